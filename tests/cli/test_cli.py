@@ -130,7 +130,7 @@ def test_a_run_without_an_accepted_method_fails_but_reports(tmp_path: Path) -> N
     arguments = ["run", "fluid_phantom", "--methods", "p1_fluid,p1_loop", "--out", str(tmp_path)]
     done = called(*arguments, *COARSE, cwd=tmp_path)
     assert done.returncode == 1, done.stderr
-    assert "Nothing was compared" in done.stdout
+    assert "nothing compared; no accepted method was run." in done.stdout
     (folder,) = tmp_path.glob("fluid_phantom+methods+*")  # other methods, another folder
     assert f"{folder.name}/report.html" in done.stdout
     results = json.loads((folder / "results.json").read_text("utf-8"))
@@ -251,8 +251,12 @@ def test_check_shows_every_figure_and_fails_when_one_moves(
     code, out, _ = here("check", "--fresh", "fluid_phantom", "--json")
     found = json.loads(out)[0]
     assert (code, found["holds"], len(found["published"])) == (0, True, 48)
-    printed = " ".join(here("check", "--fresh", "fluid_phantom")[1].split())
-    assert "no longer stand; checks: good enough, evidence: 12 of 12 checks" in printed
+    assert sum(p["result"] for p in found["published"]) == 14
+    printed = here("check", "--fresh", "fluid_phantom")[1].splitlines()
+    assert printed[0] == "fluid_phantom: holds; the verdict is good enough."
+    assert len(printed) <= 25
+    whole = here("check", "--fresh", "fluid_phantom", "--verbose")[1]
+    assert all(p["name"] in " ".join(whole.split()) for p in found["published"])
     moved = replace(phantom_result.published[0], expected=1.0)
     spoiled = replace(phantom_result, published=(moved,))
     monkeypatch.setattr(checking, "compare", lambda *_: spoiled)

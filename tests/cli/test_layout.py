@@ -12,10 +12,11 @@ import termios
 import pytest
 from commands import here
 
-from validate.cli import running
 from validate.cli.arguments import complain
+from validate.cli.check_bars import check_blocks
 from validate.cli.layout import laid, width, wrapped
 from validate.compare.verdict import Check
+from validate.report.store import check_members
 
 HEAD = ("name", "value", "why it is so")
 ROWS = (
@@ -107,4 +108,6 @@ def test_a_check_that_nothing_bounds_is_a_row_all_the_same() -> None:
     """Meshes that say nothing of convergence leave u_num, and with it u_val, infinite."""
     check = Check("force", 1.0, 2.0, math.inf, 0.1, math.inf, 0.1, "N", 3, "no answer",
                   "undecided", "why")  # fmt: skip
-    assert running._row(check, "why")[:5] == ["force", "1.000 N", "no bound", "2.000 N", "-"]
+    members = {"method": "fem", **check_members(check)}
+    (block,) = check_blocks([members])
+    assert block.lines == ("  force  ███████░░░░░░░│░░░░░>  1.00 ± no bound of 2.00 N  undecided",)

@@ -9,7 +9,7 @@ import pytest
 from tiny import TINY, Card, record, scene
 
 from validate.cli import checking, running
-from validate.cli.running import _summary
+from validate.cli.run_screen import show_run
 from validate.cli.running import run as run_command
 from validate.compare.expected import Expected
 from validate.compare.result import Result
@@ -178,8 +178,8 @@ def test_the_terminals_first_line_says_what_was_judged(
     printed = " ".join(capsys.readouterr().out.split())
     assert code == 0
     assert printed.startswith(
-        "tiny: no evidence; evidence: 0 of 1 checks; same model, the recording and the judged "
-        "model are one"
+        "tiny: no evidence (quick run); no check is evidence. Recording: same model, the recording "
+        "and the judged model are one"
     )
 
 
@@ -189,8 +189,8 @@ def test_the_terminals_first_line_says_what_was_judged(
 def test_the_first_line_doubts_what_the_warnings_doubt(
     doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _summary(replace(judged(other_model()), warnings=doubts), Path("report.html"), 1.0)
-    assert capsys.readouterr().out.startswith(f"tiny: {word} evidence: 1 of 1 checks")
+    show_run(replace(judged(other_model()), warnings=doubts), "tiny", Path("report.html"), 1.0)
+    assert capsys.readouterr().out.startswith(f"tiny: {word} 1 of 1 requirements are met; ")
 
 
 @pytest.mark.slow

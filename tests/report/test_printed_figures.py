@@ -9,7 +9,8 @@ import jsonschema
 import pytest
 from report_samples import PRINTED, small_result
 
-from validate.cli import checking, running
+from validate.cli import checking
+from validate.cli.run_screen import show_run
 from validate.compare.exhibit import Exhibit
 from validate.compare.published import Published
 from validate.compare.result import Result
@@ -66,12 +67,33 @@ def test_terminals_of_run_and_check_show_the_verdict_of_today(
     line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = showing(STATES[line])
-    checking._print(checking._content(result))
+    content = checking._content(result)
+    checking._show(content, checking._document(content, declared=True), "full")
     checked = capsys.readouterr().out
-    running._summary(result, Path("report.html"), 1.0)
+    show_run(result, "small", Path("report.html"), 1.0, "full")
     for shown in (checked, capsys.readouterr().out):
-        (row,) = (r for r in shown.splitlines() if r.startswith("soft: force"))
+        *_, row = (r for r in shown.splitlines() if r.startswith("soft: force"))
         assert f"  {line}  " in row
+    verdict = line.partition(" (")[0]
+    show_run(result, "small", Path("report.html"), 1.0)
+    assert f"Of 1 printed figures: 1 {verdict}" in capsys.readouterr().out
+
+
+def test_settings_sketches_and_citations_are_no_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photograph = replace(PRINTED, name="a photograph", ours=None, theirs=None,
+                         claim="not comparable")  # fmt: skip
+    density = replace(HELD, name="density", setting=True)
+    result = replace(small_result(), published=(HELD, photograph, density))
+    assert [p.result for p in result.published] == [True, False, False]
+    exhibit = published(result)
+    assert exhibit is not None
+    results, settings = exhibit.tables
+    assert ([row[0] for row in results.rows], settings.folded) == ([HELD.name], True)
+    show_run(result, "small", Path("report.html"), 1.0)
+    line = next(x for x in capsys.readouterr().out.splitlines() if "printed figures" in x)
+    assert line == "Of 1 printed figures: 1 reproduced; validate check small"
 
 
 @pytest.mark.parametrize(
@@ -120,5 +142,5 @@ def test_what_was_chosen_on_the_judging_twin_stands_beside_the_verdict(
     assert checked.count(chosen) == 2  # the sentence above and the row
     assert chosen in written(result, methods, tmp_path)[1]
     assert [m["chosen"] for m in document(result, CREATED)["methods"]] == [chosen, ""]
-    running._summary(result, Path("report.html"), 1.0)
+    show_run(result, "small", Path("report.html"), 1.0)
     assert chosen in " ".join(capsys.readouterr().out.split())

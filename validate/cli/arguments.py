@@ -21,6 +21,28 @@ FORCE = click.option("--force", is_flag=True, help="Replace an output that exist
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 
+def detailed(command: Callable[..., Any]) -> Any:
+    """Add `-q` and `--verbose` to a command, which gets `detail`: "short", "screen" or "full"."""
+
+    @wraps(command)
+    def chosen(*, quiet: bool, verbose: bool, **given: Any) -> Any:
+        from validate.cli.progress import quiet as without_progress
+
+        if quiet and verbose:
+            raise UsageError("-q and --verbose: give one of them")
+        if not quiet:
+            return command(detail="full" if verbose else "screen", **given)
+        with without_progress():
+            return command(detail="short", **given)
+
+    for option in (
+        click.option("-v", "--verbose", is_flag=True, help="Everything, not one screen of it."),
+        click.option("-q", "--quiet", is_flag=True, help="The answer alone, without progress."),
+    ):
+        chosen = option(chosen)
+    return chosen
+
+
 def command_line() -> tuple[str, ...]:
     """The arguments of the running command; empty where there is none."""
     context = click.get_current_context(silent=True)

@@ -5,9 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from validate.cli.check_bars import check_blocks
 from validate.cli.chosen import each
-from validate.cli.display import error_shown, figures_table, relative, say, shown, table, warn
+from validate.cli.display import error_shown, figures_table, relative, say, shown, table
 from validate.cli.progress import progress
+from validate.cli.run_screen import figures_line
+from validate.cli.screen import Block, Detail, rows, sentence_lines, show
 from validate.compare.result import KINDS, Result
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import run_folder
@@ -21,7 +24,13 @@ Json = dict[str, Any]
 
 
 def check(
-    names: tuple[str, ...], *, named: tuple[Path, ...], out: Path | None, fresh: bool, as_json: bool
+    names: tuple[str, ...],
+    *,
+    named: tuple[Path, ...],
+    out: Path | None,
+    fresh: bool,
+    as_json: bool,
+    detail: Detail = "screen",
 ) -> int:
     """Holds every figure and verdict of stored runs that match, else of new ones, which are not
     stored; 0 when no figure moved and every verdict is the declared one."""
@@ -34,7 +43,7 @@ def check(
                 content = _content(compare(experiment, Options({}), report))
         found.append(_document(content, declared=bool(experiment.published)))
         if not as_json:
-            _print(content)
+            _show(content, found[-1], detail)
         return bool(found[-1]["holds"])
 
     def failed(name: str, why: str) -> None:
@@ -98,25 +107,48 @@ def _holds(content: Json, *, declared: bool) -> bool:
     return checked and as_declared and held_some and not fallen
 
 
-def _print(content: Json) -> None:
-    say(f"{content['experiment']}: {KINDS[content['kind']]}")
-    say(content["source"])
-    figures = content["published"]
-    figures_table(figures)
-    for method in content["methods"]:
-        if method["checks"]:
-            head = ["check", "error", "2 u_val", "limit", "margin", "n", "acceptance", "validation"]
-            table(f"Requirements, {method['name']}", head, [_row(c) for c in method["checks"]])
-    for e in content["expected"]:
-        say(f"expected: {e['check']} of {e['method']} is {e['verdict']}, for {e['why']}")
-    for m in content["moved"]:
-        told = m["expected"] or "not declared"
-        warn(f"moved: {m['method']}: {m['check']} is {m['found']}; expected: {told}")
-    overall, fallen = content["overall"], sum(bool(p["fault"]) for p in figures)
-    say(
-        f"\n{len(figures)} published figures, {fallen} no longer stand; checks: "
-        f"{overall['verdict']}, evidence: {overall['evidence']} of {overall['checks']} checks\n"
-    )
+def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
+    """The answer first: what no longer stands, then how many figures have which verdict."""
+    results = [p for p in content["published"] if p["result"]]
+    fallen = [p for p in content["published"] if p["fault"]]
+    moved, overall = content["moved"], content["overall"]
+    parts = [f"the verdict is {overall['verdict']}"]
+    parts += [f"{len(moved)} verdicts moved"] if moved else []
+    parts += [f"{len(fallen)} of {len(results)} printed figures no longer stand"] if fallen else []
+    holds = "holds" if document["holds"] else "does not hold"
+    warnings = [f"{m['method']}: {m['check']} is {m['found']}; expected: "
+                f"{m['expected'] or 'not declared'}" for m in moved]  # fmt: skip
+    known = [f"expected: {e['check']} of {e['method']} is {e['verdict']}, for {e['why']}"
+             for e in content["expected"]]  # fmt: skip
+    checks = document["checks"]
+    figures = sorted(results, key=lambda p: (not p["fault"], _CLAIMS.index(p["claim"])))
+    cells = [[p["name"], shown(p["ours"], p["unit"]), shown(p["theirs"], p["unit"]), p["verdict"]]
+             for p in figures]  # fmt: skip
+    full = detail == "full"
+    show(
+        (
+            Block("", sentence_lines(f"{content['experiment']}: {holds}; {', '.join(parts)}.")),
+            Block("", tuple(k for w in warnings for k in sentence_lines(f"warning: {w}", 2))),
+            Block("", tuple(k for w in known for k in sentence_lines(w, 2)), keep=1, most=4),
+            Block("", tuple(k for p in fallen for k in sentence_lines(
+                f"{p['name']}: {p['fault']}", 2)), keep=2, most=6),
+            *([] if full else check_blocks(checks)),
+            Block("Printed figures: ours, theirs", () if full or not cells else rows(
+                [""] * 4, cells), 3, 8),
+            Block("", figures_line(results)),
+        ),
+        detail,
+    )  # fmt: skip
+    if full:
+        say(f"{KINDS[content['kind']]}; {content['source']}")
+        figures_table(content["published"])
+        for method in content["methods"]:
+            if method["checks"]:
+                table(f"Requirements, {method['name']}", _HEAD, [_row(c) for c in method["checks"]])
+
+
+_HEAD = ("check", "error", "2 u_val", "limit", "margin", "n", "acceptance", "validation")
+_CLAIMS = ("not reproduced", "not reproducible as printed", "reproduced", "not comparable")
 
 
 def _row(check: Mapping[str, Any]) -> list[str]:

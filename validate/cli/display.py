@@ -15,7 +15,7 @@ from validate.report.numbers import duration, significant, with_unit
 def console(*, error: bool = False) -> Console:
     """Standard output or error, as wide as `width` says; colours on a terminal only."""
     stream = sys.stderr if error else sys.stdout
-    return Console(stderr=error, highlight=False, width=width(stream))
+    return Console(stderr=error, highlight=False, emoji=False, width=width(stream))
 
 
 def say(text: str, style: str = "", indent: str = "", *, error: bool = False) -> None:

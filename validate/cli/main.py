@@ -18,6 +18,7 @@ from validate.cli.arguments import (
     FORCE,
     INTERRUPTED,
     complain,
+    detailed,
     output,
     require_new,
 )
@@ -134,6 +135,7 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 @click.option("--anyway", is_flag=True, help="Predict with what is not identifiable, too.")
 @click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")
 @click.option("--vtu", is_flag=True, help="Series for ParaView beside the report, in paraview/.")
+@detailed
 def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     """Replay, simulate, compare and write a report."""
     from validate.cli import running
@@ -149,6 +151,7 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 @click.option("--fresh", is_flag=True, help="Make every run anew, stored ones that match too.")
 @click.option("--out", type=FOLDER, help="Where reports lie (as for run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@detailed
 def check(names: tuple[str, ...], **options: Any) -> int:
     """Every published figure and accepted limit: ours, theirs, verdict, count.
 

@@ -7,6 +7,7 @@ is written now and then.
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from time import monotonic
 
 import click
@@ -20,6 +21,7 @@ from rich.text import Text
 from validate.cli.display import console
 from validate.cli.layout import wrapped
 
+_QUIET = ContextVar("quiet", default=False)
 _EVERY = 10.0  # s between two lines in a pipe
 _BAR = 20  # characters
 
@@ -77,9 +79,22 @@ def _clocked(seconds: float) -> str:
 
 
 @contextmanager
+def quiet() -> Iterator[None]:
+    """No progress is shown."""
+    token = _QUIET.set(True)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
+
+
+@contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
     """Yields what the work reports to: done, total, what comes next."""
     watch, screen = Watch(title), console(error=True)
+    if _QUIET.get():
+        yield watch.report
+        return
     with _bar(watch, screen) if screen.is_terminal else _lines(watch, _EVERY):
         yield watch.report
 

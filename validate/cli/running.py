@@ -1,30 +1,19 @@
 """`validate run`."""
 
 import json
-import math
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
 from validate.cli.arguments import BAD_INPUT, command_line, complain, pairs
 from validate.cli.chosen import ask_about, each
-from validate.cli.display import (
-    error_shown,
-    figures_table,
-    fits,
-    relative,
-    say,
-    shown,
-    table,
-    warn,
-)
+from validate.cli.display import relative
 from validate.cli.progress import progress
-from validate.compare.overall import PASSES
-from validate.compare.result import KINDS, MethodResult, Result
-from validate.compare.verdict import Check
+from validate.cli.run_screen import called, show_run
+from validate.cli.screen import Detail
+from validate.compare.result import Result
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
-from validate.replay.fitted_moduli import sentence
 from validate.replay.guests import with_guests
 from validate.replay.named_run import run_folder
 from validate.replay.options import Options, Report
@@ -33,7 +22,6 @@ from validate.replay.road import compare
 from validate.report import gl
 from validate.report.folder import STUDIES, locked, try_results
 from validate.report.history import replaced
-from validate.report.store import check_members, figure_members
 from validate.report.write import write_report
 
 
@@ -49,6 +37,7 @@ def run(
     anyway: bool,
     as_json: bool,
     vtu: bool = False,
+    detail: Detail = "screen",
 ) -> int:
     """Runs experiments and writes their reports; 0 when all requirements are met.
 
@@ -65,7 +54,7 @@ def run(
         if as_json:
             found.append((page.parent / "results.json").read_text(encoding="utf-8").strip())
         else:
-            _summary(result, page, perf_counter() - start)
+            show_run(result, called(experiment), page, perf_counter() - start, detail)
         return result.passed if names else result.as_expected
 
     def failed(name: str, why: str) -> None:
@@ -110,51 +99,3 @@ def _identify(
     from validate.study.identify import beside
 
     return beside(experiment, options, out, report)
-
-
-def _summary(result: Result, page: Path, seconds: float) -> None:
-    found = result.overall
-    doubt = ", in doubt" if result.warnings and found.passed else ""
-    say(f"{result.name}: {found.word}{doubt}; {found.counted}; {KINDS[result.kind]}", indent="  ")
-    for warning in (*result.warnings, *result.locking):
-        warn(warning)
-    say(result.title)
-    for one in result.moved if result.expected else ():
-        warn(f"the verdict moved: {one.words}")
-    for method in result.methods:
-        if method.checks:
-            _checks(method)
-        if ended := next((r.outcome for r in method.runs if not r.finished), None):
-            say(f"{method.name}: {ended.state} at step {ended.step}: {ended.why}", indent="  ")
-        for words in dict.fromkeys(w for r in method.runs for w in r.said):
-            say(f"{method.name}: {words}", indent="  ")
-    for value in result.identified_values:
-        say(f"{sentence(value)}.", indent="  ")
-        if value.finding:
-            warn(f"{value.name} by {value.by}: {value.finding}")
-    if result.published:
-        figures_table([figure_members(p) for p in result.published])
-    say(f"\n{result.sentence}")
-    say(f"{seconds:.1f} s wall time; report: {relative(page)}")
-
-
-def _checks(method: MethodResult) -> None:
-    """A line a check; where there is no room beside, why stands below those that are not met, and
-    what was chosen on the judging twin below all."""
-    head = ["check", "error E", "2 u_val", "limit", "margin", "n", "acceptance", "validation",
-            "why"]  # fmt: skip
-    rows = [_row(c, method.why(c)) for c in method.checks]
-    if not fits(head, rows):
-        rows = [
-            _row(c, method.chosen if c.verdict in PASSES else method.why(c)) for c in method.checks
-        ]
-    table(f"Checks of {method.name}", head, rows)
-
-
-def _row(check: Check, why: str) -> list[str]:
-    bounded = math.isfinite(check.u_val)
-    error = error_shown(check_members(check))
-    doubt = shown(2 * check.u_val, check.unit) if bounded else "no bound"
-    limit, margin = shown(check.limit, check.unit), shown(check.margin, check.unit)
-    answers = [check.acceptance, check.validation]
-    return [check.name, error, doubt, limit, margin, str(check.count), *answers, why]

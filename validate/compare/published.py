@@ -22,7 +22,8 @@ class Published:
 
     `expected` is our own value when the claim was written, good to `drift` (absolute, in `unit`).
     `missing` names what our value needs and nothing computed; `other` what the figure was printed
-    for, where this data is not that; `window` where of a run the value was counted.
+    for, where this data is not that; `window` where of a run the value was counted. `setting`: a
+    number of the set-up, a machine, a sketch or a citation, which no run can reproduce.
     """
 
     name: str
@@ -38,6 +39,14 @@ class Published:
     missing: str = ""
     window: str = ""
     other: str = ""
+    setting: bool = False
+
+    @property
+    def result(self) -> bool:
+        """Whether a result was printed that a run could reproduce: settings and pictures without
+        numbers are none, and leave the count of figures."""
+        printed = self.theirs is not None or self.claim != "not comparable"
+        return printed and not self.setting
 
     @property
     def verdict(self) -> PublishedVerdict:
@@ -113,6 +122,7 @@ class Figure:
     window: str = ""
     scale: float = 0.0
     other: str = ""
+    setting: bool = False
 
     def __post_init__(self) -> None:
         numbers = (self.theirs, self.tolerance, self.expected, self.drift)
@@ -156,7 +166,7 @@ class Figure:
             missing = f"no score {absent}"
         return Published(
             self.name, ours, self.theirs, self.tolerance, self.unit, self.claim, reason,
-            self.source, self.expected, self.drift, missing, self.window, self.other,
+            self.source, self.expected, self.drift, missing, self.window, self.other, self.setting,
         )  # fmt: skip
 
     def _ours(self, values: Values) -> float | None:

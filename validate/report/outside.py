@@ -29,7 +29,9 @@ def junit(content: Json) -> str:
     root = ElementTree.Element("testsuites", name=name)
     suites = [(f"{name}.verdict", [_verdict(content)])]
     suites += [(_clean(f"{name}.{m['name']}"), _cases(content, m)) for m in content["methods"]]
-    suites += [(f"{name}.published", [_figure(p) for p in content["published"]])]
+    suites += [
+        (f"{name}.published", [_figure(p) for p in content["published"] if p.get("result", True)])
+    ]
     for suite, cases in suites:
         if cases:
             _suite(root, suite, cases, content["created"])

@@ -222,12 +222,19 @@ def _budget(values: tuple[IdentifiedValue, ...]) -> NumberTable:
 
 
 def published(result: Result) -> Exhibit | None:
-    """Printed figures beside ours; None without any (a quick run has none)."""
+    """Printed results beside ours, settings and pictures folded below; None without any (a quick
+    run has none)."""
     if not result.published:
         return None
-    title = f"Figures printed in {result.source}, beside ours."
-    table = NumberTable("published", title, _PUBLISHED, tuple(map(_printed, result.published)))
-    return Exhibit("published", "Published figures", (), (table,))
+    groups = [
+        (NumberTable("published", f"Results printed in {result.source}, beside ours.", _PUBLISHED,
+                     tuple(_printed(p) for p in result.published if p.result))),
+        (NumberTable("published_settings", "Settings, sketches and citations of the source: no "
+                     "results, and not counted as figures.", _PUBLISHED,
+                     tuple(_printed(p) for p in result.published if not p.result), folded=True)),
+    ]  # fmt: skip
+    tables = tuple(table for table in groups if table.rows)
+    return Exhibit("published", "Published figures", (), tables)
 
 
 def _printed(figure: Published) -> tuple[Entry | TableCell, ...]:

@@ -246,7 +246,10 @@ def check_members(check: Check) -> Json:
 
 def figure_members(figure: Published) -> Json:
     """A printed figure with its verdict of today, and why the claim does not stand, if so."""
-    judged = {"verdict": figure.verdict, "reason": figure.why, "fault": figure.fault}
+    judged = {
+        "verdict": figure.verdict, "reason": figure.why, "fault": figure.fault,
+        "result": figure.result,
+    }  # fmt: skip
     return members(figure) | judged
 
 

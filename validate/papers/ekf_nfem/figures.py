@@ -72,7 +72,7 @@ def rate(cells: int, name: str, method: str, theirs: float) -> Figure:
 
 def given(name: str, theirs: float | None, unit: str, source: str, why: str) -> Figure:
     """What nothing of ours can stand beside: an input, a demand, a diagram."""
-    return Figure(name, None, theirs, None, unit, "not comparable", why, source)
+    return Figure(name, None, theirs, None, unit, "not comparable", why, source, setting=True)
 
 
 def noise_left(source: str, sd: float, case: str, said: str) -> Figure:
@@ -105,7 +105,9 @@ def count(
 ) -> Figure:
     """A count of a mesh that the paper does not print: held for ours, no reproduction."""
     said = f"a count of our own mesh, {why}"
-    return Figure(name, of, theirs, None, "1", "not comparable", said, source, ours, 0.0)
+    return Figure(
+        name, of, theirs, None, "1", "not comparable", said, source, ours, 0.0, setting=True
+    )  # fmt: skip
 
 
 def _reached(name: str, hz: int, theirs: float) -> Figure:
@@ -201,7 +203,7 @@ CONE_FIGURES = (
     Figure(
         "shear modulus of Ecoflex 0030", None, 22.081e3, None, "Pa", "not comparable",
         "taken from others and not measured on the cone: its machine's log is not printed",
-        "section 3.4",
+        "section 3.4", setting=True,
     ),
     Figure(
         "Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",

@@ -83,7 +83,7 @@ FIGURES = (
     Figure(
         "thickness of the block", None, 0.012, None, "m", "not comparable",
         "plane: forces are per metre, and a thickness changes neither pressure nor volume ratio",
-        "section 3.3",
+        "section 3.3", setting=True,
     ),
     taken("modulus of the block", 34e3, _P.material.E, "Pa", "section 3.3"),
     taken("Poisson ratio of the block", 0.35, _P.material.nu, "1", "section 3.3"),

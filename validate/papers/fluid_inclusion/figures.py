@@ -118,15 +118,15 @@ FIGURES = (
     ),
     Figure(
         "nodes of the phantom's mesh", _nodes, 1328.0, None, "1", "not comparable", _SIZED,
-        "section 4.4", 1328.0, 0.0,
+        "section 4.4", 1328.0, 0.0, setting=True,
     ),
     Figure(
         "unknowns of the phantom's mesh", lambda v: 3 * _nodes(v), 3984.0, None, "1",
-        "not comparable", _SIZED, "section 4.4", 3984.0, 0.0,
+        "not comparable", _SIZED, "section 4.4", 3984.0, 0.0, setting=True,
     ),
     Figure(
         "nodes of the cavity", _cavity_nodes, 80.0, None, "1", "not comparable", _SIZED,
-        "section 5.3", 80.0, 0.0,
+        "section 5.3", 80.0, 0.0, setting=True,
     ),
     Figure(
         "rate of the condensed phantom, 1 update", lambda v: 1 / v["p1_loop"]["step.p50"], 3000.0,

@@ -1,0 +1,125 @@
+"""One screen of text: blocks of lines that share a number of lines, and bars in characters.
+
+show([Block("Checks", rows, keep=2, most=8)])  # on at most 25 lines
+"""
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from validate.cli.display import console, say
+from validate.cli.layout import wrapped
+
+LINES = 25
+Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
+_BAR = 20  # characters of a bar
+_LIMIT = 14  # of them up to the limit
+_NAME = 12  # characters of a name that is cut
+
+
+@dataclass(frozen=True)
+class Block:
+    """Lines below a title ("" for none), of which the first `most` are shown.
+
+    `keep` lines stay however little room there is (None: all). `rest` follows the number of lines
+    that are left out.
+    """
+
+    title: str
+    lines: tuple[str, ...]
+    keep: int | None = None
+    most: int | None = None
+    rest: str = "more: --verbose"
+
+    def height(self, shown: int) -> int:
+        """Lines on the screen where so many of its own are shown."""
+        return bool(self.title) + shown + (shown < len(self.lines))
+
+
+def fitted(blocks: Sequence[Block], most: float = LINES) -> list[Block]:
+    """The blocks that have lines, the longest shortened until all have room."""
+    found = [b for b in blocks if b.lines]
+    counts = [min(len(b.lines), b.most or len(b.lines)) for b in found]
+    least = [n if b.keep is None else min(n, b.keep) for b, n in zip(found, counts, strict=True)]
+    while sum(b.height(n) for b, n in zip(found, counts, strict=True)) > most:
+        i = max(range(len(found)), key=lambda i: counts[i] - least[i])
+        if counts[i] == least[i]:
+            break
+        counts[i] -= 1
+    return [
+        replace(b, lines=(*b.lines[:n], f"  {len(b.lines) - n} {b.rest}"), most=None)
+        if n < len(b.lines) else b
+        for b, n in zip(found, counts, strict=True)
+    ]  # fmt: skip
+
+
+def show(blocks: Sequence[Block], detail: Detail = "screen") -> None:
+    """Print the blocks with their titles in bold: on one screen, whole, or the first one alone."""
+    screen = console()
+    found = [b for b in blocks if b.lines]
+    if detail == "screen":
+        found = fitted(found)
+    for block in found[:1] if detail == "short" else found:
+        if block.title:
+            say(block.title, "bold")
+        for line in block.lines:
+            screen.print(line, markup=False, soft_wrap=True)
+
+
+def width() -> int:
+    """Columns of the screen."""
+    return console().width
+
+
+def sentence_lines(text: str, most: int | None = None, indent: str = "  ") -> tuple[str, ...]:
+    """A sentence in lines of the screen's width; an ellipsis stands for what follows `most`."""
+    lines = wrapped(text, width(), indent)
+    if most is None or len(lines) <= most:
+        return tuple(lines)
+    return (*lines[: most - 1], f"{lines[most - 1][: width() - 2].rstrip(' ,;:')} …")
+
+
+def rows(head: Sequence[str], cells: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """A table with one line a row, indented; first cells are cut where there is no room."""
+    every = [*([head] if any(head) else []), *cells]
+    widths = [max(map(len, column)) for column in zip(*every, strict=True)]
+    room = width() - 2 - sum(w + 2 for w in widths[1:])
+    widths[0] = min(widths[0], max(room, _NAME))
+    texts = ([cut(row[0], widths[0]), *row[1:]] for row in every)
+    return tuple(
+        "  " + "  ".join(f"{t:<{w}}" for t, w in zip(row, widths, strict=True)).rstrip()
+        for row in texts
+    )
+
+
+def cut(text: str, room: int) -> str:
+    """A text of at most `room` characters."""
+    return text if len(text) <= room else f"{text[: room - 1]}…"
+
+
+def bar(error: float, doubt: float, limit: float) -> str:
+    """An error, `doubt` above it, and a limit, all in one unit, as characters.
+
+    The limit always stands at the same place; what goes beyond the bar ends in ">". An error or a
+    doubt that is not finite fills the bar.
+    """
+    full, soft, mark = _characters()
+    size = abs(error) if math.isfinite(error) else math.inf
+    reach = size + (doubt if math.isfinite(doubt) else math.inf)
+    places = [(i + 0.5) * limit / _LIMIT for i in range(_BAR)]
+    text = "".join(full if x < size else soft if x < reach else " " for x in places)
+    text = f"{text[:_LIMIT]}{mark}{text[_LIMIT:]}"
+    return f"{text[:-1]}>" if reach > _BAR / _LIMIT * limit else text
+
+
+def legend(limit: str) -> str:
+    """What the characters of a bar are."""
+    full, soft, mark = _characters()
+    return f"{full} error, {soft} 2 u_val, {mark} {limit}"
+
+
+def _characters() -> tuple[str, str, str]:
+    unicode = (getattr(sys.stdout, "encoding", None) or "").lower().startswith("utf")
+    return ("█", "░", "│") if unicode else ("#", "-", "|")
