@@ -112,6 +112,7 @@ PUBLISHED = (
 
 EXPERIMENT = Experiment(
     name="ecoflex_cylinder",
+    needs="ecoflex-compression",
     title="Ecoflex 00-30 cylinder compressed between plates, five logs",
     source="abubakardawood/tissue-phantom-material-database (CC BY 4.0); Dawood et al. (2026)",
     parameters=LoggedCylinder(),

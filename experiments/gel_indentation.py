@@ -57,6 +57,7 @@ UNCERTAINTY = Uncertainty(
 )  # fmt: skip
 EXPERIMENT = Experiment(
     name="gel_indentation",
+    needs="gel-indentation",
     title="Particles in an indented gel",
     source="FranckLab/SerialTrack fdb01c6 (MIT); Yang et al. (2022), SoftwareX 19, 101204",
     parameters=GelIndentation(),

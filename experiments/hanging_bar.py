@@ -38,6 +38,7 @@ METHODS = {
 }
 EXPERIMENT = Experiment(
     name="hanging_bar",
+    needs="hanging-bar",
     title="A bar that hangs under its weight, by simulators of others",
     source="AustrianTradingMachine/Newton 9e5d430 (MIT)",
     parameters=HangingBar(),

@@ -32,6 +32,7 @@ LESS = Input(
 
 EXPERIMENT = Experiment(
     name="multimode",
+    needs="multimode",
     title="treloar: identified in uniaxial tension, predicted in equibiaxial tension, pure shear",
     source="HyperData.jl 66f5b45, Hyperelastics.jl 0fbfeb3 (MIT)",
     parameters=Multimode(),

@@ -37,6 +37,7 @@ CALIBRATIONS = tuple(
 
 EXPERIMENT = Experiment(
     name="rubber_strip",
+    needs="rubber-strip",
     title="Rubber strip: Poisson ratio from the first steps, contraction at the last predicted",
     source="SolavLab/DuoDIC b2c2147 (Apache-2.0)",
     parameters=Strip(),

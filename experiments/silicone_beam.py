@@ -192,6 +192,7 @@ PART = "a tenth of its measured peak to peak"
 
 EXPERIMENT = Experiment(
     name="silicone_beam",
+    needs="silicone-beam",
     title="Silicone beam let go under its weight: its swing and its rest",
     source="srl-ethz/diffPD_sim2real 825e7b7 (MIT)",
     parameters=ReleasedBeam(),

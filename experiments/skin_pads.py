@@ -64,6 +64,7 @@ UNCERTAINTY = Uncertainty(
 
 EXPERIMENT = Experiment(
     name="skin_pads",
+    needs="skin-pads",
     title="Skin in vivo between two pads",
     source="aflahelouneg/inverse_identification_soft_tissue e9c7a1c (MIT)",
     parameters=PulledSkin(),

@@ -48,6 +48,7 @@ PUBLISHED = (
 
 EXPERIMENT = Experiment(
     name="stylus_phantom",
+    needs="stylus",
     title="Landmarks of a phantom touched with a tracked stylus",
     source="PlusToolkit/PlusLibData 51dcbb7 (BSD-3)",
     parameters=StylusPhantom(),

@@ -25,6 +25,7 @@ UNCERTAINTY = Uncertainty(
 
 EXPERIMENT = Experiment(
     name="ultrasound_disk",
+    needs="ultrasound-disk",
     title="A disk of 20 mm in B-mode images",
     source="creatis-ULTIM/PyMUST c605195 (LGPL-3)",
     parameters=ImagedDisk(),

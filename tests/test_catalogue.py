@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from validate.catalogue import Card, card, experiment_files, shipped
+from validate.datasets.registry import data_sets
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file, root_of
@@ -17,7 +18,8 @@ def test_a_card_says_what_the_experiment_itself_says(project_root: Path) -> None
     assert len(files) >= 9
     for path in files.values():
         loaded = load_file(path)
-        assert card(path) == Card(loaded.name, loaded.title, loaded.source)
+        assert loaded.needs in ("", *(s.name for s in data_sets()))
+        assert card(path) == Card(loaded.name, loaded.title, loaded.source, needs=loaded.needs)
 
 
 @pytest.mark.parametrize(

@@ -19,13 +19,15 @@ _PROJECT = (".git", "pyproject.toml")  # what the top folder of a project holds
 class Card:
     """An experiment's own words about itself; an empty source where it does not print one.
 
-    `note` says why a file cannot be an experiment; empty for one that can.
+    `needs` names the public data set that it runs on; empty: none. `note` says why a file cannot be
+    an experiment; empty for one that can.
     """
 
     name: str
     title: str
     source: str
     note: str = ""
+    needs: str = ""
 
 
 def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]:
@@ -35,16 +37,19 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
     Of two with one name the later of these is meant. No other folder is looked at. Raises
     `UsageError` for a named folder without a file that could be an experiment.
     """
-    own = (folder / "experiments" for folder in (_project(start), start))
-    found = {f.stem: f for folder in (shipped(), *own) for f in _files(folder)}
     for folder in named:
-        files = _files(folder.resolve())
-        if not files:
+        if not _files(folder.resolve()):
             raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
-        found |= {f.stem: f for f in files}
+    found = {f.stem: f for folder in searched_folders(start, named) for f in _files(folder)}
     if not found:
         raise UsageError("no experiments/ folder here or in this project, and none was installed")
     return found
+
+
+def searched_folders(start: Path, named: Sequence[Path] = ()) -> tuple[Path, ...]:
+    """The folders that experiments are looked for in; of two with one name the later is meant."""
+    own = (folder / "experiments" for folder in (_project(start), start))
+    return tuple(dict.fromkeys((shipped(), *own, *(folder.resolve() for folder in named))))
 
 
 def shipped() -> Path:
@@ -76,7 +81,8 @@ def card(path: Path) -> Card:
         return Card(path.stem, "", "", "defines no EXPERIMENT")
     texts = _spelt(module)
     docstring = (ast.get_docstring(module) or "").partition("\n")[0]
-    return Card(path.stem, texts.get("title", docstring), texts.get("source", ""))
+    title, needs = texts.get("title", docstring), texts.get("needs", "")
+    return Card(path.stem, title, texts.get("source", ""), needs=needs)
 
 
 def _names_experiment(node: ast.AST) -> bool:

@@ -163,10 +163,10 @@ def test_other_documents_in_such_containers_are_none(tmp_path: Path) -> None:
     as_xls(whole)
     data = whole.read_bytes()
     whole.write_bytes(data.replace("Workbook".encode("utf-16-le"), "Document".encode("utf-16-le")))
-    with pytest.raises(UsageError, match="not recognised"):
+    with pytest.raises(UsageError, match="unknown format"):
         recognised(whole)
     whole.write_bytes(data[:20])
-    with pytest.raises(UsageError, match="not recognised"):
+    with pytest.raises(UsageError, match="unknown format"):
         recognised(whole)
 
 

@@ -65,6 +65,11 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
     _require_of_the_event(wanted)
     try_file(out)
     named = _by(files, by)
+    for file in files[1:]:
+        if file.exists() and files[0].exists() and file.samefile(files[0]):
+            raise UsageError(
+                f"align: {file} is given twice; its clock is its own, name another recording"
+            )
     first, *others = (read_recording(file) for file in files)
     require_other_topics([first, *others])
     found, refused = list[Moved](), list[str]()

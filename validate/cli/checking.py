@@ -51,7 +51,7 @@ def check(
 
     code = each(names, named, one, failed)
     if as_json:
-        print(json.dumps(found, indent=1, allow_nan=False))
+        print(json.dumps(found, ensure_ascii=False, indent=1, allow_nan=False))
     return code
 
 

@@ -1,4 +1,4 @@
-"""`validate compare`: stored runs side by side, in so many lines as a screen has."""
+"""`validate compare`: stored runs side by side, on one screen."""
 
 import json
 import sys
@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.arguments import complain
-from validate.cli.display import relative, say, warn
+from validate.cli.display import relative, say
 from validate.cli.layout import laid, width, wrapped
+from validate.cli.screen import LINES, sentence_lines
 from validate.errors import UsageError
 from validate.report.folder import try_results
 from validate.report.numbers import shown_unit, significant, text
@@ -18,7 +19,6 @@ from validate.study.compare_page import write_comparison
 from validate.study.narrow import narrowed, ordered
 from validate.study.stored import Pair, Row, SideBySide, pairs, read_run, side_by_side
 
-_LINES = 40  # of the whole output
 _LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
 _ROUNDING = 1e-9  # relative: the same computation in another order
 _PARAMETERS = 8  # rows of parameters that differ
@@ -74,22 +74,37 @@ def _name(found: SideBySide, paths: tuple[Path, ...], wanted: Shown) -> str:
 
 
 def _show(found: SideBySide, *, everything: bool) -> None:
+    """The largest change first, then pairs of methods and parameters, on one screen."""
     columns = width(sys.stdout)
-    for warning in found.warnings:
-        warn(warning, error=True)
-    said = sum(len(wrapped(f"warning: {w}", columns, "  ")) for w in found.warnings)
+    warnings = [
+        k
+        for w in found.warnings
+        for k in sentence_lines(f"warning: {w}", None if everything else 2)
+    ]
+    head = [*sentence_lines(_headline(found)), *warnings]
     parameters = _parameters(found, columns, everything=everything)
     shown, more, unseen = pairs(found, every=everything)
-    ends = 6 + len(parameters) + said  # what is left out, the count, the page's place
-    lines, rows, drawn = _pairs(shown, columns, None if everything else max(8, _LINES - ends))
-    for line in (*lines, *parameters):
+    room = None if everything else max(6, LINES - len(head) - len(parameters) - 3)
+    lines, rows, drawn = _pairs(shown, columns, room)
+    for line in (*head, *lines, *parameters):
         say(line)
     more += len(shown) - drawn
     left = sum(len(p.rows) for p in shown) - rows
     counts = {"scores": left, "pairs of methods": more, "scores that no pair has": unseen}
     if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
         say(f"left out: {what}; --all, --method, --score or --json show them")
-    say(f"{len(found.rows)} scores of {len(found.runs)} runs compared")
+
+
+def _headline(found: SideBySide) -> str:
+    """How many scores of how many runs, and which one changed most between two of them."""
+    count = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
+    errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
+    changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
+    if not changed:
+        return f"{count}; no error changed."
+    _, change, row = max(changed, key=lambda c: c[0])
+    name = f"{row.method}: {row.score}" if row.method else row.score
+    return f"{count}; largest change: {name}, {100 * change:+.3g} %."
 
 
 def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[str], int, int]:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import say, table
-from validate.cli.studying import StudyOptions, end, running, written
+from validate.cli.screen import Block, rows, sentence_lines
+from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
 from validate.replay.options import Options
@@ -32,21 +32,28 @@ def covering(
         )  # fmt: skip
     page = written(experiment, coverage_page.told(found), place, common)
     if not common.as_json:
-        _show(found)
-        end(found.done, page)
+        answer(_blocks(found), found.done, page, common.detail)
     return OK if found.passed else FAILED
 
 
-def _show(found: Coverage) -> None:
-    rows = [list(share_row(q)) for q in found.quantities]
-    rows += [
-        [t.method, f"all {t.checks} (Holm)", percent(t.share), interval(t.share),
-         "-", "-", "-", "-", "holds" if t.holds else "too narrow"]
+def _blocks(found: Coverage) -> list[Block]:
+    """Whether the verdicts are right as often as they say, then every quantity."""
+    cells = [
+        [f"{row[0]}: {row[1]}", row[2], row[3], row[-1]] for row in map(share_row, found.quantities)
+    ]
+    cells += [
+        [f"{t.method}: all {t.checks} (Holm)", percent(t.share), interval(t.share),
+         "holds" if t.holds else "too narrow"]
         for t in found.together
     ]  # fmt: skip
-    table("A perfect model under our own verdicts", HEAD, rows)
-    for q in found.quantities:
-        if q.finding.words:
-            say(f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}", indent="  ")
     quick = "QUICK: fewer draws; " if found.quick else ""
-    say(f"\n{quick}{coverage_page.sentence(found)}")
+    notes = [
+        f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
+        for q in found.quantities if q.finding.words
+    ]  # fmt: skip
+    title = "A perfect model under these verdicts"
+    return [
+        Block("", sentence_lines(f"{quick}{coverage_page.sentence(found)}")),
+        Block(title, rows(["", *HEAD[2:4], "finding"], cells) if cells else (), 4),
+        Block("", tuple(k for note in notes for k in sentence_lines(note, 2)), keep=2, most=6),
+    ]

@@ -14,7 +14,7 @@ from validate.errors import RecordingError
 def show(as_json: bool) -> None:
     """Prints every data set, and where it is here."""
     if as_json:
-        print(json.dumps([_document(s) for s in data_sets()], indent=2))
+        print(json.dumps([_document(s) for s in data_sets()], ensure_ascii=False, indent=2))
         return
     rows = [[s.name, s.title, s.licence, _size(s), _state(s)] for s in data_sets()]
     table("", ["name", "what", "licence", "files", "here"], rows)

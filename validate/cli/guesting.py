@@ -30,7 +30,11 @@ def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
     guest = Guest(command, seconds=seconds, memory=memory)
     found = [row for rows in check_guest(guest) for row in rows]
     if as_json:
-        print(json.dumps([asdict(row) for row in found], indent=2, allow_nan=False))
+        print(
+            json.dumps(
+                [asdict(row) for row in found], ensure_ascii=False, indent=2, allow_nan=False
+            )
+        )
     else:
         _print(found)
     states = {row.state for row in found}

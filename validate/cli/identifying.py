@@ -4,16 +4,17 @@ from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import say, shown, table, warn
-from validate.cli.studying import StudyOptions, end, running, written
+from validate.cli.display import shown
+from validate.cli.screen import Block, Detail, rows, sentence_lines
+from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
 from validate.replay.options import Options
 from validate.study import identify_page
 from validate.study.identify import STARTS, IdentifyStudy, identification
-from validate.study.identify_exhibits import units, verdict
+from validate.study.identify_exhibits import units
 
-_HEAD = ("parameter", "value", "95 % from", "to", "verdict")
+_HEAD = ("", "value", "95 % from", "to", "identified")
 
 
 def identifying(
@@ -35,26 +36,35 @@ def identifying(
         )  # fmt: skip
     page = written(experiment, identify_page.told(found), place, common)
     if not common.as_json:
-        _show(found)
-        end(found.done, page)
+        answer(_blocks(found, common.detail), found.done, page, common.detail)
     return OK if found.identified else FAILED
 
 
-def _show(found: IdentifyStudy) -> None:
-    for one in found.calibrated:
-        known = units(one)
-        rows = [
-            [e.name, *(shown(v, known[e.name]) for v in (e.value, e.low, e.high)), verdict(e)]
-            for e in one.found.estimates
-        ]
-        table(f"Fitted with {one.problem.calibration.method} on {one.on}", _HEAD, rows)
+def _blocks(found: IdentifyStudy, detail: Detail) -> list[Block]:
+    """How many parameters are identified, why others are not, then every value."""
+    estimates = [(one, e) for one in found.calibrated for e in one.found.estimates]
+    known = sum(e.identified for _, e in estimates)
+    quick = " (quick run)" if found.quick else ""
+    first = f"{known} of {len(estimates)} parameters are identified{quick}."
+    missing = [k for line in identify_page.unidentified(found) for k in sentence_lines(line, 3)]
+    cells = []
+    for one, e in sorted(estimates, key=lambda pair: pair[1].identified):
+        method = one.problem.calibration.method
+        name = e.name if e.name.startswith(method) else f"{e.name} ({method})"
+        numbers = [shown(v, units(one)[e.name]) for v in (e.value, e.low, e.high)]
+        cells.append([name, *numbers, "yes" if e.identified else "no"])
+    blocks = [
+        Block("", sentence_lines(first)),
+        Block("", tuple(missing), keep=3),
+        Block("Fitted values", rows(_HEAD, cells) if cells else (), 6),
+    ]
+    for one in found.calibrated if detail == "full" else ():
         names = one.found.space.names
         pairs_ = [
             f"{a} and {b} {one.found.correlations[i, j]:+.2f}"
             for i, a in enumerate(names) for j, b in enumerate(names) if i < j
         ]  # fmt: skip
-        if pairs_:
-            say(f"correlations: {'; '.join(pairs_)}", indent="  ")
-    say(f"\n{identify_page.sentence(found)}")
-    for line in identify_page.unidentified(found):
-        warn(line)
+        on = f"{one.problem.calibration.method} on {one.on}"
+        words = f"{on}; correlations: {'; '.join(pairs_)}" if pairs_ else on
+        blocks.append(Block("", sentence_lines(words, 2), keep=1))
+    return blocks

@@ -14,7 +14,7 @@ def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...
     """Print what a file of any format holds; return 1 where it has a defect, else 0."""
     found = inspect_file(file, kind, pairs(mapping, "--map"))
     if as_json:
-        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        print(json.dumps(found.to_dict(), ensure_ascii=False, indent=2, allow_nan=False))
     else:
         _print(found)
     return FAILED if found.defects else OK
@@ -24,10 +24,10 @@ def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
     """Prints messages of a topic of an MCAP file, decoded, a line each or as one document."""
     found = list(messages_in(file, topic, most))
     if as_json:
-        print(json.dumps(found, indent=2, allow_nan=False))
+        print(json.dumps(found, ensure_ascii=False, indent=2, allow_nan=False))
         return
     for one in found:
-        print(json.dumps(one, allow_nan=False))
+        print(json.dumps(one, ensure_ascii=False, allow_nan=False))
 
 
 def _print(found: Inspection) -> None:

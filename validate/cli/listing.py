@@ -1,26 +1,34 @@
 """`validate list NAME`: one experiment with every parameter."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from validate.cli.display import say, table
+from validate.cli.screen import Block, Detail, cut, rows, sentence_lines
+from validate.cli.screen import show as show_screen
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.law_solver import laws_of
 from validate.report.plain import members
 
+_DEFAULT = 16  # characters of a default
+_FIRST = 10  # of each list on the screen
 
-def show(name: str, named: tuple[Path, ...], as_json: bool) -> None:
-    """Prints parameters, methods and accepted limits of an experiment."""
+
+def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "screen") -> None:
+    """Print parameters, methods and requirements of an experiment; "full" prints all of them."""
     experiment = find(name, Path.cwd(), named)
     if as_json:
         document = _summary(experiment) | _details(experiment)
-        print(json.dumps(document, indent=2, allow_nan=False))
+        print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
+    elif detail == "screen":
+        show_screen(_blocks(experiment))
     else:
-        _print(experiment)
+        _in_full(experiment)
 
 
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
@@ -62,13 +70,13 @@ def _details(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def _print(experiment: Experiment) -> None:
+def _in_full(experiment: Experiment) -> None:
     say(f"{experiment.name}: {experiment.title}", "bold")
     say(experiment.source)
-    rows = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
-    table("Parameters", ["path", "default", "what it is (type)"], rows)
+    rows_ = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
+    table("Parameters", ["path", "default", "what it is (type)"], rows_)
     methods = [
-        [k, m.label, "accepted" if k in experiment.accepted else ""]
+        [k, m.label, "checked" if k in experiment.accepted else ""]
         for k, m in experiment.methods.items()
     ]
     table("Methods", ["name", "what", ""], methods)
@@ -80,6 +88,53 @@ def _print(experiment: Experiment) -> None:
     table("Requirements", ["quantity", "at", "of many", "limit (SI)", "why"], required)
     known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
     table("Expected verdicts", ["method", "check", "verdict", "why"], known)
+
+
+def _blocks(experiment: Experiment) -> list[Block]:
+    """What it is, the parameters that matter most, methods and requirements."""
+    cells = [[p.path, cut(_default(p), _DEFAULT), p.doc] for p in _by_weight(experiment)]
+    methods = [
+        [f"{k}{' (checked)' if k in experiment.accepted else ''}", m.label]
+        for k, m in experiment.methods.items()
+    ]
+    required = [
+        [a.quantity, ", ".join(a.loads) or "all", a.statistic,
+         "none" if a.required is None else f"{a.required:g}", a.why]
+        for a in experiment.accept
+    ]  # fmt: skip
+    known = [[f"{e.method}: {e.check}", e.verdict, e.why] for e in experiment.expected]
+    return [
+        Block("", sentence_lines(f"{experiment.name}: {experiment.title}. {experiment.source}")),
+        _block("Parameters (--set PATH=VALUE)", cells, _FIRST),
+        _block("Methods", methods, 3),
+        _block("Requirements, limits in SI", required, 2),
+        _block("Expected verdicts", known, 1),
+    ]
+
+
+def _block(title: str, cells: Sequence[Sequence[str]], keep: int) -> Block:
+    """The first rows of a list, a line each; the last column is cut at the screen's edge."""
+    first = [[*map(str, row[:-1]), " ".join(row[-1].split())] for row in cells[:_FIRST]]
+    columns = len(first[0]) if first else 0
+    lines = rows([""] * columns, first, soft=columns - 1)
+    return Block(title, lines, keep, None, "more: --all", len(cells) - len(first))
+
+
+def _by_weight(experiment: Experiment) -> list[Parameter]:
+    """Parameters by how much they matter: identified ones, those to be given, the material, then
+    in their order, those of methods last."""
+    free = {path for c in experiment.calibrations for path in c.paths}
+
+    def weight(p: Parameter) -> int:
+        if p.path in free:
+            return 0
+        if p.missing:
+            return 1
+        if p.path.startswith("material."):
+            return 2
+        return 4 if p.path.startswith("methods.") else 3
+
+    return sorted(parameters_of(experiment), key=weight)
 
 
 def _default(parameter: Parameter) -> str:

@@ -22,8 +22,10 @@ from validate.cli.arguments import (
     output,
     require_new,
 )
+from validate.cli.help import Sections
 from validate.cli.of_guests import guest
 from validate.cli.of_recordings import COMMANDS
+from validate.cli.pipes import outlives_reader
 from validate.errors import UsageError, ValidateError
 from validate.places import of_the_place, why_not
 
@@ -36,6 +38,7 @@ def main(argv: list[str] | None = None) -> None:
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    sys.stdout, sys.stderr = outlives_reader(sys.stdout), outlives_reader(sys.stderr)
     sys.exit(run(sys.argv[1:] if argv is None else argv))
 
 
@@ -96,29 +99,43 @@ def _bug() -> int:
 
 GUESTS = click.option(
     "--guest", "guests", multiple=True, metavar="COMMAND",
-    help="A program of others as one more method (docs/guests.md).",
+    help="An external simulator as one more method (docs/guests.md).",
 )  # fmt: skip
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Sections, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="validate")
 def cli() -> None:
-    """Does my simulation predict what was measured, within the error of the measurement?"""
+    """Does my simulation predict what was measured, within the error of the
+    measurement?
+
+    \b
+    Example:
+      validate run fluid_phantom
+      validate new my_gel --from log.mcap
+    """
 
 
 @cli.command("list")
 @click.argument("name", required=False)
 @EXPERIMENTS
+@click.option("--all", "everything", is_flag=True, help="With NAME: every parameter.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
-    """Experiments; with NAME its parameters, methods, scores and source."""
+def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: bool) -> None:
+    """List experiments, or the parameters and methods of one.
+
+    \b
+    Example:
+      validate list
+      validate list hanging_bar
+    """
     if name is None:
         from validate.cli import names
 
         return names.show(named, as_json)
     from validate.cli import listing
 
-    return listing.show(name, named, as_json)
+    return listing.show(name, named, as_json, "full" if everything else "screen")
 
 
 @cli.command("run")
@@ -137,7 +154,14 @@ def list_(name: str | None, named: tuple[Path, ...], as_json: bool) -> None:
 @click.option("--vtu", is_flag=True, help="Series for ParaView beside the report, in paraview/.")
 @detailed
 def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
-    """Replay, simulate, compare and write a report."""
+    """Simulate, compare with the measurement and write the report.
+
+    Exit code 0: every requirement is met. 1: one is not, or is undecided.
+
+    \b
+    Example:
+      validate run kf_cube --quick
+    """
     from validate.cli import running
 
     if everything == bool(names):
@@ -153,9 +177,13 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 @detailed
 def check(names: tuple[str, ...], **options: Any) -> int:
-    """Every published figure and accepted limit: ours, theirs, verdict, count.
+    """Check that printed figures and declared verdicts still hold.
 
-    A stored run is reused where code, experiment, recordings, parameters and machine are the same.
+    A stored run is used where code, files, parameters and machine are the same.
+
+    \b
+    Example:
+      validate check hanging_bar
     """
     from validate.cli import checking
 
@@ -168,7 +196,12 @@ def check(names: tuple[str, ...], **options: Any) -> int:
 @click.option("--out", type=FOLDER, help="Where its reports are (default: as of run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
-    """The runs of an experiment, and what changed from one to the next."""
+    """Show past runs and what changed between them.
+
+    \b
+    Example:
+      validate history kf_cube
+    """
     from validate.cli import past
 
     past.show(name, named, out, as_json)
@@ -178,7 +211,12 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
 @click.option("--out", type=FOLDER, help="Where the reports are (default: as of run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, no page.")
 def summary_(out: Path | None, as_json: bool) -> None:
-    """Bias and scatter of what was predicted, over every stored run."""
+    """Summarise bias and scatter over all stored runs.
+
+    \b
+    Example:
+      validate summary
+    """
     from validate.cli import summing
 
     summing.show(out, as_json=as_json)
@@ -196,7 +234,12 @@ def summary_(out: Path | None, as_json: bool) -> None:
 @click.option("--out", type=FOLDER, help="Where the page goes (default: beside the first run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
-    """Stored runs (report folders) side by side, drawn; nothing is run again."""
+    """Compare stored runs side by side, without new runs.
+
+    \b
+    Example:
+      validate compare reports/kf_cube reports/kf_cube_inertia
+    """
     from validate.cli import comparing
 
     comparing.compare(runs, comparing.Shown(**wanted), out, as_json=as_json)
@@ -208,7 +251,12 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 @click.option("--latex", type=FILE, help="A tabular of its checks.")
 @FORCE
 def export_(run: Path, junit: Path | None, latex: Path | None, *, force: bool) -> None:
-    """A stored run (a report folder) for other programs; nothing is run again."""
+    """Write a stored run as JUnit XML or LaTeX.
+
+    \b
+    Example:
+      validate export reports/kf_cube --junit checks.xml --latex checks.tex
+    """
     from validate.cli import exporting
 
     require_new((file for file in (junit, latex) if file is not None), (run,), force=force)
@@ -217,7 +265,12 @@ def export_(run: Path, junit: Path | None, latex: Path | None, *, force: bool) -
 
 @cli.group()
 def study() -> None:
-    """Many runs of any experiment, on Dask; goes on where it was stopped."""
+    """Run many variations of an experiment; a stopped study resumes.
+
+    \b
+    Example:
+      validate study stability kf_cube --quick
+    """
 
 
 def _studied(command: Any) -> Any:
@@ -236,7 +289,7 @@ def _studied(command: Any) -> Any:
         click.argument("name", metavar="NAME|FILE.py"),
     ):
         command = option(command)
-    return command
+    return detailed(command)
 
 
 def _common(options: dict[str, Any]) -> Any:
@@ -265,7 +318,12 @@ def _common(options: dict[str, Any]) -> Any:
 )
 @_studied
 def filters(name: str, **options: Any) -> int:
-    """Settings, rates, noise and seeds of filters: ranking, Pareto front, consistency."""
+    """Rank filter settings on your recording.
+
+    \b
+    Example:
+      validate study filters kf_cube --quick --sweep methods.kf_load.settings.Q=log:1e-12:1e-8:3
+    """
     from validate.cli import studying
 
     return studying.filters(name, _common(options), **options)
@@ -274,7 +332,12 @@ def filters(name: str, **options: Any) -> int:
 @study.command("stability")
 @_studied
 def stability_(name: str, **options: Any) -> int:
-    """Where every scheme is stable, over step, material, damping, cells and mesh."""
+    """Map where each time-stepping scheme stays stable.
+
+    \b
+    Example:
+      validate study stability kf_cube --quick
+    """
     from validate.cli import studying
 
     return studying.stability_map(name, _common(options))
@@ -284,7 +347,12 @@ def stability_(name: str, **options: Any) -> int:
 @GUESTS
 @_studied
 def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
-    """Error against time per step: every solver, mesh, element and step; the Pareto front."""
+    """Measure error against time per step of every solver.
+
+    \b
+    Example:
+      validate study tradeoff kf_cube --quick
+    """
     from validate.cli import studying
 
     return studying.tradeoff(name, _common(options), guests)
@@ -299,7 +367,14 @@ def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
 @click.option("--declared-law", is_flag=True, help="Leave out what the linear law itself costs.")
 @_studied
 def choose(name: str, **options: Any) -> int:
-    """The cheapest method that meets an error and a rate, or what comes nearest (exit code 1)."""
+    """Find the cheapest method that meets your error and rate.
+
+    Exit code 1: none meets both; the nearest is named.
+
+    \b
+    Example:
+      validate study choose kf_cube --quick --error 0.5mm --rate 100Hz
+    """
     from validate.cli import studying
 
     return studying.choosing(name, _common(options), **options)
@@ -318,7 +393,12 @@ def choose(name: str, **options: Any) -> int:
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @_studied
 def coverage(name: str, **options: Any) -> int:
-    """How often our verdicts call a perfect model different, and notice a wrong one."""
+    """Measure how often verdicts on a known truth are right.
+
+    \b
+    Example:
+      validate study coverage kf_cube --quick --draws 10
+    """
     from validate.cli.covering import covering
 
     return covering(name, _common(options), **options)
@@ -335,9 +415,13 @@ def coverage(name: str, **options: Any) -> int:
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @_studied
 def identify(name: str, **options: Any) -> int:
-    """Parameters with profile intervals, or that the recordings do not identify them (exit code 1).
+    """Identify parameters with intervals from the recording.
 
-    By many starts over what the experiment says calibrates; goes on where it was stopped.
+    Exit code 1: the recording does not identify them.
+
+    \b
+    Example:
+      validate identify multimode --quick --seeds 2
     """
     from validate.cli import identifying
 
@@ -360,7 +444,12 @@ def identify(name: str, **options: Any) -> int:
 @output("What it did (default: NAME-live.mcap in reports/).", required=False)
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 def live_(name: str, **options: Any) -> int:
-    """A model under a tool against the clock, from its recorded path or packets on loopback."""
+    """Run a model in real time under a tool.
+
+    \b
+    Example:
+      validate live needle_pocket --seconds 1
+    """
     from validate.cli import living
 
     return living.run(name, **options)

@@ -1,26 +1,47 @@
 """`validate list`: every experiment by name, without running its file."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from validate.catalogue import card, experiment_files, shipped
-from validate.cli.display import relative, say, table
+from validate.catalogue import Card, card, experiment_files, shipped
+from validate.cli.display import relative, say
+from validate.cli.screen import rows
+from validate.datasets.home import searched, whole
+from validate.datasets.registry import data_sets
 
 
 def show(named: tuple[Path, ...], as_json: bool) -> None:
-    """Prints name, title and source of every experiment; a line for each file that is none."""
+    """Print name, title and needs of every experiment; a line for each file that is none."""
     files = experiment_files(Path.cwd(), named)
     cards = [card(path) for path in files.values()]
     if as_json:
-        print(json.dumps([asdict(c) for c in cards], indent=2))
+        print(json.dumps([asdict(c) for c in cards], ensure_ascii=False, indent=2))
         return
-    rows = [[c.name, c.title, c.source] for c in cards if not c.note]
-    table("", ["name", "what", "source"], rows)
+    here = {c.needs: _is_here(c.needs) for c in cards if c.needs}
+    cells = [[c.name, c.title, _needs(c, here)] for c in cards if not c.note]
+    for line in rows(["name", "what", "needs"], cells, soft=1):
+        print(line)
     for c in cards:
-        for line in (c.note, _hides(files[c.name])):
-            if line:
-                say(f"{relative(files[c.name])}: {line}", indent="  ")
+        for text in (c.note, _hides(files[c.name])):
+            if text:
+                say(f"{relative(files[c.name])}: {text}", indent="  ")
+
+
+def _needs(found: Card, here: Mapping[str, bool]) -> str:
+    if not found.needs:
+        return "-"
+    return found.needs if here[found.needs] else f"validate data get {found.needs}"
+
+
+def _is_here(name: str) -> bool:
+    """Whether the files of a data set are in a folder that experiments search."""
+    found = next((s for s in data_sets() if s.name == name), None)
+    if found is None:
+        return False
+    places = searched(Path.cwd() / "experiments")
+    return any(all(whole(p / found.folder / f.name, f) for f in found.files) for p in places)
 
 
 def _hides(file: Path) -> str:

@@ -1,4 +1,4 @@
-"""The commands on programs of others that solve our scenes."""
+"""The commands on external simulators."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,12 @@ from validate.cli.arguments import EXPERIMENTS, FOLDER, FORCE
 
 @click.group("guest")
 def guest() -> None:
-    """Programs of others that solve our scenes (docs/guests.md)."""
+    """Use an external simulator as one more method (docs/guests.md).
+
+    \b
+    Example:
+      validate guest job hanging_bar -o job
+    """
 
 
 @guest.command("check", context_settings={"ignore_unknown_options": True})
@@ -19,7 +24,12 @@ def guest() -> None:
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 @click.argument("command", nargs=-1, required=True, type=click.UNPROCESSED)
 def check(command: tuple[str, ...], **options: Any) -> int:
-    """Small scenes with exact answers: what COMMAND can do, and how far off it is."""
+    """Test what an external simulator can do, and how accurately.
+
+    \b
+    Example:
+      validate guest check "python my_guest.py"
+    """
     from shlex import join
 
     from validate.cli import guesting
@@ -38,7 +48,12 @@ def check(command: tuple[str, ...], **options: Any) -> int:
               help="Of a static one, evenly spaced.")  # fmt: skip
 @click.option("--inertia", is_flag=True, help="Masses count, at every step of the experiment.")
 def job(name: str, named: tuple[Path, ...], **given: Any) -> None:
-    """What a guest is given of an experiment, to keep: job.json and mesh.vtu."""
+    """Write the files that an external simulator gets.
+
+    \b
+    Example:
+      validate guest job hanging_bar -o job
+    """
     from validate.cli import guesting
 
     guesting.job(name, experiments=named, **given)

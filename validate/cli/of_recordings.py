@@ -18,9 +18,13 @@ from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, output, require
 def inspect(
     file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...], topic: str, most: int
 ) -> int:
-    """What a recording of any format holds: topics, clocks, rates, gaps, units, defects.
+    """Show what a recording holds, and its defects.
 
-    The exit code is 1 where it has a defect.
+    Exit code 1: it has a defect.
+
+    \b
+    Example:
+      validate inspect log.csv
     """
     from validate.cli import inspecting
 
@@ -64,9 +68,14 @@ def import_(
     specimens: str | None,
     **given: Any,
 ) -> None:
-    """Turn files of another program into a recording: motion capture, trackers, images, logs.
+    """Turn files of other programs into one recording.
 
-    Several logs of a testing machine, or a folder of them, are repeats: their mean and scatter.
+    Several logs of a testing machine, or a folder of them, are repeats: their mean and scatter
+    are kept.
+
+    \b
+    Example:
+      validate import log.csv -o imported.mcap
     """
     from validate.cli import recordings
 
@@ -96,7 +105,12 @@ def import_(
 def outline(
     file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, **given: Any
 ) -> None:
-    """Find the outline of a dark region in a recording's images, or bring those of others."""
+    """Find or import the outline of a region in images.
+
+    \b
+    Example:
+      validate outline images.mcap --bright -o outlined.mcap
+    """
     from validate.cli import outlining
 
     outlining.outline(file, out, topic, name, drawn, given)
@@ -113,7 +127,12 @@ def outline(
     help="Add to the times of a stream with a clock of its own; kept as a record.",
 )
 def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
-    """Put the streams of several recordings into one, clocks as they are or shifted."""
+    """Join the streams of several recordings into one.
+
+    \b
+    Example:
+      validate merge log.mcap images.mcap --shift images=0.25:0.01 -o test.mcap
+    """
     from validate.cli import recordings
 
     recordings.merge_files(files, out, shifts)
@@ -134,7 +153,12 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
 @click.option("--drift", "straighten", is_flag=True, help="Stretch the further files' clocks.")
 @output("The MCAP recording to write.")
 def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: Any) -> None:
-    """Put files of one test on the clock of the first, and say how sure that is."""
+    """Put recordings of one test on one clock.
+
+    \b
+    Example:
+      validate align log.mcap camera.mcap --by displacement=travel -o aligned.mcap
+    """
     from validate.cli import aligning
 
     aligning.align(files, out, by, aligning.HowAligned(**options))
@@ -156,9 +180,13 @@ def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: An
 def calibrate(
     file: Path, out: Path, tool: str | None, reference: str, rough: str, **given: Any
 ) -> None:
-    """Find where the image plane lies on a tracked probe, by landmarks or wires (N-wire).
+    """Calibrate a tracked ultrasound probe, or a tool tip.
 
-    With --pivot: where the tip of a tracked tool is.
+    Landmarks or wires give the image plane; --pivot gives the tip.
+
+    \b
+    Example:
+      validate calibrate pivot.mcap --pivot StylusToTracker -o tip.mcap
     """
     images = [f"--{name}" for name in ("points", "targets", "unit", "probe") if given[name]]
     if tool is not None and images:
@@ -189,9 +217,13 @@ def calibrate(
 @click.option("--unit", metavar="UNIT", help="Of a table's landmarks, as mm.")
 @output("The MCAP recording to write.")
 def digitise(file: Path, out: Path, **how: Any) -> None:
-    """Find the landmarks that the tip of a tracked tool was held on.
+    """Find the landmarks touched with a tracked tool.
 
     Known landmarks name them; each is then also predicted from the others.
+
+    \b
+    Example:
+      validate digitise stylus.mcap --tool StylusToTracker --tip 108mm,8mm,3mm -o touched.mcap
     """
     from validate.cli import digitising
 
@@ -208,9 +240,13 @@ def digitise(file: Path, out: Path, **how: Any) -> None:
 def new(
     name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool, force: bool
 ) -> None:
-    """Write a commented experiment file, filled with what a recording holds.
+    """Write an experiment from a recording and your answers.
 
-    What the recording does not tell is asked on a terminal, or taken from --answers.
+    What the recording does not contain is asked on a terminal, or taken from --answers.
+
+    \b
+    Example:
+      validate new my_gel --from log.mcap --questions
     """
     from validate.cli import new as writing
 
@@ -230,7 +266,12 @@ def new(
 @click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
 @output("The npz to write, as experiments take it.", required=False)
 def body(file: Path, **given: Any) -> None:
-    """A body of another program: .inp, .msh, .vtu, .vtk, or a closed surface .stl, .obj, .ply."""
+    """Convert a mesh or closed surface into a body.
+
+    \b
+    Example:
+      validate body gel.stl --unit mm --edge 8mm -o gel.npz
+    """
     from validate.cli import bodies
 
     bodies.body(file, **given)
@@ -245,7 +286,12 @@ def body(file: Path, **given: Any) -> None:
 def record(
     name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...], *, force: bool
 ) -> None:
-    """Make the synthetic recording of an experiment, and a JSON of what must be read from it."""
+    """Make the synthetic recording of an experiment.
+
+    \b
+    Example:
+      validate record kf_cube -o twin.mcap
+    """
     from validate.cli import making
 
     require_new((out, out.with_suffix(".json")), force=force)
@@ -256,7 +302,12 @@ def record(
 @click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
 @click.pass_context
 def data_(context: click.Context, as_json: bool) -> None:
-    """Recordings made by others, by name; which of them are here."""
+    """List and fetch public recordings by name.
+
+    \b
+    Example:
+      validate data
+    """
     if context.invoked_subcommand is None:
         from validate.cli import data
 
@@ -266,7 +317,12 @@ def data_(context: click.Context, as_json: bool) -> None:
 @data_.command("get")
 @click.argument("name")
 def get_(name: str) -> None:
-    """Bring one into the cache, checked against its hashes."""
+    """Fetch a public recording, checked against its hashes.
+
+    \b
+    Example:
+      validate data get hanging-bar
+    """
     from validate.cli import data
 
     data.get(name)

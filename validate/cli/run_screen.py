@@ -35,16 +35,17 @@ def show_run(
 ) -> None:
     """Print the answer of a run on one screen; "full" adds every check and notice."""
     verbose = detail == "full"
+    lines = None if verbose else 2  # of a sentence
     ranking = _ranking(result)
     end = f"{seconds:.1f} s wall time; report: {relative(page)}"
     show(
         (
             Block("", sentence_lines(headline(result))),
             Block("", _recording(result)),
-            Block("", _warnings(result), keep=2, most=4),
+            Block("", _warnings(result, lines), keep=2, most=4),
             *([] if verbose else check_blocks(_checks(result))),
-            Block("", _unfinished(result), keep=2, most=4),
-            Block("", _identified(result), keep=2, most=4),
+            Block("", _unfinished(result, lines), keep=2, most=4),
+            Block("", _identified(result, lines), keep=2, most=4),
             *([ranking] if ranking else []),
             Block("", figures_line([figure_members(p) for p in result.published], name)),
             Block("Next", () if verbose else tuple(_next(result, name))[:3]),
@@ -96,17 +97,17 @@ def _checks(result: Result) -> list[Json]:
     return [{"method": m.name, **check_members(c)} for m in result.methods for c in m.checks]
 
 
-def _warnings(result: Result) -> tuple[str, ...]:
+def _warnings(result: Result, most: int | None) -> tuple[str, ...]:
     moved = [f"the verdict moved: {m.words}" for m in result.moved] if result.expected else []
     findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
     texts = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
-    return tuple(line for t in texts for line in sentence_lines(f"warning: {t}", 2))
+    return tuple(line for t in texts for line in sentence_lines(f"warning: {t}", most))
 
 
 # --- methods --------------------------------------------------------------------------------------
 
 
-def _unfinished(result: Result) -> tuple[str, ...]:
+def _unfinished(result: Result, most: int | None) -> tuple[str, ...]:
     """Why methods did not finish; one line for those with the same reason."""
     ends: dict[str, list[str]] = {}
     for method in result.methods:
@@ -115,17 +116,17 @@ def _unfinished(result: Result) -> tuple[str, ...]:
                 method.name
             )
     texts = (f"{', '.join(names)}: {why}" for why, names in ends.items())
-    return tuple(line for text in texts for line in sentence_lines(text, 2))
+    return tuple(line for text in texts for line in sentence_lines(text, most))
 
 
-def _identified(result: Result) -> tuple[str, ...]:
+def _identified(result: Result, most: int | None) -> tuple[str, ...]:
     found: list[str] = []
     for v in result.identified_values:
         low, high = v.interval
         half = with_unit((high - low) / 2, v.unit, 2)
         value = with_unit(v.value, v.unit, 4)
         text = f"{v.name} = {value} ± {half} (95 %), identified by {v.by} on {v.on}"
-        found += sentence_lines(text, 2)
+        found += sentence_lines(text, most)
     return tuple(found)
 
 

@@ -24,7 +24,7 @@ class Block:
     """Lines below a title ("" for none), of which the first `most` are shown.
 
     `keep` lines stay however little room there is (None: all). `rest` follows the number of lines
-    that are left out.
+    that are left out, `hidden` ones among them that are no lines here.
     """
 
     title: str
@@ -32,10 +32,11 @@ class Block:
     keep: int | None = None
     most: int | None = None
     rest: str = "more: --verbose"
+    hidden: int = 0
 
     def height(self, shown: int) -> int:
         """Lines on the screen where so many of its own are shown."""
-        return bool(self.title) + shown + (shown < len(self.lines))
+        return bool(self.title) + shown + (shown < len(self.lines) + self.hidden)
 
 
 def fitted(blocks: Sequence[Block], most: float = LINES) -> list[Block]:
@@ -49,8 +50,8 @@ def fitted(blocks: Sequence[Block], most: float = LINES) -> list[Block]:
             break
         counts[i] -= 1
     return [
-        replace(b, lines=(*b.lines[:n], f"  {len(b.lines) - n} {b.rest}"), most=None)
-        if n < len(b.lines) else b
+        replace(b, lines=(*b.lines[:n], f"  {len(b.lines) - n + b.hidden} {b.rest}"))
+        if n < len(b.lines) + b.hidden else b
         for b, n in zip(found, counts, strict=True)
     ]  # fmt: skip
 
@@ -61,7 +62,12 @@ def show(blocks: Sequence[Block], detail: Detail = "screen") -> None:
     found = [b for b in blocks if b.lines]
     if detail == "screen":
         found = fitted(found)
-    for block in found[:1] if detail == "short" else found:
+    if detail == "short":
+        screen.print(
+            " ".join(line.strip() for line in found[0].lines), markup=False, soft_wrap=True
+        )
+        return
+    for block in found:
         if block.title:
             say(block.title, "bold")
         for line in block.lines:
@@ -81,13 +87,15 @@ def sentence_lines(text: str, most: int | None = None, indent: str = "  ") -> tu
     return (*lines[: most - 1], f"{lines[most - 1][: width() - 2].rstrip(' ,;:')} …")
 
 
-def rows(head: Sequence[str], cells: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """A table with one line a row, indented; first cells are cut where there is no room."""
-    every = [*([head] if any(head) else []), *cells]
+def rows(head: Sequence[str], cells: Sequence[Sequence[str]], soft: int = 0) -> tuple[str, ...]:
+    """A table with one line a row, indented; the texts of column `soft` are cut where they have no
+    room. None without cells."""
+    every = [*([head] if any(head) else []), *cells] if cells else []
     widths = [max(map(len, column)) for column in zip(*every, strict=True)]
-    room = width() - 2 - sum(w + 2 for w in widths[1:])
-    widths[0] = min(widths[0], max(room, _NAME))
-    texts = ([cut(row[0], widths[0]), *row[1:]] for row in every)
+    room = width() - sum(w + 2 for i, w in enumerate(widths) if i != soft) - 2
+    if widths:
+        widths[soft] = min(widths[soft], max(room, _NAME))
+    texts = ([cut(t, w) for t, w in zip(row, widths, strict=True)] for row in every)
     return tuple(
         "  " + "  ".join(f"{t:<{w}}" for t, w in zip(row, widths, strict=True)).rstrip()
         for row in texts

@@ -8,8 +8,9 @@ from typing import Any
 
 from validate.cli.arguments import FAILED, OK, command_line, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.display import fits, relative, say, table, warn
+from validate.cli.display import relative, say, table
 from validate.cli.progress import progress
+from validate.cli.screen import Block, Detail, cut, rows, sentence_lines, show
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, sources_of
@@ -37,11 +38,8 @@ from validate.study.study_page import Findings, write_study
 from validate.study.sweep import named
 from validate.study.trade import Trade, again, trade
 
-_PLACES = 10  # of every ranking on the terminal
-# Columns of a ranking, and of one where those have no room: the report has all.
-_COLUMNS = (0, 1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 15)
-_FEWER = (0, 1, 2, 3, 4, 8, 12, 13)
-_FEW = (0, 1, 2, 3, 8, 12, 13)
+_SETTINGS = 30  # characters of the settings of a place
+_RANKINGS = 2  # conditions whose rankings a screen shows
 
 
 @dataclass(frozen=True)
@@ -55,6 +53,7 @@ class StudyOptions:
     scheduler: str
     as_json: bool
     named: tuple[Path, ...] = ()
+    detail: Detail = "screen"
 
     @property
     def where(self) -> Where:
@@ -90,8 +89,7 @@ def filters(
         )  # fmt: skip
     page = written(experiment, filter_page.told(found), place, common)
     if not common.as_json:
-        _show_filters(found)
-        end(found.done, page)
+        answer(_filter_blocks(found, common.detail), found.done, page, common.detail)
     return OK
 
 
@@ -116,10 +114,8 @@ def stability_map(name: str, common: StudyOptions) -> int:
         told = with_endings(told, endings)
     page = written(experiment, told, place, common)
     if not common.as_json:
-        _show_stability(found)
-        if endings is not None:
-            say(ending_words(endings))
-        end(found.done, page)
+        ended = "" if endings is None else ending_words(endings)
+        answer(_stability_blocks(found, ended), found.done, page, common.detail)
     return OK if found.passed and not (endings and endings.bugs) else FAILED
 
 
@@ -132,7 +128,8 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
     )
     page = written(experiment, told, place, common)
     if not common.as_json:
-        say(f"{told.sentence}\nreport: {relative(page)}")
+        lines = (*sentence_lines(told.sentence), f"report: {relative(page)}")
+        show([Block("", lines)], common.detail)
     return FAILED if told.passed is False else OK
 
 
@@ -148,8 +145,7 @@ def tradeoff(name: str, common: StudyOptions, guests: tuple[str, ...] = ()) -> i
         )  # fmt: skip
     page = written(experiment, trade_page.told(found), place, common)
     if not common.as_json:
-        _show_trade(found)
-        end(found.done, page)
+        answer(_trade_blocks(found), found.done, page, common.detail)
     return OK
 
 
@@ -171,8 +167,9 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
         )  # fmt: skip
     page = written(experiment, trade_page.told_choice(choice), place, common)
     if not common.as_json:
-        _show_choice(choice)
-        end(choice.trade.done, page)
+        if common.detail == "full":
+            _choice_in_full(choice)
+        answer(_choice_blocks(choice), choice.trade.done, page, common.detail)
     return OK if choice.pick is not None else FAILED
 
 
@@ -221,42 +218,58 @@ def written(experiment: Experiment, told: Findings, place: str, common: StudyOpt
     return page
 
 
-def end(done: Finished[Any], page: Path) -> None:
+def answer(blocks: Sequence[Block], done: Finished[Any], page: Path, detail: Detail) -> None:
+    """Print a study on one screen, with the count of its cells and the place of its report."""
     where = f" on {done.workers}" if done.workers else ""
-    say(
+    ends = (
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
         f"{where}; report: {relative(page)}"
     )
+    show([*blocks, Block("", sentence_lines(ends))], detail)
 
 
 # --- terminals ------------------------------------------------------------------------------------
 
 
-def _show_filters(found: FilterStudy) -> None:
+def _filter_blocks(found: FilterStudy, detail: Detail) -> list[Block]:
+    """The best settings first, then the places of each condition."""
+    best = [line for b in found.best for line in sentence_lines(b.line)]
+    blocks = [
+        Block("", sentence_lines(filter_page.sentence(found))),
+        Block("", tuple(best), keep=1, most=4),
+    ]
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        head = ranking_head(found.unit)
-        for pick in (_COLUMNS, _FEWER, _FEW):
-            columns = tuple(head[i] for i in pick)
-            rows = _places(ranking, pick, found.by)
-            if fits(columns, rows):
-                break
-        table(f"Ranking by {found.by}{under}", columns, rows)
-        if len(found.plan.seeds) == 1 and ranking.blocks is not None:
-            say(f"{ranking.blocks.words}", indent="  ")
-        if ranking.nested is not None and len(found.plan.seeds) == 1:
-            say(chosen_line(ranking.nested, found), indent="  ")
-    failed = [pair for r in found.rankings for pair in r.failed]
-    for cell, why in failed[:_PLACES]:
-        say(f"failed: {cell.name} ({named(cell.values)}): {why}", indent="  ")
-    say(f"\n{filter_page.sentence(found)}")
-    for best in found.best:
-        say(best.line, indent="  ")
+        title = f"Ranking by {found.by}{under}"
+        blocks.append(Block(title, _places(ranking, found), 2, 11))
+        notes: list[str] = []
+        if len(found.plan.seeds) == 1:
+            notes += [] if ranking.blocks is None else [ranking.blocks.words]
+            notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
+        lines = tuple(k for note in notes for k in sentence_lines(note))
+        blocks.append(Block("", lines, keep=1))
+    if detail == "screen" and len(found.rankings) > _RANKINGS:
+        left = len(found.rankings) - _RANKINGS
+        blocks = [*blocks[: 2 + 2 * _RANKINGS], Block("", (f"{left} more conditions: --verbose",))]
+    failed = (
+        f"failed: {cell.name} ({named(cell.values)}): {why}"
+        for r in found.rankings for cell, why in r.failed
+    )  # fmt: skip
+    lines = tuple(k for text in failed for k in sentence_lines(text, 2))
+    return [*blocks, Block("", lines, keep=1, most=4)]
 
 
-def _places(ranking: Ranking, pick: Sequence[int], by: str) -> list[list[str]]:
-    rows = [ranking_row(r, by) for r in ranking.rows[:_PLACES]]
-    return [[_text(row[i]) for i in pick] for row in rows]
+def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
+    """Place, settings where any were swept, error with its interval, and times of a step."""
+    swept = any(r.cell.settings for r in ranking.rows)
+    error = ranking_head(found.unit)[3]
+    head = ["", *(["settings"] if swept else []), error, "± 95 %", "p50 / ms", "p99 / ms"]
+    cells = []
+    for row in ranking.rows:
+        place, method, settings, *numbers = (_text(v) for v in ranking_row(row, found.by))
+        own = [cut(settings, _SETTINGS)] if swept else []
+        cells.append([f"{place}. {method}", *own, numbers[0], numbers[1], numbers[9], numbers[10]])
+    return rows(head, cells) if cells else ()
 
 
 def _text(value: float | int | str | None) -> str:
@@ -265,51 +278,68 @@ def _text(value: float | int | str | None) -> str:
     return significant(value) if isinstance(value, float) else str(value)
 
 
-def _show_stability(found: Stability) -> None:
-    rows = [
+def _stability_blocks(found: Stability, endings: str) -> list[Block]:
+    quick = "QUICK: fewer points; " if found.quick else ""
+    cells = [
         [p.name, _text(p.value), significant(p.limit), str(p.count),
          "holds" if p.holds else "FAILS"]
-        for p in found.predictions
+        for p in sorted(found.predictions, key=lambda p: p.holds)
     ]  # fmt: skip
-    head = ("prediction", "worst / 1", "limit / 1", "count", "verdict")
-    table("Predictions against measured radii", head, rows)
-    quick = "QUICK: fewer points; " if found.quick else ""
-    say(f"\n{quick}{stability_page.sentence(found)}")
+    head = ["prediction", "worst / 1", "limit / 1", "count", "verdict"]
+    return [
+        Block("", sentence_lines(f"{quick}{stability_page.sentence(found)}")),
+        Block("", sentence_lines(endings) if endings else ()),
+        Block("Predictions against measured spectral radii", rows(head, cells), 3),
+    ]
 
 
-def _show_trade(found: Trade) -> None:
-    head = ("solver", "element", "mesh", "error / mm", "time / us")
+def _trade_blocks(found: Trade) -> list[Block]:
+    blocks = [
+        Block("", sentence_lines(trade_page.sentence(found))),
+        Block("", _warned(found.locking), keep=2, most=4),
+    ]
+    head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
     for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
-        rows = [
-            [r.solver.name, r.element, str(r.level), significant(1e3 * float(getattr(r, by))),
+        cells = [
+            [r.solver.name, r.element, str(r.level),
+             significant(found.scale * float(getattr(r, by))),
              significant(1e6 * (r.time_s or 0.0))]
             for r in found.front(by).rows
         ]  # fmt: skip
-        table(title, head, rows)
-    for by in ("error", "total"):
-        if off := found.front(by).dominated:
-            say(f"dominated ({by}): {'; '.join(off)}", indent="  ")
-    for warning in found.locking:
-        warn(warning)
-    say(f"\n{trade_page.sentence(found)}")
+        dominated = found.front(by).dominated
+        lines = sentence_lines(f"dominated ({by}): {'; '.join(dominated)}", 2) if dominated else ()
+        blocks += [Block(title, rows(head, cells) if cells else (), 3), Block("", lines)]
+    return blocks
 
 
-def _show_choice(choice: Choice) -> None:
-    for warning in choice.trade.locking:
-        warn(warning)
-    rows = [[f.name, f.value, f.means] for f in choice.facts]
-    table("The scene's own numbers", ("what", "value", "asks for"), rows)
-    rows, scale = [], choice.trade.scale
+def _choice_blocks(choice: Choice) -> list[Block]:
+    """The answer, then what each candidate method reaches."""
+    first, *others = words(choice)
+    cells = []
     for c in choice.ladder:
         error = None if c.best is None else error_of(c.best, choice.by)
-        rows.append(
-            [c.rung, c.verdict, _text(None if error is None else scale * error), c.evidence]
-        )
-    head = ("rung", "verdict", f"error / {choice.trade.shown_unit}", "evidence")
-    table("The ladder", head, rows)
+        reached = _text(None if error is None else choice.trade.scale * error)
+        cells.append([c.rung, reached, c.verdict])
+    head = ["", f"error / {choice.trade.shown_unit}", "verdict"]
+    ladder = rows(head, cells)
+    return [
+        Block("", sentence_lines(first)),
+        Block("", tuple(k for w in others for k in sentence_lines(w)), keep=4),
+        Block("", _warned(choice.trade.locking), keep=2, most=4),
+        Block("Candidate methods", ladder, 4),
+        Block("", tuple(k for w in choice.rejected for k in sentence_lines(w, 2)), keep=1, most=4),
+    ]
+
+
+def _choice_in_full(choice: Choice) -> None:
+    facts = [[f.name, f.value, f.means] for f in choice.facts]
+    table("The scene's own numbers", ("what", "value", "asks for"), facts)
+    evidence = [[c.rung, c.evidence] for c in choice.ladder]
+    table("Evidence", ("candidate", "evidence"), evidence)
     if choice.excluded:
-        rows = [[e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded]
-        table("Left out by a bound", ("rung", "candidate", "at least / us", "why"), rows)
-    say("")
-    for line in (*choice.rejected, *words(choice)):
-        say(line, indent="  ")
+        cells = [[e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded]
+        table("Left out by a bound", ("candidate", "cell", "at least / µs", "why"), cells)
+
+
+def _warned(texts: Sequence[str]) -> tuple[str, ...]:
+    return tuple(k for text in texts for k in sentence_lines(f"warning: {text}", 2))

@@ -88,5 +88,29 @@ def recognised(path: Path) -> Reader:
             raise UsageError(said)
         if reader.recognises(path):
             return reader
-    kinds = ", ".join(f"{r.name} ({r.doc})" for r in READERS)
-    raise UsageError(f"{path}: not recognised as any of {kinds}; say which with --as KIND")
+    raise UsageError(f"{path}: {_unknown(path)}")
+
+
+def _unknown(path: Path) -> str:
+    """What a file is that no reader recognises: a folder, empty, text or other bytes."""
+    names = ", ".join(r.name for r in READERS)
+    if path.is_dir():
+        return f"a folder of no known format; name a file, or the format with --as ({names})"
+    size = path.stat().st_size
+    if size == 0:
+        return "the file is empty (0 bytes); record or copy it again"
+    start = head(path)
+    what = "text" if _is_text(start) else "binary data"
+    return (
+        f"unknown format ({what}, {size} bytes, begins with {start[:8].hex()}); if it is one of "
+        f"{names}, name it with --as"
+    )
+
+
+def _is_text(start: bytes) -> bool:
+    """Whether bytes are printable UTF-8, cut anywhere."""
+    try:
+        text = start.decode("utf-8")
+    except UnicodeDecodeError as error:
+        text = start[: error.start].decode("utf-8") if len(start) - error.start < 4 else ""
+    return bool(text) and all(c.isprintable() or c in "\r\n\t" for c in text)

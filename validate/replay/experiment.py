@@ -248,7 +248,8 @@ class Experiment:
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     `specimen` names the one that a recording is of: repeats of one specimen count once over all
     experiments; without it all recordings are of one.
-    `kind` is what its recordings are where no twin makes them. `expected` are the verdicts that it
+    `kind` is what its recordings are where no twin makes them; `needs` names the public data set
+    (`validate data`) that they come from. `expected` are the verdicts that it
     is known to have, with the reason.
     """
 
@@ -284,6 +285,7 @@ class Experiment:
     specimen: Callable[[Recording], str] | None = None
     quick: Change = unchanged
     kind: Kind = "measured"
+    needs: str = ""
     expected: tuple[Expected, ...] = ()
     path: Path | None = field(default=None, compare=False)
 

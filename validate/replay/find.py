@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 from types import ModuleType
 
-from validate.catalogue import card, experiment_files
+from validate.catalogue import card, experiment_files, searched_folders
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.replay.experiment import Experiment
@@ -29,7 +29,9 @@ def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
 
         if said := told_apart(Path(name)):
             raise UsageError(said)
-        raise UsageError(f"unknown experiment '{name}'; {nearest_names(name, set(files))}")
+        near = nearest_names(name, set(files))
+        places = ", ".join(str(p) for p in searched_folders(start, named))
+        raise UsageError(f"unknown experiment '{name}'; {near}; searched: {places}")
     return load_file(files[name])
 
 

@@ -29,6 +29,7 @@ QUANTITY = {
     "stretch": "strain",
 }
 DERIVED = ("strain", "stretch", "stress")
+_NAMED = 12  # columns that an error names
 _SIZE_OF = {"displacement": "length=20mm", "force": "area=314mm2"}
 SIZES_SAID = ("area", "length", "measure")  # of the specimen; true or engineering
 KEYS = (
@@ -153,7 +154,9 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
         return said_pick(role, table, said)
     found = [column for column in table.columns if role_of(column) == role]
     if not found:
-        labels = ", ".join(repr(c.label) for c in table.columns)
+        labels = ", ".join(repr(c.label) for c in table.columns[:_NAMED])
+        if (more := len(table.columns) - _NAMED) > 0:
+            labels += f" and {more} more"
         other = _by_unit(role, table) or f" or, where it was not logged, --map {role}=none"
         if role == "time":
             other = " or, at a constant rate, --map time=every:0.1s"
