@@ -13,7 +13,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.study.interval import SeedInterval, interval
 from validate.study.score import LOG_LOSS, FilterScores, of_score, summed
-from validate.study.withheld import Withheld
 
 FEWEST = 8  # blocks of an interval
 MOST = 20
@@ -149,10 +148,8 @@ def nested(
     blocks: Blocks | None,
 ) -> Nested | None:
     """None with fewer than two blocks, filters, or without what was withheld."""
-    parts = {name: of_score(v.withheld, by) for name, v in filters.items()}
-    common = (
-        sorted(set.intersection(*({w.name for w in p} for p in parts.values()))) if parts else []
-    )
+    parts = [_parts(v, by) for v in filters.values()]
+    common = sorted(set.intersection(*parts)) if parts else []
     if blocks is None or blocks.count < 2 or len(filters) < 2 or not common:
         return None
     halves = [common[::2], common[1::2]] if len(common) > 1 else [common, common]
@@ -173,15 +170,26 @@ def nested(
                 counts[s, b] += told[pick][1][s, b]
         for name, found in others.items():
             found += [told[name][0].sum(), told[name][1].sum()]
-    beside = {n: float(np.sqrt(q / c)) for n, (q, c) in others.items() if c}
-    return Nested(_reported(squares, counts, blocks), chosen, beside, blocks.count, len(common) > 1)
+    beside = {n: _root(by, float(q / c)) for n, (q, c) in others.items() if c}
+    return Nested(
+        _reported(squares, counts, by, blocks), chosen, beside, blocks.count, len(common) > 1
+    )
+
+
+def _parts(value: FilterScores, by: str) -> set[str]:
+    """The names of what a score is made of; the likelihood is one part."""
+    if by == LOG_LOSS:
+        return {LOG_LOSS} if value.innovations is not None else set()
+    return {w.name for w in of_score(value.withheld, by)}
 
 
 def _by_block(
     value: FilterScores, by: str, names: Sequence[str], blocks: Blocks
 ) -> tuple[Floats, Floats]:
-    mine: list[Withheld] = [w for w in of_score(value.withheld, by) if w.name in names]
-    found = summed(mine)
+    if by == LOG_LOSS:
+        found = value.sums(by)
+    else:
+        found = summed([w for w in of_score(value.withheld, by) if w.name in names])
     if found is None:
         none = np.zeros((len(value.scores[by]), blocks.count))
         return none, none
@@ -189,16 +197,23 @@ def _by_block(
 
 
 def _without(sums: tuple[Floats, Floats], seed: int, block: int) -> float:
-    """Mean square of a seed over all blocks but one."""
+    """Mean square, or mean log loss, of a seed over all blocks but one."""
     squares, counts = (np.delete(x[seed], block).sum() for x in sums)
     return float(squares / counts) if counts else np.inf
 
 
-def _reported(squares: Floats, counts: Floats, blocks: Blocks) -> SeedInterval:
+def _root(by: str, mean: float) -> float:
+    """A score of the mean over its samples: log loss is that mean, an rms its root."""
+    return mean if by == LOG_LOSS else float(np.sqrt(mean))
+
+
+def _reported(squares: Floats, counts: Floats, by: str, blocks: Blocks) -> SeedInterval:
     if len(squares) > 1:
-        return interval(np.sqrt(squares.sum(axis=1) / counts.sum(axis=1)).tolist())
+        totals = squares.sum(axis=1) / counts.sum(axis=1)
+        return interval([_root(by, float(mean)) for mean in totals])
     seen = counts[0] > 0
     means = squares[0, seen] / counts[0, seen]
-    rms = float(np.sqrt(squares.sum() / counts.sum()))
+    score = _root(by, float(squares.sum() / counts.sum()))
     half = interval(means.tolist()).half if blocks.sure else None
-    return SeedInterval(rms, None if half is None else half / (2 * rms), int(seen.sum()))
+    half = None if half is None else half / _slope(by, score, score)
+    return SeedInterval(score, half, int(seen.sum()))

@@ -7,7 +7,7 @@ from validate.study.agreement import NEAR, TruthPick
 from validate.study.blocks import Nested
 from validate.study.filters import FilterStudy
 from validate.study.ranking import Ranking
-from validate.study.score import WITHHELD
+from validate.study.score import LOG_LOSS, WITHHELD
 from validate.study.score_units import shown_unit
 from validate.study.sweep import named
 
@@ -72,11 +72,14 @@ def _nested_words(study: FilterStudy) -> Iterator[str]:
         "chosen, and its error on the block that was left out is reported."
     )
     found = next(r.nested for r in study.rankings if r.nested)
-    yield (
-        "Half of the markers choose, the other half reports, and the other way round."
-        if found.split
-        else "There is one marker to score: the same one chooses and reports, in other blocks."
-    )
+    if study.by == LOG_LOSS:
+        yield "The likelihood of all measured components chooses and reports, in other blocks."
+    else:
+        yield (
+            "Half of the markers choose, the other half reports, and the other way round."
+            if found.split
+            else "There is one marker to score: the same one chooses and reports, in other blocks."
+        )
     for ranking in study.rankings:
         if ranking.nested and ranking.blocks and not ranking.blocks.sure:
             yield f"{ranking.blocks.words}."

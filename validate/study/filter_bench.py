@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import describe
@@ -37,7 +38,8 @@ _MANY = 40  # recordings and registrations kept, of seeds mostly
 class Ready:
     """A method prepared for one recording: `true` are the parameters of the twin that made it, and
     `mark` names all that `seen` and the scene come from. `tracks` are the markers that score, read
-    from the method's own fields, in `segments` of time."""
+    from the method's own fields, in `segments` of time. `tracked` is the same recording as the
+    study's first filter has it; None for that filter itself."""
 
     parameters: Any
     true: Any
@@ -48,6 +50,7 @@ class Ready:
     experiment: Experiment
     tracks: MarkerTracks | None
     segments: Segments
+    tracked: "Ready | None" = None
 
     @property
     def scene(self) -> Scene:
@@ -61,6 +64,11 @@ class Ready:
         """The same, where every marker and outline was missed at every sample after rest."""
         blank = tuple(_missed(o) for o in self.seen.observations)
         return replace(self, seen=replace(self.seen, observations=blank))
+
+    def offered(self, names: Sequence[str]) -> Measurements:
+        """Measurements of these markers and outlines, as filters are given them."""
+        ready = self.tracked or self
+        return replace(ready.method, markers=tuple(names)).offered(ready.system, ready.seen)
 
     def stepper(self) -> Stepper:
         given = self.experiment.sets(self.parameters, self.seen)
@@ -193,7 +201,9 @@ class Bench:
         elif tracked is not None and tracked.mark != mark:
             tracks = tracks.on(system.scene.mesh)
         segments = segments_of(seen) if tracked is None else tracked.segments
-        return Ready(parameters, true, method, system, seen, mark, experiment, tracks, segments)
+        return Ready(
+            parameters, true, method, system, seen, mark, experiment, tracks, segments, tracked
+        )
 
     def truth(self, ready: Ready) -> Mapping[str, Floats]:
         """The twin's motion at the probes: noise does not touch it, so the first seed's serves

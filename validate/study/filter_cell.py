@@ -25,6 +25,7 @@ from validate.study.score import NIS, FilterScores, error_scores, withheld_score
 from validate.study.withheld import (
     Innovations,
     MarkerTracks,
+    PredictionErrors,
     Segments,
     Withheld,
     ahead_errors,
@@ -32,9 +33,11 @@ from validate.study.withheld import (
     in_a_row,
     innovations_of,
     joined_innovations,
+    joined_predictions,
     other_errors,
     other_times,
     outline_tracks,
+    prediction_errors,
     read_innovations,
 )
 
@@ -45,13 +48,15 @@ _TIMED_S = 0.05  # s after which no more of them are
 @dataclass(frozen=True)
 class Scored:
     """What one recording says of a method: errors at the truth's probes by score, at what was
-    withheld, its innovations, NIS with its degrees of freedom."""
+    withheld, its innovations, NIS with its degrees of freedom; `predictions` of a method without
+    innovations."""
 
     truth: Mapping[str, float]
     withheld: tuple[Withheld, ...]
     innovations: Innovations | None = None
     nis: float = 0.0
     dof: int = 0
+    predictions: PredictionErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -285,7 +290,8 @@ def _scored(
     nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
     if nis is None or dof is None or cell.baseline:
         ahead = _at_given(cell, ready, run, segments)
-        return Scored(truth, (*held, *ahead))
+        predictions = _predictions(cell, ready, run, segments)
+        return Scored(truth, (*held, *ahead), predictions=predictions)
     names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
     names = [n.removeprefix("innovation.") for n in names]
     y, sd = read_innovations(run, names)
@@ -313,6 +319,30 @@ def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> t
     return tuple(found)
 
 
+def _predictions(
+    cell: FilterCell, ready: Ready, run: Run, segments: Segments
+) -> PredictionErrors | None:
+    """Errors y - H u at what filters are given, of a method that is given nothing."""
+    if run.points is None:
+        return None
+    offered, start = ready.offered(cell.given), np.zeros(1)
+    columns: dict[str, Floats] = {}
+    markers = ready.tracks.names if ready.tracks is not None else ()
+    for i, name in enumerate(markers):
+        for c in range(run.points.shape[2]):
+            columns[f"{name}.{'xyz'[c]}"] = run.points[:, i, c]
+    first = len(markers)
+    for outline in outline_tracks(ready.seen, cell.given):
+        last = first + len(outline.distances.normals)
+        along = (run.points[:, first:last] * outline.distances.normals).sum(axis=2)
+        columns |= {f"{outline.name}.{i}": y for i, y in enumerate(along.T)}
+        first = last
+    t = np.concatenate([start, run.t])
+    predicted = [np.interp(offered.t, t, np.append(start, columns[n])) for n in offered.names]
+    errors = offered.z - np.stack(predicted, axis=1)
+    return prediction_errors(offered.t, errors, offered.sd**2, segments)
+
+
 # --- persistence ----------------------------------------------------------------------------------
 
 
@@ -323,8 +353,7 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
     for seed in cell.seeds:
         on_each = []
         for ready in bench.ready(cell, seed):
-            one = ready.with_markers(cell.given)
-            offered = one.method.offered(one.system, one.seen)
+            offered = ready.offered(cell.given)
             start = perf_counter()
             last = _last_seen(offered.z)
             seconds.append((perf_counter() - start) / len(offered.t))
@@ -341,7 +370,8 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
                     u = scoring.held(given)
                     held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
                     truth = _held_at_probes(bench, ready, given)
-            on_each.append(Scored(truth, (*held, *ahead)))
+            predictions = prediction_errors(offered.t, y, offered.sd**2, segments)
+            on_each.append(Scored(truth, (*held, *ahead), predictions=predictions))
         scored.append(_in_a_row(on_each))
     found = _put_together(scored, segments)
     step = float(np.median(seconds))
@@ -399,6 +429,7 @@ def _in_a_row(scored: Sequence[Scored]) -> Scored:
         {}, in_a_row([s.withheld for s in scored]),
         joined_innovations([s.innovations for s in scored], 1),
         sum(s.nis for s in scored), sum(s.dof for s in scored),
+        joined_predictions([s.predictions for s in scored], 2),
     )  # fmt: skip
 
 
@@ -417,5 +448,6 @@ def _put_together(scored: Sequence[Scored], segments: Segments) -> FilterScores:
         nis_dof=dof,
         withheld=withheld,
         innovations=innovations,
+        predictions=joined_predictions([s.predictions for s in scored], 0),
         segment_s=segments.length,
     )

@@ -7,7 +7,7 @@ print(found.best[0].line)
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.errors import ComparisonError, UsageError
@@ -22,6 +22,7 @@ from validate.study.filter_bench import open_bench
 from validate.study.filter_cell import run_cell
 from validate.study.filter_plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
 from validate.study.job import Plan, Where
+from validate.study.predictive import with_likelihoods
 from validate.study.ranking import Ranked, Ranking, rankings, tied
 from validate.study.score import AHEAD, HELD_OUT, POOLED, WITHHELD, FilterScores
 from validate.study.sweep import axes
@@ -117,6 +118,7 @@ def study(
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(found, KIND, out) / CELLS, where, report)
     _require_filters(planned, done)
+    done = replace(done, records=with_likelihoods(planned.cells, done.records))
     by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))

@@ -129,6 +129,8 @@ def _comparable(found: Found, by: str) -> tuple[Found, list[tuple[FilterCell, st
 
 
 def _why_not(value: FilterScores, by: str, mine: frozenset[str], most: frozenset[str]) -> str:
+    if by == LOG_LOSS and value.predictions is not None:
+        return f"no {by}: its variance needs samples in two blocks of time"
     if by == LOG_LOSS or (by not in value.scores and not most):
         return f"no innovations, so no {by}"
     return (

@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.track import rmse, track_error
 from validate.estimate.consistency import Consistency, nis_consistency
-from validate.study.withheld import Innovations, Withheld
+from validate.study.withheld import Innovations, PredictionErrors, Withheld
 
 POOLED = "all.rmse"
 NIS = "nis.per_dof"
@@ -23,7 +23,8 @@ WORDS = {
     "the next sample of those that were given (noise included)",
     HELD_OUT: "rms distance from what was measured of markers that were held out (noise included)",
     AHEAD: "rms distance of a given marker's next sample from its prediction (noise included)",
-    LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in metres",
+    LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in "
+    "metres; without innovations, of a Gaussian with the error variance of the other blocks",
 }
 
 
@@ -35,7 +36,8 @@ class FilterScores:
     `nis` is that of all seeds with `nis_dof` degrees of freedom, None without innovations.
     `frozen` is the step from which a linear filter's gains repeat. `shared`: all seeds were run at
     once with one set of gains. `withheld` are the squared errors at what the method was not given,
-    in segments of `segment_s` s.
+    in segments of `segment_s` s. `predictions` are the errors of a method without innovations at
+    what filters were given.
     """
 
     scores: Mapping[str, tuple[float, ...]]
@@ -50,6 +52,7 @@ class FilterScores:
     shared: bool = False
     withheld: tuple[Withheld, ...] = ()
     innovations: Innovations | None = None
+    predictions: PredictionErrors | None = None
     segment_s: float = 0.0
 
     @property

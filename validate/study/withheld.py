@@ -55,6 +55,19 @@ class Innovations:
 
 
 @dataclass(frozen=True)
+class PredictionErrors:
+    """Prediction errors of a method without innovations, at the components that filters are given.
+
+    Sums of `squares` (seeds, components, segments) m^2 over the samples of each segment, their
+    `counts`, and the `noise` variance (seeds, components, segments) m^2 of one measurement.
+    """
+
+    squares: Floats
+    counts: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True)
 class Segments:
     """Equal parts of the time from 0 to the end of a recording; a sample at t = 0 is in none."""
 
@@ -240,6 +253,20 @@ def read_innovations(run: Run, names: Sequence[str]) -> tuple[Floats, Floats]:
     return y, sd
 
 
+def prediction_errors(
+    t: Floats, errors: Floats, noise: Floats, segments: Segments
+) -> PredictionErrors:
+    """Of errors (nt, m) m at times t (nt,) s, NaN = no sample, of components whose measurements
+    have the noise variance (m,) m^2."""
+    squares, counts = [], []
+    for error in errors.T:
+        measured = np.isfinite(error)
+        squares.append(segments.sums(t[measured], error[measured] ** 2))
+        counts.append(segments.sums(t[measured], np.ones(int(measured.sum()))))
+    variances = np.tile(noise[:, None], (1, segments.count))
+    return PredictionErrors(np.array([squares]), np.array([counts]), variances[None])
+
+
 # --- other sensors --------------------------------------------------------------------------------
 
 
@@ -334,6 +361,22 @@ def _joined(every: Sequence[tuple[Withheld, ...]], axis: int) -> tuple[Withheld,
             counts=np.concatenate([one[key].counts for one in keyed], axis=axis),
         )
         for key in common
+    )
+
+
+def joined_predictions(
+    every: Sequence[PredictionErrors | None], axis: int
+) -> PredictionErrors | None:
+    """Of all seeds (axis 0) or recordings (axis 2); None where any has none, or has other
+    components."""
+    present = [p for p in every if p is not None]
+    components = {p.squares.shape[1] for p in present}
+    if len(present) < len(every) or len(components) != 1:
+        return None
+    return PredictionErrors(
+        np.concatenate([p.squares for p in present], axis=axis),
+        np.concatenate([p.counts for p in present], axis=axis),
+        np.concatenate([p.noise for p in present], axis=axis),
     )
 
 
