@@ -24,7 +24,7 @@ from validate.scene.box import box
 from validate.study.blocks import cut, nested, score_interval
 from validate.study.filter_bench import Bench
 from validate.study.filter_cell import folds_of, run_cell
-from validate.study.filter_exhibits import ranking_row
+from validate.study.filter_exhibits import ranking_row, study_exhibits
 from validate.study.filter_plan import FilterCell, plan
 from validate.study.filters import study
 from validate.study.job import Where
@@ -216,6 +216,34 @@ def test_without_a_free_marker_each_is_held_out_in_turn(tmp_path: object) -> Non
         ("top", False), ("side", False), ("top", True), ("side", True),
     }  # fmt: skip
     assert len(found.scores[HELD_OUT]) == len(found.scores[AHEAD]) == 2
+
+
+def test_each_withholds_free_markers_and_those_that_a_filter_can_lose(tmp_path: Path) -> None:
+    """One marker is given and cannot be lost: the other one, never given, is withheld."""
+    pulled = load_file(experiment_file(tmp_path))
+    found = study(
+        pulled, methods=("kf", "plain"), seeds=1, hold_out=("each",), by=WITHHELD,
+        out=tmp_path, where=Where(workers=0),
+    )  # fmt: skip
+    (ranking,) = found.rankings
+    assert (len(ranking.rows), ranking.failed) == (3, ())
+    for r in ranking.rows:
+        scored = {(w.name, w.ahead) for w in r.result.withheld}
+        assert scored == {("side", False), ("top", True)}, r.cell.name
+    assert found.plan.single_words in " ".join(study_exhibits(found)[1].words)
+
+
+def test_a_marker_in_turn_is_not_predicted_by_itself(tmp_path: Path) -> None:
+    """Persistence of a marker that is held out is the other marker's last displacement."""
+    bench, cell = two_markers(tmp_path)
+    held = run_cell(bench, replace(cell, baseline="persistence"))
+    ready = bench.ready(cell, cell.seeds[0])[0]
+    assert ready.tracks is not None
+    z = ready.tracks.z[1:]
+    top, side = (ready.tracks.names.index(n) for n in ("top", "side"))
+    rms = float(np.sqrt(((z[:, top] - z[:, side]) ** 2).sum(axis=1).mean()))
+    assert held.scores["top.held_out.rmse"][0] == pytest.approx(rms)
+    assert held.scores["side.held_out.rmse"][0] == pytest.approx(rms)
 
 
 def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: object) -> None:

@@ -246,6 +246,8 @@ def _show_filters(found: FilterStudy) -> None:
             say(f"{ranking.blocks.words}", indent="  ")
         if ranking.nested is not None and len(found.plan.seeds) == 1:
             say(chosen_line(ranking.nested, found), indent="  ")
+    if found.plan.single_words:
+        say(found.plan.single_words, indent="  ")
     failed = [pair for r in found.rankings for pair in r.failed]
     for cell, why in failed[:_PLACES]:
         say(f"failed: {cell.name} ({named(cell.values)}): {why}", indent="  ")

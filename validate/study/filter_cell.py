@@ -104,7 +104,8 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
     """The runs of a cell.
 
     Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
-    every marker is held out in turn of a method that is given two and more.
+    every marker is held out in turn of a method that is given two and more. One that is given a
+    single marker cannot lose it: its next samples score it.
     """
     moving = ready.tracks.names if ready.tracks else ()
     given = ready.method.markers
@@ -115,8 +116,8 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
     whole = Fold(given, tuple(n for n in moving if n not in given))
     if not cell.in_turn(moving):
         return (whole,)
-    turns = tuple(Fold(tuple(n for n in given if n != m), (m,)) for m in given if len(given) > 1)
-    return (whole, *turns)
+    turns = [m for m in given if m in moving] if len(given) > 1 else []
+    return (whole, *(Fold(tuple(n for n in given if n != m), (m,)) for m in turns))
 
 
 def _left(
@@ -365,10 +366,8 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
                 given = tracks.of(cell.given).and_outlines(
                     outline_tracks(ready.seen, cell.given), ready.scene.mesh
                 )
-                scoring = tracks.of(cell.scored(tracks.names))
-                if given.names and scoring.names:
-                    u = scoring.held(given)
-                    held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
+                if given.names:
+                    held = _held_markers(cell, tracks, given, segments)
                     truth = _held_at_probes(bench, ready, given)
             predictions = prediction_errors(offered.t, y, offered.sd**2, segments)
             on_each.append(Scored(truth, (*held, *ahead), predictions=predictions))
@@ -376,6 +375,19 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
     found = _put_together(scored, segments)
     step = float(np.median(seconds))
     return replace(found, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.seen.t))
+
+
+def _held_markers(
+    cell: FilterCell, tracks: MarkerTracks, given: MarkerTracks, segments: Segments
+) -> tuple[Withheld, ...]:
+    """Errors of the markers that are held out, each where the nearest other given one was."""
+    held = list[Withheld]()
+    for name in cell.scored(tracks.names):
+        marker, others = tracks.of((name,)), given.of([n for n in given.names if n != name])
+        if others.names:
+            u = marker.held(others)
+            held += marker.errors(tracks.t[1:], u[1:], segments, ahead=False)
+    return tuple(held)
 
 
 def _last_seen(z: Floats) -> Floats:

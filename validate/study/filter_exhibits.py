@@ -7,7 +7,6 @@ import numpy as np
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.study.chosen_exhibits import chosen_exhibits
 from validate.study.filter_maps import over_axes
-from validate.study.filter_plan import CASE
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
 from validate.study.score import LOG_LOSS, WORDS
@@ -112,8 +111,6 @@ def best_exhibit(study: FilterStudy) -> Exhibit:
             f"{study.by} {factor * r.score.mean:.4g}{half} {unit} over {over(study)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
-    if any(CASE in dict(best.ranked.cell.condition) for best in study.best):
-        words.append("A run of the experiment shows all its cases in one report.")
     head = ("condition", "command")
     table = NumberTable("best", "The best settings as commands", head, tuple(rows))
     return Exhibit("best", "Best settings", tuple(words), tables=(table,))
@@ -148,6 +145,8 @@ def _ranking_words(study: FilterStudy) -> Iterator[str]:
             if ranking.blocks is not None:
                 yield f"{_under(ranking).strip() or 'The recording'}: {ranking.blocks.words}."
         yield _BLOCKS
+    if study.plan.single_words:
+        yield study.plan.single_words
     yield _NIS
     yield (
         "Times are the median and the 99 % quantile of one step in this study's workers, one "

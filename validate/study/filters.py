@@ -187,11 +187,12 @@ def run_line(planned: FilterPlan, cell: FilterCell) -> str:
     beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
     methods = tuple(dict.fromkeys((*beside, cell.method)))
     values = {**dict(planned.job.values), **cell.values}
-    values.pop(CASE, None)  # a run shows all cases
+    case = values.pop(CASE, "")
     kept = {k: v for k, v in values.items() if _concerns(k, methods)}
     parts = ["validate", "run", experiment.name]
     for path, value in kept.items():
         parts += ["--set", f"{path}={value}"]
+    parts += ["--case", case] if case else []
     return shlex.join([*parts, "--methods", ",".join(methods)])
 
 
