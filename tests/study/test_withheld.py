@@ -1,7 +1,5 @@
 """Errors at what was withheld, blocks of time and nested choices, against numbers made by hand."""
 
-import importlib.util
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from script_modules import module_of
 from study_samples import experiment_file
 
 from validate.errors import ComparisonError
@@ -316,12 +315,7 @@ def test_without_an_interval_a_place_is_neither_worse_nor_a_tie(tmp_path: Path) 
 def test_a_ranking_without_truth_picks_a_good_filter() -> None:
     """Two of the three twins, one of the seeds that were named before the first run."""
     file = Path(__file__).parents[2] / "benchmarks" / "filter_rankings.py"
-    spec = importlib.util.spec_from_file_location("filter_rankings", file)
-    assert spec is not None
-    assert spec.loader is not None
-    ranked = importlib.util.module_from_spec(spec)
-    sys.modules["filter_rankings"] = ranked
-    spec.loader.exec_module(ranked)
+    ranked = module_of(file)
     with tempfile.TemporaryDirectory() as folder:
         found = ranked.picks("ekf_cube", (301,), Path(folder))
     assert len(found) == 4
