@@ -202,7 +202,7 @@ def test_seeds_need_a_parameter_and_stand_once() -> None:
         filter_plan._seeds(2, None, "")
     with pytest.raises(UsageError, match="--seeds 0: at least 1"):
         filter_plan._seeds(0, None, "twin.seed")
-    with pytest.raises(UsageError, match="a seed stands twice: that is no second sample"):
+    with pytest.raises(UsageError, match="a seed is given twice: each seed is one sample"):
         filter_plan._seeds((3, 3), None, "twin.seed")
 
 

@@ -88,7 +88,7 @@ def filters(
             seeds=seeds_of(seeds) if seeds else None, by=by, hold_out=kept,
             quick=common.quick, out=common.out, where=common.where, report=report,
         )  # fmt: skip
-    page = written(experiment, filter_page.told(found), place, common)
+    page = written(experiment, filter_page.findings(found), place, common)
     if not common.as_json:
         _show_filters(found)
         end(found.done, page)

@@ -56,7 +56,7 @@ class FilterCell:
         return f"{self.name}{given}{seeds}"
 
     def in_turn(self, moving: Sequence[str]) -> bool:
-        """Whether every marker is held out in turn: where that is asked for, or none is free."""
+        """Whether every marker is held out in turn: `--hold-out each`, or no marker is free."""
         return self.hold_out == EACH or set(moving) <= set(self.given)
 
     def scored(self, moving: Sequence[str]) -> tuple[str, ...]:
@@ -102,10 +102,10 @@ def plan(
 ) -> FilterPlan:
     """Checks every path and value before anything runs.
 
-    `seeds`: so many from the twin's own seed on, or these (None: `SEEDS`; a measured recording has
-    one). An axis of one method multiplies that method's cells only. Raises `UsageError` for an
-    experiment without filters, unknown paths (naming the nearest), values of another type, methods
-    without a sweep's name, and fewer than one seed.
+    `seeds`: so many from the declared seed of the twin on, or these (None: `SEEDS`; a measured
+    recording has one). An axis of one method multiplies its cells only. Raises `UsageError` for
+    an experiment without filters, unknown paths (naming the nearest), values of another type,
+    methods without a sweep's name, and fewer than one seed.
     """
     filters = [n for n, m in experiment.methods.items() if m.markers]
     if not filters:
@@ -118,14 +118,14 @@ def plan(
     seed_path = _seed_path(parameters) if experiment.repeats else ""
     _require(axes, experiment, parameters, methods, seed_path)
     job = job_of(experiment, options.values, options.quick)
-    mine = [m for m in methods if m in filters] or filters
-    given = tuple(dict.fromkeys(n for m in mine for n in experiment.methods[m].markers))
-    several = [m for m in mine if len(experiment.methods[m].markers) > 1]
+    chosen = [m for m in methods if m in filters] or filters
+    given = tuple(dict.fromkeys(n for m in chosen for n in experiment.methods[m].markers))
+    several = [m for m in chosen if len(experiment.methods[m].markers) > 1]
     spared = tuple(dict.fromkeys(n for m in several for n in experiment.methods[m].markers))
-    single = tuple(m for m in mine if m not in several) if hold_out == EACH else ()
+    single = tuple(m for m in chosen if m not in several) if hold_out == EACH else ()
     if seeds is None:
         seeds = SEEDS if experiment.repeats and seed_path else 1
-    own = FilterCell(
+    bare = FilterCell(
         "",
         (),
         (),
@@ -134,18 +134,18 @@ def plan(
         given=given,
         spared=spared,
         hold_out=hold_out,
-        tracker=mine[0],
+        tracker=chosen[0],
     )
     if not options.methods and not experiment.repeats:
         methods = tuple(dict.fromkeys((*methods, *_plain(experiment, methods))))
-    of_methods = [replace(own, method=m) for m in methods]
+    of_methods = [replace(bare, method=m) for m in methods]
     cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
-    beside = [replace(own, method=mine[0], baseline="persistence")]
+    beside = [replace(bare, method=chosen[0], baseline="persistence")]
     if all(m in filters for m in methods):  # no plain solver stands beside them
-        beside.insert(0, replace(own, method=mine[0], baseline="alone"))
+        beside.insert(0, replace(bare, method=chosen[0], baseline="alone"))
     conditions = [a for a in axes if not a.path.startswith(METHODS)]
     cells += [c for one in beside for c in _cells(experiment, job, one, conditions)]
-    return FilterPlan(experiment, job, tuple(axes), methods, own.seeds, tuple(cells), single)
+    return FilterPlan(experiment, job, tuple(axes), methods, bare.seeds, tuple(cells), single)
 
 
 def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tuple[Any, Any]:
@@ -158,15 +158,16 @@ def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tup
 
 
 def _cells(
-    experiment: Experiment, job: Job, own: FilterCell, axes: Sequence[Axis]
+    experiment: Experiment, job: Job, bare: FilterCell, axes: Sequence[Axis]
 ) -> list[FilterCell]:
-    mine = f"{METHODS}{own.method}."
-    found = []
-    for row in grid([a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(mine)]):
+    prefix = f"{METHODS}{bare.method}."
+    cells = []
+    concerning = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(prefix)]
+    for row in grid(concerning):
         settings = tuple((k, v) for k, v in row.items() if k.startswith(METHODS))
         condition = tuple((k, v) for k, v in row.items() if not k.startswith(METHODS))
-        found.append(_keyed(experiment, job, replace(own, settings=settings, condition=condition)))
-    return found
+        cells.append(_keyed(experiment, job, replace(bare, settings=settings, condition=condition)))
+    return cells
 
 
 def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
@@ -240,7 +241,7 @@ def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tup
         return (0,)
     if isinstance(seeds, tuple):
         if len(set(seeds)) < count:
-            raise UsageError("a seed stands twice: that is no second sample")
+            raise UsageError("a seed is given twice: each seed is one sample; name different seeds")
         return seeds
     first = {p.path: p.default for p in describe(parameters)}[seed_path]
     return tuple(range(int(first), int(first) + count))

@@ -88,7 +88,7 @@ def summed(withheld: Sequence[Withheld]) -> tuple[Floats, Floats] | None:
 
 
 def name_of(w: Withheld) -> str:
-    """The name of one quantity's own score."""
+    """The name of the score of one quantity."""
     return f"{w.name}.{AHEAD if w.ahead else HELD_OUT}"
 
 
@@ -100,10 +100,10 @@ def withheld_scores(
     units: dict[str, str] = {}
     named = {n: of_score(withheld, n) for n in (WITHHELD, HELD_OUT, AHEAD)}
     for name, parts in (named | {name_of(w): [w] for w in withheld}).items():
-        found = summed(parts)
-        if found is None or not (found[1].sum(axis=1) > 0).all():
+        sums = summed(parts)
+        if sums is None or not (sums[1].sum(axis=1) > 0).all():
             continue
-        squares, counts = (x.sum(axis=1) for x in found)
+        squares, counts = (x.sum(axis=1) for x in sums)
         scores[name], units[name] = tuple(np.sqrt(squares / counts).tolist()), parts[0].unit
     if innovations is not None and (dof := innovations.dof.sum(axis=1)).all():
         loss = -innovations.log_likelihood.sum(axis=1) / dof
@@ -116,9 +116,9 @@ def error_scores(
 ) -> dict[str, float]:
     """`<probe>.rmse` m and `all.rmse` m from traces (nt,) m and truths (nt, d) m by probe."""
     c = "xyz".index(axis)
-    found, squares = {}, []
+    scores, squares = {}, []
     for probe, reference in truth.items():
         error = track_error(probe, axis, estimates[probe], reference[:, c])
-        found[f"{probe}.rmse"] = rmse(error)
+        scores[f"{probe}.rmse"] = rmse(error)
         squares.append(error.values**2)
-    return {POOLED: float(np.sqrt(np.mean(squares))), **found}
+    return {POOLED: float(np.sqrt(np.mean(squares))), **scores}
