@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from script_modules import module_of
 from study_samples import experiment_file
 
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.estimate.kalman import Gaussian, kf_update
 from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours
@@ -33,6 +33,7 @@ from validate.study.withheld import (
     MarkerTracks,
     Segments,
     Withheld,
+    ahead_errors,
     innovations_of,
 )
 
@@ -232,6 +233,19 @@ def test_each_withholds_free_markers_and_those_that_a_filter_can_lose(tmp_path: 
     assert found.plan.single_words in " ".join(study_exhibits(found)[1].words)
 
 
+def test_a_filter_that_is_given_nothing_is_its_model(tmp_path: Path) -> None:
+    """The model of the filter is that of the plain solver: their errors are equal."""
+    pulled = load_file(experiment_file(tmp_path))
+    errors = {}
+    for methods in (("kf",), ("kf", "plain")):
+        found = study(
+            pulled, methods=methods, seeds=1, by=WITHHELD, out=tmp_path, where=Where(workers=0)
+        )
+        errors |= {r.cell.name: r.score.mean for r in found.rankings[0].rows}
+    assert set(errors) == {"kf", "kf, given nothing", "plain", "last measurement, held"}
+    assert errors["kf, given nothing"] == pytest.approx(errors["plain"], rel=1e-9)
+
+
 def test_a_marker_in_turn_is_not_predicted_by_itself(tmp_path: Path) -> None:
     """Persistence of a marker that is held out is the other marker's last displacement."""
     bench, cell = two_markers(tmp_path)
@@ -252,6 +266,25 @@ def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: obj
     assert (fold.given, fold.scores) == (("top",), ("side",))
     found = run_cell(bench, named)
     assert {(w.name, w.ahead) for w in found.withheld} == {("side", False), ("top", True)}
+
+
+def test_held_out_names_are_markers_that_move_and_leave_one_to_the_filter(tmp_path: Path) -> None:
+    bench, cell = two_markers(tmp_path)
+    with pytest.raises(UsageError, match="--hold-out a: no marker that moves; there are"):
+        run_cell(bench, replace(cell, hold_out=("a",)))
+    with pytest.raises(UsageError, match="--hold-out top, side leaves nothing of top, side to"):
+        run_cell(bench, replace(cell, hold_out=("top", "side")))
+
+
+def test_a_next_sample_is_off_by_the_length_of_its_innovation() -> None:
+    """3, 4 and 0 mm of one marker are 5 mm; a component of another one is its length."""
+    y = np.array([[3.0, 4.0, 0.0, 2.0], [3.0, 0.0, 0.0, 9.0]])
+    measured = np.array([[True, True, True, True], [True, True, True, False]])
+    names = ("a.x", "a.y", "a.z", "b.z")
+    one = Segments(np.array([0.0, 2.0]))
+    a, b = ahead_errors(np.array([1.0, 2.0]), names, y, measured, one)
+    assert (a.squares.item(), a.counts.item(), a.ahead) == (34.0, 2.0, True)
+    assert (b.squares.item(), b.counts.item()) == (4.0, 1.0)
 
 
 @pytest.mark.parametrize(("R", "used"), [("none", True), ("1e-9", False), ("1e-11", False)])
