@@ -8,6 +8,7 @@ import pytest
 from study_samples import experiment_file
 
 from validate.replay.find import load_file
+from validate.study import filter_page
 from validate.study.blocks import Blocks, cut
 from validate.study.filters import study
 from validate.study.job import Where
@@ -90,6 +91,7 @@ def test_plain_fem_and_persistence_are_ranked_by_likelihood(tmp_path: Path) -> N
     assert plain.score.mean == pytest.approx(entropy(1e-10), abs=0.15)
     assert held.score.mean > plain.score.mean + 0.5
     assert (plain.score.half is not None, plain.score.count) == (True, ranking.blocks.count)  # type: ignore[union-attr]
+    assert "-10.12 ± 0.14 (" in filter_page.sentence(found)  # a number without a unit
     assert ranking.nested is not None
     assert ranking.nested.error.mean == pytest.approx(ranking.rows[0].score.mean)
     assert ranking.nested.beside == pytest.approx(

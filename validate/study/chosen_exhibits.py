@@ -8,7 +8,7 @@ from validate.study.blocks import Nested
 from validate.study.filters import FilterStudy
 from validate.study.ranking import Ranking
 from validate.study.score import LOG_LOSS, WITHHELD
-from validate.study.score_units import shown_unit
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.sweep import named
 
 _MM = 1e3
@@ -55,12 +55,13 @@ def _by_count(chosen: Mapping[str, int]) -> list[tuple[str, int]]:
 
 def chosen_line(nested: Nested, study: FilterStudy) -> str:
     """What a choice on other blocks and markers is worth, in one line."""
-    factor, unit = shown_unit(_unit(study))
+    factor, shown = shown_unit(_unit(study))
+    unit = unit_text(shown)
     half = "" if nested.error.half is None else f" ± {factor * nested.error.half:.2g}"
     others = "other blocks and markers" if nested.split else "other blocks"
     beside = ", ".join(f"{name} {factor * e:.3g}" for name, e in nested.beside.items())
     return (
-        f"chosen on {others}, reported on the rest: {factor * nested.error.mean:.4g}{half} {unit}"
+        f"chosen on {others}, reported on the rest: {factor * nested.error.mean:.4g}{half}{unit}"
         f"{f' ({beside})' if beside else ''}"
     )
 

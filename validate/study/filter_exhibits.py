@@ -10,7 +10,7 @@ from validate.study.filter_maps import over_axes
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
 from validate.study.score import LOG_LOSS, WORDS
-from validate.study.score_units import shown_unit
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.sweep import named
 
 _MS = 1e3
@@ -104,13 +104,14 @@ def best_exhibit(study: FilterStudy) -> Exhibit:
     words, rows = [], []
     for best in study.best:
         r = best.ranked
-        factor, unit = shown_unit(study.unit)
+        factor, shown = shown_unit(study.unit)
+        unit = unit_text(shown)
         half = f" ± {factor * r.score.half:.3g}" if r.score.half is not None else ""
         when = f" with {named(r.cell.condition)}" if r.cell.condition else ""
         doubts = f"; {best.doubts}" if best.doubts else ""
         words.append(
             f"Best{when}: {r.cell.method} ({named(r.cell.settings)}), "
-            f"{study.by} {factor * r.score.mean:.4g}{half} {unit} over {over(study)}{doubts}."
+            f"{study.by} {factor * r.score.mean:.4g}{half}{unit} over {over(study)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
     head = ("condition", "command")

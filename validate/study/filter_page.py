@@ -9,7 +9,7 @@ from validate.study.filter_plan import FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
-from validate.study.score_units import shown_unit
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.store import Record
 from validate.study.study_page import CellsTable, Findings, Row
 
@@ -32,7 +32,8 @@ def sentence(study: FilterStudy) -> str:
     doubts = f" ({best.doubts})" if best.doubts else ""
     more = f" (first of {len(study.rankings)} conditions)" if len(study.rankings) > 1 else ""
     failed = f", {study.failed} failed" if study.failed else ""
-    half, (factor, unit) = best.ranked.score.half, shown_unit(study.unit)
+    half, (factor, shown) = best.ranked.score.half, shown_unit(study.unit)
+    unit = unit_text(shown)
     spread = "" if half is None else f" ± {factor * half:.2g}"
     near = sum(p.near for p in study.picks)
     truth = (
@@ -43,7 +44,7 @@ def sentence(study: FilterStudy) -> str:
     )
     return (
         f"{cells} cells over {over(study)}{failed}; best filter by {study.by}{more}: "
-        f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread} {unit}{doubts}."
+        f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread}{unit}{doubts}."
         f"{truth}"
     )
 
