@@ -1,25 +1,18 @@
 """The guard of results: what it reads of a report, what it calls equal, and how it ends."""
 
-import importlib.util
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 from click.testing import CliRunner
+from script_modules import module_of
 
 
 @pytest.fixture(scope="module")
 def guard(project_root: Path) -> ModuleType:
     path = project_root / "benchmarks" / "guard.py"
-    spec = importlib.util.spec_from_file_location("guard", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["guard"] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_of(path)
 
 
 def score(name: str, value: float | None, unit: str = "m") -> dict[str, object]:

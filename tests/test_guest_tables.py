@@ -1,16 +1,15 @@
 """The README's tables of guests: what they are made by, and that they are today's."""
 
-import importlib.util
 import json
 import re
 import shutil
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 from commands import here
+from script_modules import module_of
 
 from validate.compare.result import Result
 from validate.replay import load
@@ -18,13 +17,7 @@ from validate.report.numbers import significant
 
 
 def script(root: Path, name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, root / "benchmarks" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_of(root / "benchmarks" / f"{name}.py")
 
 
 @pytest.fixture(scope="module")

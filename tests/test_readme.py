@@ -1,14 +1,13 @@
 """The README is tested from its own text."""
 
-import importlib.util
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 from click.testing import CliRunner
+from script_modules import module_of
 
 from validate.cli.main import cli
 from validate.compare.result import Result
@@ -22,13 +21,7 @@ def readme(project_root: Path) -> str:
 @pytest.fixture(scope="module")
 def script(project_root: Path) -> ModuleType:
     path = project_root / "benchmarks" / "readme_table.py"
-    spec = importlib.util.spec_from_file_location("readme_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["readme_table"] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_of(path)
 
 
 def test_its_first_two_shell_blocks_are_one_line_each(readme: str) -> None:

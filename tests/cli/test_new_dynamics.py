@@ -137,6 +137,34 @@ def test_filters_of_an_outline_are_ranked_at_the_marker(here: Path) -> None:
     assert not ranking.failed
 
 
+def test_of_three_markers_filters_are_given_two_and_each_is_held_out(here: Path) -> None:
+    """The tip moves most and is predicted; the filter beats the last measurement held."""
+    code, said = new(here, "swinging")
+    assert code == 0, said
+    mine = experiment(here)
+    assert mine.methods["reduced_kf"].markers == ("side", "middle")
+    found = study(
+        mine, methods=("reduced_kf", "modal"), hold_out=("each",), out=here,
+        where=Where(workers=0),
+    )  # fmt: skip
+    (ranking,) = found.rankings
+    assert (found.by, ranking.failed, found.plan.single_words) == ("held_out.rmse", (), "")
+    errors = {r.cell.name: r for r in ranking.rows}
+    for r in ranking.rows:
+        held = {w.name for w in r.result.withheld if not w.ahead}
+        assert held == {"tip", "middle", "side"}, r.cell.name
+    assert errors["reduced_kf"].score.mean < errors["last measurement, held"].score.mean / 10
+
+
+def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
+    start = 'motion = {how = "dynamic"'
+    one = (start, f'filters.markers = "tip"\n{start}')
+    assert new(here, "swinging", one)[0] == 0
+    assert experiment(here).methods["roukf"].markers == ("tip",)
+    code, said = new(here, "swinging", (start, f'filters.markers = "tip,end"\n{start}'))
+    assert (code, "no marker end; there are tip, middle, side" in said) == (2, True), said
+
+
 def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Path) -> None:
     new(here, "swinging")
     mine = experiment(here)

@@ -51,7 +51,7 @@ def test_the_folder_holds_what_a_report_holds(made: Path) -> None:
         "heat_nis_kf.png", "heat_error_kf.png", "chart_pareto_1.png",
     }  # fmt: skip
     page = (folder / "report.html").read_text("utf-8")
-    assert "cannot tell" in page or "worse" in page
+    assert "not distinguishable" in page or "worse" in page
     for best in content["study"]["best"]:
         assert best["command"].startswith("validate run pulled --set twin.noise=1e-1")
         assert best["command"] in page.replace("​", "")

@@ -1,11 +1,11 @@
 """The table of a paper's page holds every figure that the experiments of that paper declare."""
 
-import importlib.util
 import re
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from script_modules import module_of
 
 from validate.replay import load
 
@@ -13,12 +13,7 @@ from validate.replay import load
 @pytest.fixture(scope="module")
 def script(project_root: Path) -> ModuleType:
     path = project_root / "benchmarks" / "paper_table.py"
-    spec = importlib.util.spec_from_file_location("paper_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_of(path)
 
 
 PICTURES = {"paper-000": 10, "paper-001": 5, "paper-002": 11, "paper-003": 7, "paper-004": 8}

@@ -1,24 +1,17 @@
 """Every package says what is public, and the reference has exactly that."""
 
-import importlib.util
 import re
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from script_modules import module_of
 
 
 @pytest.fixture(scope="module")
 def reference(project_root: Path) -> ModuleType:
     path = project_root / "docs" / "reference_page.py"
-    spec = importlib.util.spec_from_file_location("reference_page", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["reference_page"] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_of(path)
 
 
 def test_every_package_has_public_names_with_docstrings(reference: ModuleType) -> None:

@@ -82,6 +82,26 @@ def test_zero_pivots_are_refused() -> None:
             factorise(sparse.csr_array(np.array(matrix)), np.arange(2), np.eye(2))
 
 
+def test_an_empty_column_is_refused_before_blas_complains(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """SuperLU calls DGEMV with an illegal size, which prints to standard output."""
+    A, places = grid_laplacian(8)
+    kept = np.ones(len(places))
+    kept[len(places) // 2 :] = 0.0
+    empty = sparse.csr_array(sparse.diags_array(kept) @ A @ sparse.diags_array(kept))
+    with pytest.raises(SceneError, match=r"not positive definite .*, 256 not positive"):
+        factorise(empty, np.arange(len(places)), places)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_entries_that_are_not_finite_are_refused() -> None:
+    A, places = grid_laplacian(4)
+    A.data[3] = np.inf
+    with pytest.raises(SceneError, match="1 entries of the stiffness matrix are not finite"):
+        factorise(A, np.arange(len(places)), places)
+
+
 @pytest.mark.parametrize("drop", ["pin", "y0", "x0"])
 def test_body_that_can_move_rigidly_is_refused(drop: str) -> None:
     """The missing z pin of paper 000's set-up is silent in the library."""

@@ -1,7 +1,5 @@
 """Outlines of regions with known walls: exact shapes, synthetic frames, refusals, a real disk."""
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -9,6 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 import scipy.io
+from script_modules import module_of
 
 from validate.errors import RecordingError
 from validate.recording.images import followed
@@ -37,13 +36,7 @@ def image(outline: np.ndarray | None, seed: int = 0, **target: float) -> np.ndar
 @pytest.fixture(scope="module")
 def bench(project_root: Path) -> ModuleType:
     place = project_root / "benchmarks" / "contours.py"
-    spec = importlib.util.spec_from_file_location("contours_benchmark", place)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["contours_benchmark"] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_of(place)
 
 
 def test_closed_path_is_the_cheapest_of_all() -> None:

@@ -1,25 +1,18 @@
 """Synthetic logs of a benchmark: intervals hold their truths, wrong laws are named."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from script_modules import module_of
 
 FILE = Path(__file__).parents[2] / "benchmarks" / "identified_logs.py"
 
 
 @pytest.fixture(scope="module")
 def logs() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("identified_logs", FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = found  # dataclasses look their module up
-    spec.loader.exec_module(found)
-    return found
+    return module_of(FILE)
 
 
 def test_the_bonded_truth_is_that_of_known_limits(logs: ModuleType) -> None:

@@ -1,11 +1,11 @@
 """An indentation log of FElupe's on a compliant machine, through the commands of a user."""
 
-import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from script_modules import module_of
 
 from tests.cli.test_new_body import called
 from validate.replay import compare
@@ -17,12 +17,7 @@ SMALL = {"body.cells": "8", "seen.states": "10"}
 
 
 def benchmark() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("indentation_log", FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
-    return found
+    return module_of(FILE)
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 from report_samples import bare_result, small_result
+from script_modules import module_of
 
 from validate.arrays import Floats
 from validate.compare.result import Result
@@ -535,11 +536,7 @@ def test_a_walk_by_the_specification_reads_the_same(
     path: Path, messages: Messages, project_root: Path
 ) -> None:
     where = project_root / "tests" / "recording" / "mcap_samples.py"
-    spec = importlib.util.spec_from_file_location("mcap_walk", where)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = module_of(where)
     topics: dict[int, str] = {}
     found: Messages = defaultdict(list)
     for opcode, content in module.walk(path.read_bytes()):

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from study_samples import experiment_file
 
 from validate.fem.system import System
 from validate.replay.find import load_file
@@ -17,7 +18,11 @@ from validate.solve.newmark import Newmark
 from validate.solve.schemes import candidates, steppings, steppings_for
 from validate.solve.stepping import Rates, Stepping, implicit_maps
 from validate.solve.types import Scheme, Stepper
+from validate.study.choose import choose, wanted
+from validate.study.climb import Climb
+from validate.study.job import Where
 from validate.study.stability import declared
+from validate.study.trade import again
 
 EXPERIMENTS = Path(__file__).parents[2] / "experiments"
 STEPS = (0.02, 0.01)
@@ -106,3 +111,21 @@ def test_a_new_scheme_enters_by_its_name_in_the_list(toy: None) -> None:
     trial = trial_of(load_file(EXPERIMENTS / "kf_cube.py"), quick=True)
     assert "a toy" in {s.name for s in trial.solvers}
     assert isinstance(next(s for s in trial.solvers if s.name == "a toy").make(0.01), Toy)
+
+
+def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """`study choose` runs its candidates: as the only scheme in the list it is the choice."""
+    monkeypatch.setattr(schemes, "SCHEMES", (Toy,))
+    pulled, here = load_file(experiment_file(tmp_path)), Where(workers=0)
+    climb = Climb(pulled, quick=True, out=tmp_path, where=here)
+    found = choose(
+        climb, wanted("10mm", "1Hz"), True,
+        lambda trade, row, dt: again(trade, row, dt, tmp_path, here),
+    )  # fmt: skip
+    assert {r.solver.name for r in found.trade.rows} == {"a toy"}
+    assert found.pick is not None
+    assert isinstance(found.pick.solver.make(0.01), Toy)
+    assert found.pick.error is not None
+    assert 0 < found.pick.error < 10e-3

@@ -142,7 +142,7 @@ def test_a_stored_cell_is_read_back_and_a_damaged_one_is_not(
 def test_a_worker_keeps_few_systems_and_many_recordings(pulled: Experiment) -> None:
     """Its memory is bounded: factors of four meshes, seeds of one study."""
     bench = Bench(pulled, planned(pulled).job)
-    kept = (bench._systems, bench._truths, bench._loaded, bench._seen, bench._recordings)
+    kept = (bench._systems, bench._truths, bench._loaded, bench._registered, bench._recordings)
     assert [k._most for k in kept] == [4, 4, 4, 40, 40]
 
 
@@ -163,7 +163,7 @@ def test_a_twin_that_tells_no_truth_is_no_benchmark(
     made = planned(pulled)
     bench = Bench(pulled, made.job)
     monkeypatch.setattr(bench, "_repeated", lambda ready: Truth({}))
-    with pytest.raises(ComparisonError, match="the twin tells no probe's truth: 0 compared"):
+    with pytest.raises(ComparisonError, match="the truth of the twin has no probes: 0 compared"):
         run_cell(bench, made.cells[0])
 
 

@@ -1,21 +1,31 @@
 """What a study will run: checked before anything runs, keyed by all that makes a cell."""
 
+import shlex
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from study_samples import experiment_file
 
+from validate.cli import running
+from validate.cli.arguments import pairs
+from validate.cli.main import cli
 from validate.errors import UsageError
 from validate.replay.cards import changed
-from validate.replay.experiment import Case, Experiment
+from validate.replay.experiment import Case, Experiment, Told
 from validate.replay.find import load_file
-from validate.replay.options import Options
+from validate.replay.named_run import run_name
+from validate.replay.options import Options, chosen_cases
+from validate.replay.road import compare
 from validate.study import filter_plan
 from validate.study.filter_bench import Bench
 from validate.study.filter_cell import run_cell
 from validate.study.filter_plan import FilterPlan, plan
-from validate.study.filters import run_line
+from validate.study.filters import run_line, study
+from validate.study.job import Where
 from validate.study.sweep import axes
 
 
@@ -99,9 +109,17 @@ def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
         plan(phantom, Options({}), (), 2)
 
 
-def test_a_filter_of_one_marker_cannot_be_kept_from_it(pulled: Experiment) -> None:
-    with pytest.raises(UsageError, match="leaves nothing to 'kf', which is given top alone"):
-        plan(pulled, Options({}), (), 2, ("each",))
+def test_each_keeps_the_only_marker_of_a_filter_and_names_it(pulled: Experiment) -> None:
+    alone = plan(pulled, Options({}), (), 2, ("each",))
+    assert {(c.given, c.spared) for c in alone.cells} == {(("top",), ())}
+    words = "Given one marker, which is scored by its next sample only: kf (top)."
+    assert alone.single_words == words
+    assert plan(pulled, Options({}), (), 2).single_words == ""
+    two = replace(pulled.methods["kf"], markers=("top", "side"))
+    more = replace(pulled, methods={**pulled.methods, "two": two})
+    both = plan(more, Options({}), (), 2, ("each",))
+    assert both.single_words == words
+    assert both.cells[0].spared == ("top", "side")
 
 
 def test_a_case_is_a_condition_by_its_name(pulled: Experiment) -> None:
@@ -115,13 +133,76 @@ def test_a_case_is_a_condition_by_its_name(pulled: Experiment) -> None:
         plan(more, Options({}, ("kf",)), axes(["case=sof"]), 2)
 
 
+def with_cases(folder: Path) -> Path:
+    """The file of the experiment with two cases, the second one for the solver alone."""
+    path = experiment_file(folder)
+    text = path.read_text("utf-8")
+    head = "from validate.replay.experiment import Experiment, Twin"
+    assert head in text
+    text = text.replace(
+        head,
+        "from validate.replay.cards import changed\n"
+        "from validate.replay.experiment import Case, Experiment, Twin",
+    )
+    text = text.replace("    twin=Twin(record", """    cases=(
+        Case("soft", "half as stiff", changed("twin", stiffness=0.5)),
+        Case("stiff", "twice as stiff", changed("twin", stiffness=2.0), methods=("plain",)),
+    ),
+    twin=Twin(record""")  # fmt: skip
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_the_best_command_of_a_case_runs_that_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its report has the score of the study's first seed, on that case and on no other one."""
+    more = load_file(with_cases(tmp_path))
+    found = study(
+        more, ["case=stiff,recorded", "methods.kf.Q=1e-11,1e-9"], seeds=1,
+        out=tmp_path / "reports", where=Where(workers=0),
+    )  # fmt: skip
+    stiff, recorded = found.best
+    assert "--case stiff " in stiff.line
+    assert "--case recorded " in recorded.line
+    for best, cases in ((stiff, ["@stiff"]), (recorded, [])):
+        scores = compare(more, options_of(best.line, monkeypatch)).methods[0].scores
+        run = {s.name: s.value for s in scores if s.name.startswith("top.rmse")}
+        assert list(run) == ["top.rmse", *(f"top.rmse{c}" for c in cases)]
+        assert run[f"top.rmse{''.join(cases)}"] == pytest.approx(
+            best.ranked.result.scores["top.rmse"][0], rel=1e-6
+        )
+
+
+def options_of(line: str, monkeypatch: pytest.MonkeyPatch) -> Options:
+    """What the command line hands to a run."""
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(running, "run", lambda names, **options: given.update(options) or 0)
+    CliRunner().invoke(cli, shlex.split(line)[1:], standalone_mode=False)
+    methods = tuple(given["methods"].split(","))
+    return Options(pairs(given["values"], "--set"), methods, case=given["case"])
+
+
+def test_a_run_of_one_case_has_a_folder_of_its_name(tmp_path: Path) -> None:
+    more = load_file(with_cases(tmp_path))
+    names = {c: run_name(more, Options({}, case=c)) for c in ("", "soft", "recorded")}
+    assert names[""] == "pulled"
+    assert names["soft"].startswith("pulled+case_soft-")
+    assert len(set(names.values())) == 3
+    assert [c.name for c in chosen_cases(more, Options({}))] == ["soft", "stiff"]
+    needs_all = replace(more, exhibits=lambda p, cases, tell: Told(numbers=dict(cases["soft"])))
+    assert compare(needs_all, Options({}, case="stiff")).methods  # its figures are left out
+    with pytest.raises(UsageError, match="no case 'sof' of pulled; nearest: soft"):
+        compare(more, Options({}, case="sof"))
+
+
 def test_seeds_need_a_parameter_and_stand_once() -> None:
     assert filter_plan._seeds(1, None, "") == (0,)
     with pytest.raises(UsageError, match=r"2 seeds, but the experiment has no parameter twin.seed"):
         filter_plan._seeds(2, None, "")
     with pytest.raises(UsageError, match="--seeds 0: at least 1"):
         filter_plan._seeds(0, None, "twin.seed")
-    with pytest.raises(UsageError, match="a seed stands twice: that is no second sample"):
+    with pytest.raises(UsageError, match="a seed is given twice: each seed is one sample"):
         filter_plan._seeds((3, 3), None, "twin.seed")
 
 

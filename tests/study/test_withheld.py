@@ -1,7 +1,5 @@
 """Errors at what was withheld, blocks of time and nested choices, against numbers made by hand."""
 
-import importlib.util
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from script_modules import module_of
 from study_samples import experiment_file
 
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.estimate.kalman import Gaussian, kf_update
 from validate.fem.locate import barycentric_rows
 from validate.recording.types import Contours
@@ -24,7 +23,7 @@ from validate.scene.box import box
 from validate.study.blocks import cut, nested, score_interval
 from validate.study.filter_bench import Bench
 from validate.study.filter_cell import folds_of, run_cell
-from validate.study.filter_exhibits import ranking_row
+from validate.study.filter_exhibits import ranking_row, study_exhibits
 from validate.study.filter_plan import FilterCell, plan
 from validate.study.filters import study
 from validate.study.job import Where
@@ -34,6 +33,7 @@ from validate.study.withheld import (
     MarkerTracks,
     Segments,
     Withheld,
+    ahead_errors,
     innovations_of,
 )
 
@@ -218,6 +218,47 @@ def test_without_a_free_marker_each_is_held_out_in_turn(tmp_path: object) -> Non
     assert len(found.scores[HELD_OUT]) == len(found.scores[AHEAD]) == 2
 
 
+def test_each_withholds_free_markers_and_those_that_a_filter_can_lose(tmp_path: Path) -> None:
+    """One marker is given and cannot be lost: the other one, never given, is withheld."""
+    pulled = load_file(experiment_file(tmp_path))
+    found = study(
+        pulled, methods=("kf", "plain"), seeds=1, hold_out=("each",), by=WITHHELD,
+        out=tmp_path, where=Where(workers=0),
+    )  # fmt: skip
+    (ranking,) = found.rankings
+    assert (len(ranking.rows), ranking.failed) == (3, ())
+    for r in ranking.rows:
+        scored = {(w.name, w.ahead) for w in r.result.withheld}
+        assert scored == {("side", False), ("top", True)}, r.cell.name
+    assert found.plan.single_words in " ".join(study_exhibits(found)[1].words)
+
+
+def test_a_filter_that_is_given_nothing_is_its_model(tmp_path: Path) -> None:
+    """The model of the filter is that of the plain solver: their errors are equal."""
+    pulled = load_file(experiment_file(tmp_path))
+    errors = {}
+    for methods in (("kf",), ("kf", "plain")):
+        found = study(
+            pulled, methods=methods, seeds=1, by=WITHHELD, out=tmp_path, where=Where(workers=0)
+        )
+        errors |= {r.cell.name: r.score.mean for r in found.rankings[0].rows}
+    assert set(errors) == {"kf", "kf, given nothing", "plain", "last measurement, held"}
+    assert errors["kf, given nothing"] == pytest.approx(errors["plain"], rel=1e-9)
+
+
+def test_a_marker_in_turn_is_not_predicted_by_itself(tmp_path: Path) -> None:
+    """Persistence of a marker that is held out is the other marker's last displacement."""
+    bench, cell = two_markers(tmp_path)
+    held = run_cell(bench, replace(cell, baseline="persistence"))
+    ready = bench.ready(cell, cell.seeds[0])[0]
+    assert ready.tracks is not None
+    z = ready.tracks.z[1:]
+    top, side = (ready.tracks.names.index(n) for n in ("top", "side"))
+    rms = float(np.sqrt(((z[:, top] - z[:, side]) ** 2).sum(axis=1).mean()))
+    assert held.scores["top.held_out.rmse"][0] == pytest.approx(rms)
+    assert held.scores["side.held_out.rmse"][0] == pytest.approx(rms)
+
+
 def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: object) -> None:
     bench, cell = two_markers(tmp_path)
     named = replace(cell, hold_out=("side",))
@@ -225,6 +266,25 @@ def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: obj
     assert (fold.given, fold.scores) == (("top",), ("side",))
     found = run_cell(bench, named)
     assert {(w.name, w.ahead) for w in found.withheld} == {("side", False), ("top", True)}
+
+
+def test_held_out_names_are_markers_that_move_and_leave_one_to_the_filter(tmp_path: Path) -> None:
+    bench, cell = two_markers(tmp_path)
+    with pytest.raises(UsageError, match="--hold-out a: no marker that moves; there are"):
+        run_cell(bench, replace(cell, hold_out=("a",)))
+    with pytest.raises(UsageError, match="--hold-out top, side leaves nothing of top, side to"):
+        run_cell(bench, replace(cell, hold_out=("top", "side")))
+
+
+def test_a_next_sample_is_off_by_the_length_of_its_innovation() -> None:
+    """3, 4 and 0 mm of one marker are 5 mm; a component of another one is its length."""
+    y = np.array([[3.0, 4.0, 0.0, 2.0], [3.0, 0.0, 0.0, 9.0]])
+    measured = np.array([[True, True, True, True], [True, True, True, False]])
+    names = ("a.x", "a.y", "a.z", "b.z")
+    one = Segments(np.array([0.0, 2.0]))
+    a, b = ahead_errors(np.array([1.0, 2.0]), names, y, measured, one)
+    assert (a.squares.item(), a.counts.item(), a.ahead) == (34.0, 2.0, True)
+    assert (b.squares.item(), b.counts.item()) == (4.0, 1.0)
 
 
 @pytest.mark.parametrize(("R", "used"), [("none", True), ("1e-9", False), ("1e-11", False)])
@@ -288,12 +348,7 @@ def test_without_an_interval_a_place_is_neither_worse_nor_a_tie(tmp_path: Path) 
 def test_a_ranking_without_truth_picks_a_good_filter() -> None:
     """Two of the three twins, one of the seeds that were named before the first run."""
     file = Path(__file__).parents[2] / "benchmarks" / "filter_rankings.py"
-    spec = importlib.util.spec_from_file_location("filter_rankings", file)
-    assert spec is not None
-    assert spec.loader is not None
-    ranked = importlib.util.module_from_spec(spec)
-    sys.modules["filter_rankings"] = ranked
-    spec.loader.exec_module(ranked)
+    ranked = module_of(file)
     with tempfile.TemporaryDirectory() as folder:
         found = ranked.picks("ekf_cube", (301,), Path(folder))
     assert len(found) == 4

@@ -148,6 +148,12 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
+@click.option(
+    "--case",
+    default="",
+    metavar="NAME",
+    help="Run this case only, beside the recording.",
+)
 @GUESTS
 @click.option("--anyway", is_flag=True, help="Predict with what is not identifiable, too.")
 @click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")

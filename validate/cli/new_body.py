@@ -295,7 +295,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
             replace(p, body=replace(p.body, cells=cells_for(p))) for p in (parameters, here)
         )
         order = 1 if mesh is not None and mesh.bricks else order  # taken as they are, mixed
-        methods = moving_methods(recording, here, found["law"], order)
+        methods = moving_methods(recording, here, found, order)
         names = judged_markers(recording, here)
         accepted = "large" if found["law"] != "linear" else "implicit"
     else:

@@ -1,6 +1,6 @@
 """Questions about a body that moves in time, and the methods of its experiment."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
@@ -33,6 +33,8 @@ _UNKNOWNS = 6000  # of quadratic cells, at most
 _FILTERED = 900  # unknowns of a filter of all nodes: its modes are all taken
 _MARGIN = 0.9  # of the critical step
 _LOAD = 0.1  # of its largest value: how unsure a filter is of the load
+_STILL = 0.05  # of the largest motion: a marker that moves less teaches a filter little
+GIVEN = "filters.markers"
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def motion_questions(
     if found["moved.by"] != "gravity":
         asked.append(by_path("material.rho", "density, kg/m3"))
     asked += _of_the_start(found) + _of_the_damping(found)
+    asked += _of_the_filters(recording, with_values(MeasuredBody(), dict(values)))
     return [
         *asked,
         by_path("ranges.rho", "standard uncertainty, relative, of the density"),
@@ -131,6 +134,32 @@ def _of_the_damping(found: Answers) -> list[Question]:
         asked.append(by_path("motion.fit_window", "seconds from the start on which it is "
                              "identified; only what comes later is evidence"))  # fmt: skip
     return asked
+
+
+def _of_the_filters(recording: Recording, p: MeasuredBody) -> list[Question]:
+    """Which markers filters are given; none where there is no choice."""
+    names = judged_markers(recording, p)
+    if len(names) < 2:
+        return []
+    return [Question(GIVEN, f"markers that filters are given, of {', '.join(names)}; the others "
+                     "show how well filters predict", ",".join(_given(recording, p, names)),
+                     "every second marker by size of motion, two at least where three move; the "
+                     "one that moves most is predicted", check=_among(names))]  # fmt: skip
+
+
+def _among(names: Sequence[str]) -> Callable[[str], None]:
+    def check(text: str) -> None:
+        chosen = _listed(text)
+        if absent := [n for n in chosen if n not in names]:
+            raise UsageError(f"no marker {', '.join(absent)}; there are {', '.join(names)}")
+        if not chosen or len(set(chosen)) < len(chosen):
+            raise UsageError(f"each marker once, one at least of {', '.join(names)}")
+
+    return check
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def held(text: str) -> tuple[str, str]:
@@ -189,15 +218,16 @@ def cells_for(p: MeasuredBody) -> int:
     return max(p.body.cells, min(wanted, most))
 
 
-def moving_methods(recording: Recording, p: MeasuredBody, law: str, order: int) -> list[str]:
-    """Lines of the methods: schemes with inertia, statics beside them, filters that are given one
-    of the markers, or the outline where one marker alone is judged."""
+def moving_methods(recording: Recording, p: MeasuredBody, found: Answers, order: int) -> list[str]:
+    """Lines of the methods: schemes with inertia, statics, and filters that are given some of the
+    markers, or the outline where only one marker is compared."""
+    law = found["law"]
     lines = [f'"implicit": moving("implicit", order={order}),',
              f'"explicit": moving("explicit", order=1, split={_parts(recording, p)}),',
              f'"static": moving("static", order={order}),']  # fmt: skip
     if law != "linear":
         lines.insert(0, f'"large": moving("large", "{law}", {order}),')
-    lines += _filters(recording, p, order)
+    lines += _filters(recording, p, found.get(GIVEN, ""), order)
     return [*lines, f'"modal": moving("modal", order={order}),']
 
 
@@ -209,34 +239,37 @@ def _parts(recording: Recording, p: MeasuredBody) -> int:
     return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
 
 
-def _filters(recording: Recording, p: MeasuredBody, order: int) -> list[str]:
+def _filters(recording: Recording, p: MeasuredBody, answer: str, order: int) -> list[str]:
     names = judged_markers(recording, p)
     if not names and not p.seen.outline:
         return []
-    given = _given(recording, p, names) if len(names) > 1 else p.seen.outline or names[0]
+    given = _given(recording, p, names) if len(names) > 1 else (p.seen.outline or names[0],)
+    given = _listed(answer) if answer not in ("", ",".join(given)) else given
     kind, lines = drive_kind(recording, p), []
     small = _scene(recording, p, Path(), 1).mesh.nodes.size <= _FILTERED
     if small:
-        lines.append(f'"kf_fem": moving("kf_fem", order=1, markers=({given!r},)),')
+        lines.append(f'"kf_fem": moving("kf_fem", order=1, markers={given!r}),')
     if kind in ("moves", "follows"):
         if small:
-            lines.append(f'"modal_kf": moving("modal_kf", order=1, markers=({given!r},)),')
+            lines.append(f'"modal_kf": moving("modal_kf", order=1, markers={given!r}),')
         return lines
     unsure = _LOAD * _largest(recording, p, kind)
     return [
         *lines,
-        f'"reduced_kf": moving("reduced_kf", order={order}, markers=({given!r},), '
+        f'"reduced_kf": moving("reduced_kf", order={order}, markers={given!r}, '
         f"load_start={unsure:.3g}, load_walk={unsure:.3g}),",
-        f'"roukf": moving("roukf", order={order}, markers=({given!r},)),',
+        f'"roukf": moving("roukf", order={order}, markers={given!r}),',
     ]  # fmt: skip
 
 
-def _given(recording: Recording, p: MeasuredBody, names: tuple[str, ...]) -> str:
-    """The marker that moves most of all but the one that moves most: that one is predicted."""
+def _given(recording: Recording, p: MeasuredBody, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Every second marker by size of motion, without the largest; of three that move two."""
     seen = recording.marker(str(p.seen.markers))
     x = {n: seen.x[:, seen.names.index(n)] for n in names}
-    sizes = sorted(names, key=lambda n: -float(np.nanmax(np.ptp(_seen(x[n]), axis=0), initial=0.0)))
-    return sizes[1]
+    size = {n: float(np.nanmax(np.ptp(_seen(x[n]), axis=0), initial=0.0)) for n in names}
+    order = sorted(names, key=lambda n: -size[n])
+    moving = [n for n in order if size[n] > _STILL * size[order[0]]]
+    return tuple(moving[1:3] if len(moving) == 3 else moving[1::2]) or (order[1],)
 
 
 def _seen(x: Floats) -> Floats:

@@ -34,6 +34,7 @@ def run(
     values: tuple[str, ...],
     methods: str,
     guests: tuple[str, ...] = (),
+    case: str = "",
     anyway: bool,
     as_json: bool,
     vtu: bool = False,
@@ -45,7 +46,7 @@ def run(
     """
     gl.ask()
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
-    options = Options(pairs(values, "--set"), wanted, quick, anyway, guests)
+    options = Options(pairs(values, "--set"), wanted, quick, anyway, guests, case)
     found: list[str] = []  # results.json of each, or why there is none
 
     def one(experiment: Experiment) -> bool:

@@ -87,7 +87,7 @@ def filters(
             seeds=seeds_of(seeds) if seeds else None, by=by, hold_out=kept,
             quick=common.quick, out=common.out, where=common.where, report=report,
         )  # fmt: skip
-    page = written(experiment, filter_page.told(found), place, common)
+    page = written(experiment, filter_page.findings(found), place, common)
     if not common.as_json:
         answer(_filter_blocks(found, common.detail), found.done, page, common.detail)
     return OK
@@ -251,6 +251,8 @@ def _filter_blocks(found: FilterStudy, detail: Detail) -> list[Block]:
     if detail == "screen" and len(found.rankings) > _RANKINGS:
         left = len(found.rankings) - _RANKINGS
         blocks = [*blocks[: 2 + 2 * _RANKINGS], Block("", (f"{left} more conditions: --verbose",))]
+    if found.plan.single_words:
+        blocks.append(Block("", sentence_lines(found.plan.single_words)))
     failed = (
         f"failed: {cell.name} ({named(cell.values)}): {why}"
         for r in found.rankings for cell, why in r.failed

@@ -209,8 +209,12 @@ def _basis(
 def _solver(
     system: System, split: tuple[StiffnessPart, ...], K: tuple[sparse.csr_array, ...], x: Floats
 ) -> Function:
-    """K^-1 with parameters of coordinates x (p,)."""
-    factors = [float(part.factor(x[None, :])[0]) for part in split]
+    """K^-1 with parameters of coordinates x (p,). Raises `SceneError` for a stiffness beyond the
+    number range: a member far off the model has it."""
+    with np.errstate(over="ignore", under="ignore"):
+        factors = [float(part.factor(x[None, :])[0]) for part in split]
+    if not all(np.finfo(float).tiny < s < np.inf for s in factors):
+        raise _off_model("stiffnesses")
     total = sum((s * k for s, k in zip(factors, K[1:], strict=True)), K[0])
     d = system.scene.mesh.dimension
     return factorise(sparse.csr_array(total), system.free // d, system.scene.mesh.nodes).solve
@@ -224,14 +228,18 @@ def _outside(v: Floats, basis: Floats, M: sparse.csr_array) -> tuple[Floats, flo
     with np.errstate(all="ignore"):
         whole = float(np.sqrt(v @ (M @ v))) if np.isfinite(v).all() else np.inf
     if not np.isfinite(whole):
-        raise SceneError(
-            "a member lies so far off the model that its shapes leave the number range; take a "
-            "smaller sd of the parameters"
-        )
+        raise _off_model("shapes")
     for _ in range(2):  # once leaves what rounding leaves
         v = v - basis @ (basis.T @ (M @ v))
     left = float(np.sqrt(v @ (M @ v)))
     return v / max(left, np.finfo(float).tiny), left / max(whole, np.finfo(float).tiny)
+
+
+def _off_model(what: str) -> SceneError:
+    return SceneError(
+        f"a member lies so far off the model that its {what} leave the number range; take a "
+        "smaller sd of the parameters"
+    )
 
 
 # --- explicit, at large strain --------------------------------------------------------------------

@@ -40,6 +40,7 @@ def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor | Front
     Without pivoting U's diagonal holds the pivots, whose signs are the inertia of A.
     """
     require_factor(len(node), places.shape[1])
+    _require_positive(A)
     dissection = _dissected(A, node, places)
     if len(node) > FRONTAL:
         found = fronts(A, dissection.order, dissection.stops, dissection.children)
@@ -49,6 +50,20 @@ def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor | Front
     if pivots.min() <= 1e-13 * pivots.max():
         raise _not_definite(float(pivots.min() / pivots.max()), int((pivots <= 0).sum()))
     return factor
+
+
+def _require_positive(A: sparse.csr_array) -> None:
+    """Raises `SceneError` for entries that are not finite and for a diagonal that is not positive:
+    SuperLU would hand an empty column to BLAS, which prints a line of its own."""
+    if not np.isfinite(A.data).all():
+        raise SceneError(
+            f"{int((~np.isfinite(A.data)).sum())} entries of the stiffness matrix are not finite; "
+            "look for sizes or material parameters beyond the number range"
+        )
+    diagonal = A.diagonal()
+    if (diagonal <= 0).any():
+        largest = max(float(np.abs(diagonal).max()), np.finfo(float).tiny)
+        raise _not_definite(float(diagonal.min()) / largest, int((diagonal <= 0).sum()))
 
 
 def factorise_indefinite(A: sparse.csr_array, order: Ints) -> Factor:

@@ -48,9 +48,11 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
     methods = sorted(set(options.methods))
     if methods == sorted(experiment.methods):
         methods = []
-    words = ["quick"] * options.quick + ["methods"] * bool(methods) + [p for p, _ in differing]
+    case = [f"case_{options.case}"] * bool(options.case)
+    words = ["quick"] * options.quick + case + ["methods"] * bool(methods)
     guests = sorted(options.guests)
-    return words + ["guest"] * bool(guests), [options.quick, methods, differing, *guests]
+    content = [options.quick, methods, differing, *guests, *case]
+    return [*words, *(p for p, _ in differing), *["guest"] * bool(guests)], content
 
 
 def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:

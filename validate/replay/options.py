@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, nearest_names, with_values
-from validate.replay.experiment import Experiment
+from validate.replay.experiment import Case, Experiment
 from validate.replay.guests import added_guests
 from validate.replay.law_solver import with_laws
 from validate.replay.method import Method
@@ -16,6 +16,7 @@ from validate.scene.abaqus_lines import files_named
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 
 Report = Callable[[int, int, str], None]  # done, total, what comes next
+RECORDED = "recorded"  # the case that the experiment's own recording is
 _MESHES = (".npz", *FOREIGN)
 _LAYOUTS = (".fcsv", ".json")  # of landmarks, which place markers
 
@@ -24,13 +25,15 @@ _LAYOUTS = (".fcsv", ".json")  # of landmarks, which place markers
 class Options:
     """What the user changed: values by path, methods to run (none: all), quick; `anyway`: predict
     with parameters that were not identifiable, too. `guests` are command lines of programs of
-    others that the experiment has as methods (`with_guests`): they are run whatever is chosen."""
+    others that the experiment has as methods (`with_guests`): they are run whatever is chosen.
+    `case`: run this case alone beside the recorded one (`RECORDED`: none beside it)."""
 
     values: Mapping[str, str]
     methods: tuple[str, ...] = ()
     quick: bool = False
     anyway: bool = False
     guests: tuple[str, ...] = ()
+    case: str = ""
 
 
 def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, Method]]:
@@ -45,6 +48,26 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     added = added_guests(methods, options.guests)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     return with_values(parameters, mine), {name: methods[name] for name in chosen}
+
+
+def chosen_cases(experiment: Experiment, options: Options) -> tuple[Case, ...]:
+    """The cases to run: all, or the one that is named, with every chosen method.
+
+    Raises `UsageError` for an unknown name.
+    """
+    if not options.case:
+        return experiment.cases
+    require_case(experiment, options.case)
+    chosen = [c for c in experiment.cases if c.name == options.case]
+    return tuple(replace(c, methods=()) if options.methods else c for c in chosen)
+
+
+def require_case(experiment: Experiment, name: str) -> None:
+    """Raises `UsageError` where the experiment has no case of that name."""
+    names = {c.name for c in experiment.cases}
+    if name not in names | {RECORDED}:
+        hint = nearest_names(name, names) if names else "the experiment has none"
+        raise UsageError(f"no case '{name}' of {experiment.name}; {hint}")
 
 
 def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:

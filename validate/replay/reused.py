@@ -15,7 +15,7 @@ from validate.recording.types import Recording
 from validate.replay.calibrated import apart
 from validate.replay.experiment import Experiment
 from validate.replay.find import sources_of
-from validate.replay.options import Options, configure, folder_of, mesh_files
+from validate.replay.options import Options, chosen_cases, configure, folder_of, mesh_files
 from validate.replay.origins import opened
 from validate.report.environment import environment
 from validate.report.folder import MARK
@@ -36,7 +36,7 @@ def rests_on(experiment: Experiment, options: Options, command: Sequence[str] = 
     found = replace(found, files=(*found.files, *(_used(r, "calibrates") for r in others)))
     if options.quick:
         return found
-    cases = [c.change(parameters) for c in experiment.cases if c.shipped]
+    cases = [c.change(parameters) for c in chosen_cases(experiment, options) if c.shipped]
     shipped = [r for p in cases for r in experiment.load(p, folder_of(experiment))]
     return replace(found, files=(*found.files, *(_used(r, "case") for r in shipped)))
 

@@ -37,7 +37,7 @@ from validate.replay.gated import gate_warnings
 from validate.replay.guest_exhibit import guest_exhibits
 from validate.replay.likely_causes import Motions, explained_by, motions_of
 from validate.replay.method import Method
-from validate.replay.options import Options, Report, all_methods, configure
+from validate.replay.options import Options, Report, all_methods, chosen_cases, configure
 from validate.replay.origins import Opened, marked, opened
 from validate.replay.plausible import doubts
 from validate.replay.problem import Calibrated
@@ -101,6 +101,7 @@ def set_out(
 ) -> SetOut:
     """Loads, asks for memory and identifies. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
+    cases = chosen_cases(experiment, options)
     found = opened(experiment, parameters)
     declared = _settings(experiment.parameters, experiment.methods)
     differing = changed(declared, _settings(parameters, methods))
@@ -126,7 +127,7 @@ def set_out(
         experiment = with_uncertain_drives(experiment, methods, shipped, used)
     road = Road(
         experiment, methods, used, report,
-        quick=options.quick, calibrated=identified.calibrated if identified else (),
+        quick=options.quick, cases=cases, calibrated=identified.calibrated if identified else (),
         since=since or perf_counter(), refused=refused,
     )  # fmt: skip
     return SetOut(experiment, road, found, identified, differing, fitted)
@@ -233,8 +234,7 @@ def _settings(parameters: Any, methods: Mapping[str, Method]) -> tuple[Parameter
 def _told(road: Road, cases: Cases) -> Told:
     """What the experiment adds; only when all of it was run."""
     experiment = road.experiment
-    whole = set(cases[MAIN]) == set(experiment.methods)
-    if experiment.exhibits is None or road.quick or not whole:
+    if experiment.exhibits is None or road.quick or not road.whole:
         return Told()
     return experiment.exhibits(road.parameters, cases, road.tell)
 
@@ -289,7 +289,7 @@ def _published(
 ) -> tuple[Published, ...]:
     """Printed figures beside ours; none in a quick run.
 
-    One that is not computed stands among them with its fault, unless methods were left out.
+    One that is not computed stands among them with its fault; not where a part was left out.
     """
     if road.quick:
         return ()
@@ -297,8 +297,7 @@ def _published(
     values["identified"] = {s.name: s.value for s in (identified.scores if identified else ())}
     values["told"] = dict(told.numbers)
     figures = [figure.beside(values) for figure in road.experiment.published]
-    whole = set(road.methods) == set(road.experiment.methods)
-    return tuple(figure for figure in figures if whole or not figure.missing)
+    return tuple(figure for figure in figures if road.whole or not figure.missing)
 
 
 def _doubtful(warnings: tuple[str, ...]) -> str:

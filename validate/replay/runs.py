@@ -1,6 +1,6 @@
 """The runs of an experiment: each variant on each case once, counted for the progress bar."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from types import MappingProxyType
@@ -26,7 +26,8 @@ class Road:
 
     `truths` are kept by case: the twin is repeated once. `calibrated` names residuals whose data
     served to identify; `remade` says that the user's own parameters made the recording. `refused`
-    methods are not run, for the reason given: they are rows of the result.
+    methods are not run, for the reason given: they are rows of the result. `cases` are run beside
+    the recorded one.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class Road:
         report: Report | None,
         *,
         quick: bool,
+        cases: Sequence[Case] = (),
         calibrated: tuple[str, ...] = (),
         since: float | None = None,
         refused: Mapping[str, str] = MappingProxyType({}),
@@ -45,7 +47,9 @@ class Road:
         self.calibrated, self.refused = calibrated, refused
         self.settings: Mapping[str, Method] = {**experiment.methods, **methods}
         self.quick = quick
-        self.cases = () if quick else _cases(experiment, methods)
+        self.cases = () if quick else tuple(c for c in cases if _of_case(methods, c))
+        every = tuple(c for c in experiment.cases if _of_case(methods, c))
+        self.whole = set(methods) == set(experiment.methods) and self.cases == every
         self.recordings: tuple[Recording, ...] = ()
         self.remade = False
         self._true: Any = parameters
@@ -178,11 +182,6 @@ class Road:
         settings = self.settings[variant.method]
         changed = variant.change(parameters)
         return case, variant.method, settings, variant.split, variant.off, changed
-
-
-def _cases(experiment: Experiment, methods: Mapping[str, Method]) -> tuple[Case, ...]:
-    """The cases that any of the chosen methods is run on."""
-    return tuple(case for case in experiment.cases if _of_case(methods, case))
 
 
 def _of_case(methods: Mapping[str, Method], case: Case) -> tuple[str, ...]:

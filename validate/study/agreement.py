@@ -38,14 +38,14 @@ def picks(values: Mapping[FilterCell, FilterScores]) -> tuple[TruthPick, ...]:
         c: v for c, v in values.items()
         if v.nis is not None and not c.baseline and POOLED in v.scores and WITHHELD in v.scores
     }  # fmt: skip
-    found = []
+    picked = []
     for condition in dict.fromkeys(c.condition for c in filters):
-        mine = {c: v for c, v in filters.items() if c.condition == condition}
-        if len(mine) < 2:
+        same = {c: v for c, v in filters.items() if c.condition == condition}
+        if len(same) < 2:
             continue
-        for i, seed in enumerate(next(iter(mine)).seeds):
-            true = {c: v.scores[POOLED][i] for c, v in mine.items()}
-            pick = min(mine, key=lambda c: mine[c].scores[WITHHELD][i])
+        for i, seed in enumerate(next(iter(same)).seeds):
+            true = {c: v.scores[POOLED][i] for c, v in same.items()}
+            pick = min(same, key=lambda c: same[c].scores[WITHHELD][i])
             best = min(true, key=lambda c: true[c])
-            found.append(TruthPick(condition, seed, pick, true[pick], best, true[best]))
-    return tuple(found)
+            picked.append(TruthPick(condition, seed, pick, true[pick], best, true[best]))
+    return tuple(picked)

@@ -13,7 +13,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.study.interval import SeedInterval, interval
 from validate.study.score import LOG_LOSS, FilterScores, of_score, summed
-from validate.study.withheld import Withheld
 
 FEWEST = 8  # blocks of an interval
 MOST = 20
@@ -40,11 +39,11 @@ class Blocks:
 
     @property
     def words(self) -> str:
-        said = (
+        text = (
             f"{self.count} blocks of {self.length_s:.3g} s; innovations of {self.name} stay "
             f"correlated for {self.correlation_s:.3g} s"
         )
-        return said if self.sure else f"{said}: fewer than {FEWEST} blocks give no interval"
+        return text if self.sure else f"{text}: fewer than {FEWEST} blocks give no interval"
 
     def sums(self, values: Floats) -> Floats:
         """Of values (..., segments) by block (..., blocks)."""
@@ -86,8 +85,8 @@ def score_interval(value: FilterScores, by: str, blocks: Blocks | None) -> SeedI
     means = _block_means(value, by, blocks)
     if len(scores) > 1 or means is None:
         return interval(scores)
-    found = interval(means.tolist())
-    half = None if found.half is None else found.half / _slope(by, scores[0], scores[0])
+    half = interval(means.tolist()).half
+    half = None if half is None else half / _slope(by, scores[0], scores[0])
     return SeedInterval(scores[0], half, len(means))
 
 
@@ -95,14 +94,14 @@ def score_difference(
     one: FilterScores, other: FilterScores, by: str, blocks: Blocks | None
 ) -> SeedInterval:
     """Of one score less the other, seed by seed or block by block."""
-    mine, others = one.scores[by], other.scores[by]
-    apart = [a - b for a, b in zip(mine, others, strict=True)]
+    scores, others = one.scores[by], other.scores[by]
+    differences = [a - b for a, b in zip(scores, others, strict=True)]
     means = _block_means(one, by, blocks), _block_means(other, by, blocks)
-    if len(mine) > 1 or means[0] is None or means[1] is None:
-        return interval(apart)
-    found = interval((means[0] - means[1]).tolist())
-    half = None if found.half is None else found.half / _slope(by, mine[0], others[0])
-    return SeedInterval(apart[0], half, len(means[0]))
+    if len(scores) > 1 or means[0] is None or means[1] is None:
+        return interval(differences)
+    half = interval((means[0] - means[1]).tolist()).half
+    half = None if half is None else half / _slope(by, scores[0], others[0])
+    return SeedInterval(differences[0], half, len(means[0]))
 
 
 def _slope(by: str, one: float, other: float) -> float:
@@ -113,13 +112,13 @@ def _slope(by: str, one: float, other: float) -> float:
 def _block_means(value: FilterScores, by: str, blocks: Blocks | None) -> Floats | None:
     """Mean squares of one recording by block; None where there is no interval: too few blocks, or
     innovations that stay correlated for longer than one."""
-    found = value.sums(by)
-    if blocks is None or not blocks.sure or found is None or len(found[0]) > 1:
+    totals = value.sums(by)
+    if blocks is None or not blocks.sure or totals is None or len(totals[0]) > 1:
         return None
-    own = value.innovations
-    if own is not None and (own.correlation_s or 0.0) > blocks.length_s * (1 + 1e-9):
+    correlation_s = value.innovations.correlation_s if value.innovations is not None else None
+    if (correlation_s or 0.0) > blocks.length_s * (1 + 1e-9):
         return None
-    sums, counts = (blocks.sums(x[0]) for x in found)
+    sums, counts = (blocks.sums(x[0]) for x in totals)
     return np.asarray(sums[counts > 0] / counts[counts > 0])
 
 
@@ -149,10 +148,8 @@ def nested(
     blocks: Blocks | None,
 ) -> Nested | None:
     """None with fewer than two blocks, filters, or without what was withheld."""
-    parts = {name: of_score(v.withheld, by) for name, v in filters.items()}
-    common = (
-        sorted(set.intersection(*({w.name for w in p} for p in parts.values()))) if parts else []
-    )
+    parts = [_parts(v, by) for v in filters.values()]
+    common = sorted(set.intersection(*parts)) if parts else []
     if blocks is None or blocks.count < 2 or len(filters) < 2 or not common:
         return None
     halves = [common[::2], common[1::2]] if len(common) > 1 else [common, common]
@@ -164,41 +161,59 @@ def nested(
     others = {name: np.zeros(2) for name in baselines}
     for choose, report in folds:
         sums = {n: _by_block(v, by, choose, blocks) for n, v in filters.items()}
-        told = {n: _by_block(v, by, report, blocks) for n, v in every.items()}
+        reported = {n: _by_block(v, by, report, blocks) for n, v in every.items()}
         for s in range(seeds):
             for b in range(blocks.count):
                 pick = min(sums, key=lambda n: _without(sums[n], s, b))
                 chosen[pick] += 1
-                squares[s, b] += told[pick][0][s, b]
-                counts[s, b] += told[pick][1][s, b]
-        for name, found in others.items():
-            found += [told[name][0].sum(), told[name][1].sum()]
-    beside = {n: float(np.sqrt(q / c)) for n, (q, c) in others.items() if c}
-    return Nested(_reported(squares, counts, blocks), chosen, beside, blocks.count, len(common) > 1)
+                squares[s, b] += reported[pick][0][s, b]
+                counts[s, b] += reported[pick][1][s, b]
+        for name, totals in others.items():
+            totals += [reported[name][0].sum(), reported[name][1].sum()]
+    beside = {n: _root(by, float(q / c)) for n, (q, c) in others.items() if c}
+    return Nested(
+        _reported(squares, counts, by, blocks), chosen, beside, blocks.count, len(common) > 1
+    )
+
+
+def _parts(value: FilterScores, by: str) -> set[str]:
+    """The names of what a score is made of; the likelihood is one part."""
+    if by == LOG_LOSS:
+        return {LOG_LOSS} if value.innovations is not None else set()
+    return {w.name for w in of_score(value.withheld, by)}
 
 
 def _by_block(
     value: FilterScores, by: str, names: Sequence[str], blocks: Blocks
 ) -> tuple[Floats, Floats]:
-    mine: list[Withheld] = [w for w in of_score(value.withheld, by) if w.name in names]
-    found = summed(mine)
-    if found is None:
+    if by == LOG_LOSS:
+        totals = value.sums(by)
+    else:
+        totals = summed([w for w in of_score(value.withheld, by) if w.name in names])
+    if totals is None:
         none = np.zeros((len(value.scores[by]), blocks.count))
         return none, none
-    return blocks.sums(found[0]), blocks.sums(found[1])
+    return blocks.sums(totals[0]), blocks.sums(totals[1])
 
 
 def _without(sums: tuple[Floats, Floats], seed: int, block: int) -> float:
-    """Mean square of a seed over all blocks but one."""
+    """Mean square, or mean log loss, of a seed over all blocks but one."""
     squares, counts = (np.delete(x[seed], block).sum() for x in sums)
     return float(squares / counts) if counts else np.inf
 
 
-def _reported(squares: Floats, counts: Floats, blocks: Blocks) -> SeedInterval:
+def _root(by: str, mean: float) -> float:
+    """A score of the mean over its samples: log loss is that mean, an rms its root."""
+    return mean if by == LOG_LOSS else float(np.sqrt(mean))
+
+
+def _reported(squares: Floats, counts: Floats, by: str, blocks: Blocks) -> SeedInterval:
     if len(squares) > 1:
-        return interval(np.sqrt(squares.sum(axis=1) / counts.sum(axis=1)).tolist())
-    seen = counts[0] > 0
-    means = squares[0, seen] / counts[0, seen]
-    rms = float(np.sqrt(squares.sum() / counts.sum()))
+        totals = squares.sum(axis=1) / counts.sum(axis=1)
+        return interval([_root(by, float(mean)) for mean in totals])
+    sampled = counts[0] > 0
+    means = squares[0, sampled] / counts[0, sampled]
+    score = _root(by, float(squares.sum() / counts.sum()))
     half = interval(means.tolist()).half if blocks.sure else None
-    return SeedInterval(rms, None if half is None else half / (2 * rms), int(seen.sum()))
+    half = None if half is None else half / _slope(by, score, score)
+    return SeedInterval(score, half, int(sampled.sum()))

@@ -1,4 +1,4 @@
-"""What a choice without truth is worth: on other data of the recording, and against the truth."""
+"""Nested choice of settings on other data of the recording, and agreement with the truth."""
 
 from collections.abc import Iterator, Mapping
 
@@ -7,8 +7,8 @@ from validate.study.agreement import NEAR, TruthPick
 from validate.study.blocks import Nested
 from validate.study.filters import FilterStudy
 from validate.study.ranking import Ranking
-from validate.study.score import WITHHELD
-from validate.study.score_units import shown_unit
+from validate.study.score import LOG_LOSS, WITHHELD
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.sweep import named
 
 _MM = 1e3
@@ -37,30 +37,31 @@ def _unit(study: FilterStudy) -> str:
 
 
 def _nested_rows(ranking: Ranking, study: FilterStudy) -> list[tuple[Entry, ...]]:
-    found, condition = ranking.nested, named(ranking.condition)
-    assert found is not None
+    nested, condition = ranking.nested, named(ranking.condition)
+    assert nested is not None
     factor, _ = shown_unit(_unit(study))
-    half = None if found.error.half is None else factor * found.error.half
-    total = sum(found.chosen.values())
-    often = ", ".join(f"{n} {k} of {total}" for n, k in _by_count(found.chosen))
+    half = None if nested.error.half is None else factor * nested.error.half
+    total = sum(nested.chosen.values())
+    often = ", ".join(f"{n} {k} of {total}" for n, k in _by_count(nested.chosen))
     rows: list[tuple[Entry, ...]] = [
-        (condition, "the chosen setting", factor * found.error.mean, half, often)
+        (condition, "the chosen setting", factor * nested.error.mean, half, often)
     ]
-    return rows + [(condition, name, factor * e, None, None) for name, e in found.beside.items()]
+    return rows + [(condition, name, factor * e, None, None) for name, e in nested.beside.items()]
 
 
 def _by_count(chosen: Mapping[str, int]) -> list[tuple[str, int]]:
     return sorted(chosen.items(), key=lambda one: -one[1])[:3]
 
 
-def chosen_line(found: Nested, study: FilterStudy) -> str:
+def chosen_line(nested: Nested, study: FilterStudy) -> str:
     """What a choice on other blocks and markers is worth, in one line."""
-    factor, unit = shown_unit(_unit(study))
-    half = "" if found.error.half is None else f" ± {factor * found.error.half:.2g}"
-    others = "other blocks and markers" if found.split else "other blocks"
-    beside = ", ".join(f"{name} {factor * e:.3g}" for name, e in found.beside.items())
+    factor, shown = shown_unit(_unit(study))
+    unit = unit_text(shown)
+    half = "" if nested.error.half is None else f" ± {factor * nested.error.half:.2g}"
+    others = "other blocks and markers" if nested.split else "other blocks"
+    beside = ", ".join(f"{name} {factor * e:.3g}" for name, e in nested.beside.items())
     return (
-        f"chosen on {others}, reported on the rest: {factor * found.error.mean:.4g}{half} {unit}"
+        f"chosen on {others}, reported on the rest: {factor * nested.error.mean:.4g}{half}{unit}"
         f"{f' ({beside})' if beside else ''}"
     )
 
@@ -71,12 +72,15 @@ def _nested_words(study: FilterStudy) -> Iterator[str]:
         "block of time is left out in turn: the setting of least error on the other blocks is "
         "chosen, and its error on the block that was left out is reported."
     )
-    found = next(r.nested for r in study.rankings if r.nested)
-    yield (
-        "Half of the markers choose, the other half reports, and the other way round."
-        if found.split
-        else "There is one marker to score: the same one chooses and reports, in other blocks."
-    )
+    nested = next(r.nested for r in study.rankings if r.nested)
+    if study.by == LOG_LOSS:
+        yield "The likelihood of all measured components chooses and reports, in other blocks."
+    else:
+        yield (
+            "Half of the markers choose, the other half reports, and the other way round."
+            if nested.split
+            else "There is one marker to score: the same one chooses and reports, in other blocks."
+        )
     for ranking in study.rankings:
         if ranking.nested and ranking.blocks and not ranking.blocks.sure:
             yield f"{ranking.blocks.words}."

@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.parameters import describe
@@ -36,18 +37,20 @@ _MANY = 40  # recordings and registrations kept, of seeds mostly
 @dataclass(frozen=True)
 class Ready:
     """A method prepared for one recording: `true` are the parameters of the twin that made it, and
-    `mark` names all that `seen` and the scene come from. `tracks` are the markers that score, read
-    from the method's own fields, in `segments` of time."""
+    `mark` names all that `registered` and the scene come from. `tracks` are the markers that
+    score, read from the fields of the method, in `segments` of time. `tracked` is the same
+    recording as the study's first filter has it; None for that filter itself."""
 
     parameters: Any
     true: Any
     method: Method
     system: System
-    seen: Registered
+    registered: Registered
     mark: Hashable
     experiment: Experiment
     tracks: MarkerTracks | None
     segments: Segments
+    tracked: "Ready | None" = None
 
     @property
     def scene(self) -> Scene:
@@ -59,20 +62,31 @@ class Ready:
 
     def given_nothing(self) -> "Ready":
         """The same, where every marker and outline was missed at every sample after rest."""
-        blank = tuple(_missed(o) for o in self.seen.observations)
-        return replace(self, seen=replace(self.seen, observations=blank))
+        blank = tuple(_missed(o) for o in self.registered.observations)
+        return replace(self, registered=replace(self.registered, observations=blank))
+
+    def offered(self, names: Sequence[str]) -> Measurements:
+        """Measurements of these markers and outlines, as filters are given them."""
+        ready = self.tracked or self
+        return replace(ready.method, markers=tuple(names)).offered(ready.system, ready.registered)
 
     def stepper(self) -> Stepper:
-        given = self.experiment.sets(self.parameters, self.seen)
-        return self.method.prepare(self.system, self.seen, given)
+        given = self.experiment.sets(self.parameters, self.registered)
+        return self.method.prepare(self.system, self.registered, given)
 
     def run(self, name: str, kept: KeptFields) -> Run:
         """The method through the recorded inputs."""
         kept = replace(kept, system=self.system)
-        (found,) = run_on(
-            self.experiment, name, self.method, self.parameters, self.scene, (self.seen,), kept
+        (run,) = run_on(
+            self.experiment,
+            name,
+            self.method,
+            self.parameters,
+            self.scene,
+            (self.registered,),
+            kept,
         )
-        return found
+        return run
 
 
 def _missed(sensor: Observation) -> Observation:
@@ -99,7 +113,7 @@ class Bench:
     def __init__(self, experiment: Experiment, job: Job) -> None:
         self.experiment, self.job = experiment, job
         self._systems: Kept[System] = Kept(4)
-        self._seen: Kept[tuple[str, Registered]] = Kept(_MANY)
+        self._registered: Kept[tuple[str, Registered]] = Kept(_MANY)
         self._recordings: Kept[Recording] = Kept(_MANY)
         self._truths: Kept[Truth] = Kept(4)
         self._loaded: Kept[_Loaded] = Kept(4)
@@ -124,8 +138,8 @@ class Bench:
         for that filter itself."""
         if cell.method == cell.tracker:
             return (None,) * self._count(cell)
-        own = replace(cell, method=cell.tracker, settings=())
-        return self.ready(own, seed)
+        tracker = replace(cell, method=cell.tracker, settings=())
+        return self.ready(tracker, seed)
 
     def _count(self, cell: FilterCell) -> int:
         if self.experiment.repeats:
@@ -157,8 +171,8 @@ class Bench:
         """What stands open is identified once, by the methods as they are declared."""
 
         def load() -> _Loaded:
-            own = {**dict(self.job.values), **dict(cell.condition)}
-            out = set_out(self.experiment, Options(own, (cell.tracker,), self.job.quick))
+            values = {**dict(self.job.values), **dict(cell.condition)}
+            out = set_out(self.experiment, Options(values, (cell.tracker,), self.job.quick))
             return _Loaded(out.experiment, out.road.parameters, out.found.recordings)
 
         return self._loaded.get(cell.condition, load)
@@ -178,40 +192,53 @@ class Bench:
         def scene() -> Scene:
             return meshed(experiment.build(recording, parameters, method.scene))
 
-        def registered() -> tuple[str, Registered]:
+        def register() -> tuple[str, Registered]:
             """The registration, behind the fingerprint of its scene: seeds share their system."""
             body = scene()
             name = fingerprint(body)
             system = self._systems.get(name, lambda: build_system(body))
             return name, experiment.place(recording, parameters, system.scene)
 
-        body, seen = self._seen.get(mark, registered)
+        body, registered = self._registered.get(mark, register)
         system = self._systems.get(body, lambda: build_system(scene()))
         tracks = None if tracked is None else tracked.tracks
         if tracks is None:
-            tracks = marker_tracks(seen, system)
+            tracks = marker_tracks(registered, system)
         elif tracked is not None and tracked.mark != mark:
             tracks = tracks.on(system.scene.mesh)
-        segments = segments_of(seen) if tracked is None else tracked.segments
-        return Ready(parameters, true, method, system, seen, mark, experiment, tracks, segments)
+        segments = segments_of(registered) if tracked is None else tracked.segments
+        return Ready(
+            parameters,
+            true,
+            method,
+            system,
+            registered,
+            mark,
+            experiment,
+            tracks,
+            segments,
+            tracked,
+        )
 
     def truth(self, ready: Ready) -> Mapping[str, Floats]:
         """The twin's motion at the probes: noise does not touch it, so the first seed's serves
         all; empty without a twin."""
         if not self.experiment.repeats:
             return {}
-        found = self._truths.get(
+        motions = self._truths.get(
             _text(ready.true),
             lambda: replace(self._repeated(ready), u=None, mesh=None),
         ).probes
-        if not found:
-            raise ComparisonError("the twin tells no probe's truth: 0 compared")
-        return found
+        if not motions:
+            raise ComparisonError(
+                "the truth of the twin has no probes: 0 compared; give it those of the scene"
+            )
+        return motions
 
     def _repeated(self, ready: Ready) -> Truth:
         assert self.experiment.twin is not None
         assert self.experiment.twin.truth is not None
-        return self.experiment.twin.truth(ready.true, ready.seen)
+        return self.experiment.twin.truth(ready.true, ready.registered)
 
 
 def open_bench(job: Job) -> Bench:

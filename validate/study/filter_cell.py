@@ -25,6 +25,7 @@ from validate.study.score import NIS, FilterScores, error_scores, withheld_score
 from validate.study.withheld import (
     Innovations,
     MarkerTracks,
+    PredictionErrors,
     Segments,
     Withheld,
     ahead_errors,
@@ -32,9 +33,11 @@ from validate.study.withheld import (
     in_a_row,
     innovations_of,
     joined_innovations,
+    joined_predictions,
     other_errors,
     other_times,
     outline_tracks,
+    prediction_errors,
     read_innovations,
 )
 
@@ -44,14 +47,16 @@ _TIMED_S = 0.05  # s after which no more of them are
 
 @dataclass(frozen=True)
 class Scored:
-    """What one recording says of a method: errors at the truth's probes by score, at what was
-    withheld, its innovations, NIS with its degrees of freedom."""
+    """Results of a method on one recording: errors at the truth's probes by score, at what was
+    withheld, its innovations, NIS with its degrees of freedom; `predictions` of a method without
+    innovations."""
 
     truth: Mapping[str, float]
     withheld: tuple[Withheld, ...]
     innovations: Innovations | None = None
     nis: float = 0.0
     dof: int = 0
+    predictions: PredictionErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -87,10 +92,10 @@ def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
         start = perf_counter()
         stepper = cast(FilterStepper, ready.stepper())
         setup = perf_counter() - start
-        if other_times(first.seen) is None:
+        if other_times(first.registered) is None:
             together = _all_seeds(bench, cell, stepper, ready, folds[0])
             if together is not None:
-                p50, p99 = _step_times(stepper, ready.seen.inputs)
+                p50, p99 = _step_times(stepper, ready.registered.inputs)
                 return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
     return _one_by_one(bench, cell, folds)
 
@@ -99,7 +104,8 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
     """The runs of a cell.
 
     Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
-    every marker is held out in turn of a method that is given two and more.
+    every marker is held out in turn of a method that is given two and more. One that is given a
+    single marker cannot lose it: its next samples score it.
     """
     moving = ready.tracks.names if ready.tracks else ()
     given = ready.method.markers
@@ -110,8 +116,8 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
     whole = Fold(given, tuple(n for n in moving if n not in given))
     if not cell.in_turn(moving):
         return (whole,)
-    turns = tuple(Fold(tuple(n for n in given if n != m), (m,)) for m in given if len(given) > 1)
-    return (whole, *turns)
+    turns = [m for m in given if m in moving] if len(given) > 1 else []
+    return (whole, *(Fold(tuple(n for n in given if n != m), (m,)) for m in turns))
 
 
 def _left(
@@ -136,46 +142,46 @@ def _all_seeds(
     bench: Bench, cell: FilterCell, stepper: FilterStepper, first: Ready, fold: Fold
 ) -> FilterScores | None:
     """None where the filter cannot take all seeds in one walk."""
-    offered, inputs, t = stepper.offered, first.seen.inputs, first.seen.t
+    offered, inputs, t = stepper.offered, first.registered.inputs, first.registered.t
     every = [bench.ready(cell, seed)[0].with_markers(fold.given) for seed in cell.seeds]
-    z = [_by_step(r.method.offered(r.system, r.seen), offered, t) for r in every]
-    if any(own is None for own in z):
+    z = [_by_step(r.method.offered(r.system, r.registered), offered, t) for r in every]
+    if any(row is None for row in z):
         return None
     rows, places = _rows(bench, first, fold)
-    found = stepper.batch(inputs, np.array(z), rows)
-    if found is None:
+    batch = stepper.batch(inputs, np.array(z), rows)
+    if batch is None:
         return None
-    if not (np.isfinite(found.values).all() and np.isfinite(found.nis).all()):
+    if not (np.isfinite(batch.values).all() and np.isfinite(batch.nis).all()):
         raise ComparisonError("diverged: the estimate is not finite")
-    dof = int(found.dof.sum())
+    dof = int(batch.dof.sum())
     if not dof:
-        raise ComparisonError(f"invalid: {_unheard(stepper, len(inputs))}")
+        raise ComparisonError(f"invalid: {_unreached(stepper, len(inputs))}")
     measured, segments = np.isfinite(np.array(z)), first.segments
     names = [p.name for p in first.scene.probes]
     scored = []
     for i, ready in enumerate(every):
-        probes = dict(zip(names, found.values[i, :, : len(names)].T, strict=True))
-        u = found.values[i, :, len(names) :].reshape(len(t), len(places), -1)
-        y = found.y[i]
-        own = (
+        probes = dict(zip(names, batch.values[i, :, : len(names)].T, strict=True))
+        u = batch.values[i, :, len(names) :].reshape(len(t), len(places), -1)
+        y = batch.y[i]
+        withheld = (
             *_held_out(ready, fold, t, u, segments),
             *ahead_errors(t, offered.names, y, measured[i], segments),
         )
         scaled = _scaled(y, measured[i], offered)
-        told = innovations_of(t, scaled, found.log_likelihood[i], found.dof, segments)
+        innovations = innovations_of(t, scaled, batch.log_likelihood[i], batch.dof, segments)
         truth = _against_truth(bench, first, probes)
-        scored.append(Scored(truth, own, told, float(found.nis[i].sum()), dof))
+        scored.append(Scored(truth, withheld, innovations, float(batch.nis[i].sum()), dof))
     return replace(
-        _put_together(scored, segments), steps=len(inputs), frozen=found.frozen, shared=True
+        _put_together(scored, segments), steps=len(inputs), frozen=batch.frozen, shared=True
     )
 
 
-def _by_step(own: Measurements, offered: Measurements, t: Floats) -> Floats | None:
+def _by_step(measurements: Measurements, offered: Measurements, t: Floats) -> Floats | None:
     """Measurements (nt, m) m by step, NaN = none; None for other components."""
-    if own.names != offered.names:
+    if measurements.names != offered.names:
         return None
-    z = np.full((len(t), len(own.names)), np.nan)
-    for step, row in timetable(own, float(t[0])).z.items():
+    z = np.full((len(t), len(measurements.names)), np.nan)
+    for step, row in timetable(measurements, float(t[0])).z.items():
         if step <= len(z):
             z[step - 1] = row
     return z
@@ -202,7 +208,7 @@ def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ..
     return np.vstack([probes, markers]), tracks.names
 
 
-def _unheard(stepper: FilterStepper, steps: int) -> str:
+def _unreached(stepper: FilterStepper, steps: int) -> str:
     return cast(str, stepper.unheard([{"nis.dof": 0.0}] * steps))  # type: ignore[attr-defined]
 
 
@@ -249,7 +255,7 @@ def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
     one = ready.with_markers(fold.given)
     one = one.given_nothing() if cell.baseline == "alone" else one
     points = _watched(ready, cell)
-    run = one.run(cell.method, KeptFields(other_times(ready.seen), points))
+    run = one.run(cell.method, KeptFields(other_times(ready.registered), points))
     state = run.outcome.state
     if state == "finished" or (state == "invalid" and cell.baseline == "alone"):
         return run
@@ -260,7 +266,7 @@ def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
 def _watched(ready: Ready, cell: FilterCell) -> Rows | None:
     """Rows of the markers, then of the outlines that filters are given."""
     every = [] if ready.tracks is None else [ready.tracks.rows]
-    every += [o.distances.rows for o in outline_tracks(ready.seen, cell.given)]
+    every += [o.distances.rows for o in outline_tracks(ready.registered, cell.given)]
     if not every:
         return None
     weights = sparse.csr_array(sparse.vstack([r.weights for r in every]))
@@ -270,30 +276,33 @@ def _watched(ready: Ready, cell: FilterCell) -> Rows | None:
 def _scored(
     bench: Bench, cell: FilterCell, ready: Ready, folds: Sequence[Fold], runs: Sequence[Run]
 ) -> Scored:
-    """One recording: held-out errors of every fold, all else of the first."""
+    """Results on one recording: held-out errors of every fold, all others of the first."""
     segments, run = ready.segments, runs[0]
     tracks = ready.tracks
     held = list[Withheld]()
-    for fold, own in zip(folds, runs, strict=True):
-        if tracks is not None and own.points is not None and fold.scores:
+    for fold, of_fold in zip(folds, runs, strict=True):
+        if tracks is not None and of_fold.points is not None and fold.scores:
             at = [tracks.names.index(n) for n in fold.scores]
-            held += tracks.of(fold.scores).errors(own.t, own.points[:, at], segments, ahead=False)
-    held += other_errors(run, ready.seen, segments, cell.given)
+            held += tracks.of(fold.scores).errors(
+                of_fold.t, of_fold.points[:, at], segments, ahead=False
+            )
+    held += other_errors(run, ready.registered, segments, cell.given)
     axis = ready.experiment.axis
     probes = {p.name: run.traces[f"{p.name}.{axis}"].y for p in ready.scene.probes}
     truth = _against_truth(bench, ready, probes) if bench.experiment.repeats else {}
     nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
     if nis is None or dof is None or cell.baseline:
         ahead = _at_given(cell, ready, run, segments)
-        return Scored(truth, (*held, *ahead))
+        predictions = _predictions(cell, ready, run, segments)
+        return Scored(truth, (*held, *ahead), predictions=predictions)
     names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
     names = [n.removeprefix("innovation.") for n in names]
     y, sd = read_innovations(run, names)
     measured = (sd > 0) | (y != 0)
     scaled = np.where(sd > 0, y / np.where(sd > 0, sd, 1.0), np.nan)
-    told = innovations_of(run.t, scaled, run.traces["log_likelihood"].y, dof.y, segments)
+    innovations = innovations_of(run.t, scaled, run.traces["log_likelihood"].y, dof.y, segments)
     ahead = ahead_errors(run.t, names, y, measured, segments)
-    return Scored(truth, (*held, *ahead), told, float(nis.y.sum()), int(dof.y.sum()))
+    return Scored(truth, (*held, *ahead), innovations, float(nis.y.sum()), int(dof.y.sum()))
 
 
 def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> tuple[Withheld, ...]:
@@ -301,16 +310,40 @@ def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> t
     u, tracks = run.points, ready.tracks
     if u is None:
         return ()
-    found, first = list[Withheld](), 0
+    errors, first = list[Withheld](), 0
     if tracks is not None:
         given, first = tracks.of(cell.given), len(tracks.names)
         at = [tracks.names.index(n) for n in given.names]
-        found += given.errors(run.t, u[:, at], segments, ahead=True) if at else ()
-    for outline in outline_tracks(ready.seen, cell.given):
+        errors += given.errors(run.t, u[:, at], segments, ahead=True) if at else ()
+    for outline in outline_tracks(ready.registered, cell.given):
         last = first + len(outline.distances.normals)
-        found += outline.errors(run.t, u[:, first:last], segments)
+        errors += outline.errors(run.t, u[:, first:last], segments)
         first = last
-    return tuple(found)
+    return tuple(errors)
+
+
+def _predictions(
+    cell: FilterCell, ready: Ready, run: Run, segments: Segments
+) -> PredictionErrors | None:
+    """Errors y - H u at what filters are given, of a method that is given nothing."""
+    if run.points is None:
+        return None
+    offered, start = ready.offered(cell.given), np.zeros(1)
+    columns: dict[str, Floats] = {}
+    markers = ready.tracks.names if ready.tracks is not None else ()
+    for i, name in enumerate(markers):
+        for c in range(run.points.shape[2]):
+            columns[f"{name}.{'xyz'[c]}"] = run.points[:, i, c]
+    first = len(markers)
+    for outline in outline_tracks(ready.registered, cell.given):
+        last = first + len(outline.distances.normals)
+        along = (run.points[:, first:last] * outline.distances.normals).sum(axis=2)
+        columns |= {f"{outline.name}.{i}": y for i, y in enumerate(along.T)}
+        first = last
+    t = np.concatenate([start, run.t])
+    predicted = [np.interp(offered.t, t, np.append(start, columns[n])) for n in offered.names]
+    errors = offered.z - np.stack(predicted, axis=1)
+    return prediction_errors(offered.t, errors, offered.sd**2, segments)
 
 
 # --- persistence ----------------------------------------------------------------------------------
@@ -323,10 +356,9 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
     for seed in cell.seeds:
         on_each = []
         for ready in bench.ready(cell, seed):
-            one = ready.with_markers(cell.given)
-            offered = one.method.offered(one.system, one.seen)
+            offered = ready.offered(cell.given)
             start = perf_counter()
-            last = _last_seen(offered.z)
+            last = _last_measured(offered.z)
             seconds.append((perf_counter() - start) / len(offered.t))
             y, measured = offered.z - last, np.isfinite(offered.z)
             ahead = ahead_errors(offered.t, offered.names, np.nan_to_num(y), measured, segments)
@@ -334,27 +366,41 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
             truth: Mapping[str, float] = {}
             if tracks is not None:
                 given = tracks.of(cell.given).and_outlines(
-                    outline_tracks(ready.seen, cell.given), ready.scene.mesh
+                    outline_tracks(ready.registered, cell.given), ready.scene.mesh
                 )
-                scoring = tracks.of(cell.scored(tracks.names))
-                if given.names and scoring.names:
-                    u = scoring.held(given)
-                    held = scoring.errors(tracks.t[1:], u[1:], segments, ahead=False)
+                if given.names:
+                    held = _held_markers(cell, tracks, given, segments)
                     truth = _held_at_probes(bench, ready, given)
-            on_each.append(Scored(truth, (*held, *ahead)))
+            predictions = prediction_errors(offered.t, y, offered.sd**2, segments)
+            on_each.append(Scored(truth, (*held, *ahead), predictions=predictions))
         scored.append(_in_a_row(on_each))
-    found = _put_together(scored, segments)
+    scores = _put_together(scored, segments)
     step = float(np.median(seconds))
-    return replace(found, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.seen.t))
+    return replace(
+        scores, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.registered.t)
+    )
 
 
-def _last_seen(z: Floats) -> Floats:
+def _held_markers(
+    cell: FilterCell, tracks: MarkerTracks, given: MarkerTracks, segments: Segments
+) -> tuple[Withheld, ...]:
+    """Errors of the markers that are held out, each where the nearest other given one was."""
+    held = list[Withheld]()
+    for name in cell.scored(tracks.names):
+        marker, others = tracks.of((name,)), given.of([n for n in given.names if n != name])
+        if others.names:
+            u = marker.held(others)
+            held += marker.errors(tracks.t[1:], u[1:], segments, ahead=False)
+    return tuple(held)
+
+
+def _last_measured(z: Floats) -> Floats:
     """The last value of every component before each row (nt, m), zero at first."""
-    last, found = np.zeros(z.shape[1]), np.zeros_like(z)
+    last, before = np.zeros(z.shape[1]), np.zeros_like(z)
     for i, row in enumerate(z):
-        found[i] = last
+        before[i] = last
         last = np.where(np.isfinite(row), row, last)
-    return found
+    return before
 
 
 def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[str, float]:
@@ -365,7 +411,7 @@ def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[
     rest = np.array([p.point for p in probes])
     at = replace(given, names=tuple(p.name for p in probes), rest=rest)
     now = at.held(given)
-    c, t = "xyz".index(ready.experiment.axis), np.concatenate([[0.0], ready.seen.t])
+    c, t = "xyz".index(ready.experiment.axis), np.concatenate([[0.0], ready.registered.t])
     last = np.searchsorted(given.t, t[1:] + 1e-9) - 1
     estimates = {p.name: now[last, j, c] for j, p in enumerate(probes)}
     return error_scores(estimates, truth, ready.experiment.axis)
@@ -399,6 +445,7 @@ def _in_a_row(scored: Sequence[Scored]) -> Scored:
         {}, in_a_row([s.withheld for s in scored]),
         joined_innovations([s.innovations for s in scored], 1),
         sum(s.nis for s in scored), sum(s.dof for s in scored),
+        joined_predictions([s.predictions for s in scored], 2),
     )  # fmt: skip
 
 
@@ -417,5 +464,6 @@ def _put_together(scored: Sequence[Scored], segments: Segments) -> FilterScores:
         nis_dof=dof,
         withheld=withheld,
         innovations=innovations,
+        predictions=joined_predictions([s.predictions for s in scored], 0),
         segment_s=segments.length,
     )

@@ -1,4 +1,4 @@
-"""What a filter study shows: the best settings, rankings with ties, Pareto front, NIS maps."""
+"""Figures and tables of a filter study: best settings, rankings, Pareto front, NIS maps."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,11 +7,10 @@ import numpy as np
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.study.chosen_exhibits import chosen_exhibits
 from validate.study.filter_maps import over_axes
-from validate.study.filter_plan import CASE
 from validate.study.filters import FilterStudy
 from validate.study.ranking import SAME_TIME, Ranked, Ranking
 from validate.study.score import LOG_LOSS, WORDS
-from validate.study.score_units import shown_unit
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.sweep import named
 
 _MS = 1e3
@@ -19,40 +18,40 @@ _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
 _SHOWN_OF_MANY = 8  # places of each where there are many conditions
 _FULL = 12  # conditions whose rankings and charts are shown
 _SAME_MODEL = (
-    "The twin is the models' own model, so trusting the model most wins: that says nothing about a "
+    "The twin is the models' own model, so trusting the model most wins: that is no evidence for a "
     "body that differs. Change the twin with --set or sweep it, and look for settings that hold."
 )
 _PAIRS = (
     "All cells of a condition see the same seeds, so differences from the first place are taken "
-    "seed by seed (paired): 'cannot tell' means that their 95 % interval holds zero. Intervals "
-    "that overlap may still differ in pairs. Nothing is corrected for the number of cells: the "
-    "winner of many is a little better here than it is."
+    "seed by seed (paired): 'not distinguishable' means that their 95 % interval holds zero. "
+    "Intervals that overlap may still differ in pairs. Nothing is corrected for the number of "
+    "cells: the winner of many is a little better here than it is."
 )
 _BLOCKS = (
     "± is half of Student's 95 % interval over blocks of time; differences from the first place "
     "are taken block by block. A setting whose innovations stay correlated longer than a block has "
-    "no interval. What was measured has noise of its own: it is in every score alike."
+    "no interval. Measured samples have noise: it is in every score alike."
 )
 _NIS = (
-    "A filter whose NIS lies outside its 95 % band does not know how wrong it is: its own interval "
-    "is not used."
+    "A filter whose NIS lies outside its 95 % band does not know its error: the interval that it "
+    "claims is not used."
 )
 _NAMED = 3  # overlapping places that are named
 
 
 def study_exhibits(study: FilterStudy) -> tuple[Exhibit, ...]:
-    """In the order of a reader's questions: which, how sure, at what cost, is it honest."""
-    found = [best_exhibit(study), _ranking_exhibit(study), *chosen_exhibits(study)]
-    found += [_pareto_exhibit(study), *over_axes(study)]
+    """Figures and tables: settings, intervals, times and consistency, in this order."""
+    exhibits = [best_exhibit(study), _ranking_exhibit(study), *chosen_exhibits(study)]
+    exhibits += [_pareto_exhibit(study), *over_axes(study)]
     failed = _failed_exhibit(study)
-    return (*found, *((failed,) if failed else ()))
+    return (*exhibits, *((failed,) if failed else ()))
 
 
 def ranking_row(r: Ranked, by: str) -> tuple[Entry, ...]:
-    """One place: what it is, its score with interval, ties, honesty and cost."""
+    """One place: its cell, score with interval, ties, consistency and time of a step."""
     result, (factor, _) = r.result, shown_unit(r.result.units[by])
-    seen, told = result.consistency, result.innovations
-    half, apart = r.score.half, r.from_best
+    consistency, innovations = result.consistency, result.innovations
+    half, difference = r.score.half, r.from_best
     return (
         r.place,
         r.cell.name,
@@ -60,12 +59,12 @@ def ranking_row(r: Ranked, by: str) -> tuple[Entry, ...]:
         factor * r.score.mean,
         None if half is None else factor * half,
         _overlapping(r),
-        factor * apart.mean if r.place > 1 else None,
-        factor * apart.half if r.place > 1 and apart.half is not None else None,
+        factor * difference.mean if r.place > 1 else None,
+        factor * difference.half if r.place > 1 and difference.half is not None else None,
         _tied(r),
-        seen.mean if seen else None,
+        consistency.mean if consistency else None,
         _consistent(r),
-        told.lag_1 if told else None,
+        innovations.lag_1 if innovations else None,
         None if result.step_s is None else _MS * result.step_s,
         None if result.step_p99_s is None else _MS * result.step_p99_s,
         result.frozen,
@@ -74,11 +73,13 @@ def ranking_row(r: Ranked, by: str) -> tuple[Entry, ...]:
 
 
 def _consistent(r: Ranked) -> str | None:
-    """What NIS says of a filter, and of the interval that it claims."""
-    seen = r.result.consistency
-    if seen is None:
+    """Consistency of a filter by NIS, and whether the interval that it claims is used."""
+    consistency = r.result.consistency
+    if consistency is None:
         return None
-    return "consistent" if seen.band_95.holds(seen.mean) else f"{seen.verdict}: interval not used"
+    if consistency.band_95.holds(consistency.mean):
+        return "consistent"
+    return f"{consistency.verdict}: interval not used"
 
 
 def _front(r: Ranked) -> str:
@@ -92,28 +93,27 @@ def ranking_head(unit: str) -> tuple[str, ...]:
     shown = shown_unit(unit)[1]
     return (
         "place", "method", "settings", f"error / {shown}", f"± 95 % / {shown}",
-        "interval overlaps", f"less #1's, paired / {shown}", f"± 95 % / {shown} (paired)",
+        "interval overlaps", f"difference from #1 / {shown}", f"± 95 % / {shown} (paired)",
         "against #1", "NIS per dof / 1", "filter is", "innovation lag 1 / 1", "step p50 / ms",
         "step p99 / ms", "gains repeat from step", "Pareto",
     )  # fmt: skip
 
 
 def best_exhibit(study: FilterStudy) -> Exhibit:
-    """The winners as ready commands, with what ties with them."""
+    """The best settings as commands, with those that are not distinguishable from them."""
     words, rows = [], []
     for best in study.best:
         r = best.ranked
-        factor, unit = shown_unit(study.unit)
+        factor, shown = shown_unit(study.unit)
+        unit = unit_text(shown)
         half = f" ± {factor * r.score.half:.3g}" if r.score.half is not None else ""
         when = f" with {named(r.cell.condition)}" if r.cell.condition else ""
         doubts = f"; {best.doubts}" if best.doubts else ""
         words.append(
             f"Best{when}: {r.cell.method} ({named(r.cell.settings)}), "
-            f"{study.by} {factor * r.score.mean:.4g}{half} {unit} over {over(study)}{doubts}."
+            f"{study.by} {factor * r.score.mean:.4g}{half}{unit} over {over(study)}{doubts}."
         )
         rows.append((named(r.cell.condition), best.line))
-    if any(CASE in dict(best.ranked.cell.condition) for best in study.best):
-        words.append("A run of the experiment shows all its cases in one report.")
     head = ("condition", "command")
     table = NumberTable("best", "The best settings as commands", head, tuple(rows))
     return Exhibit("best", "Best settings", tuple(words), tables=(table,))
@@ -148,6 +148,8 @@ def _ranking_words(study: FilterStudy) -> Iterator[str]:
             if ranking.blocks is not None:
                 yield f"{_under(ranking).strip() or 'The recording'}: {ranking.blocks.words}."
         yield _BLOCKS
+    if study.plan.single_words:
+        yield study.plan.single_words
     yield _NIS
     yield (
         "Times are the median and the 99 % quantile of one step in this study's workers, one "
@@ -188,7 +190,7 @@ def _tied(r: Ranked) -> str:
         return "best"
     if r.from_best.half is None:
         return "no interval"
-    return "cannot tell" if r.tied else "worse"
+    return "not distinguishable" if r.tied else "worse"
 
 
 def _under(ranking: Ranking) -> str:
@@ -204,7 +206,7 @@ def _pareto_exhibit(study: FilterStudy) -> Exhibit:
     tables = tuple(
         NumberTable(
             f"pareto_{i}",
-            f"Pareto front{_under(r)}, fastest first: nothing here is both less wrong and faster",
+            f"Pareto front{_under(r)}, fastest first: no cell has both less error and less time",
             (
                 "place",
                 "method",
@@ -251,8 +253,8 @@ def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
     factor, unit = shown_unit(study.unit)
     series = []
     for method in dict.fromkeys(r.cell.name for r in rows):
-        mine = [r for r in rows if r.cell.name == method]
-        x, y = _points(mine, factor)
+        of_method = [r for r in rows if r.cell.name == method]
+        x, y = _points(of_method, factor)
         series.append(Series(method, x, y, "points"))
     x, y = _points([r for r in ranking.front if r in rows], factor)
     series.append(Series("Pareto front", x, y))

@@ -1,4 +1,4 @@
-"""What a filter study shows over its swept axes: consistency and error as maps or curves."""
+"""Consistency and error over the swept axes of a filter study, as maps or curves."""
 
 from collections.abc import Iterator, Sequence
 
@@ -32,16 +32,16 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
     if charts or heats:
         yield Exhibit(
             "axes", "Over the swept values",
-            ("NIS per degree of freedom is 1 for a filter that knows how wrong it is; above it is "
-             "over-confident, below under-confident. It sees measured components only.", *words),
+            ("NIS per degree of freedom is 1 for a filter that knows its error; above it is "
+             "over-confident, below under-confident. It is of measured components only.", *words),
             charts=tuple(charts), heats=tuple(heats),
         )  # fmt: skip
 
 
 def _axes_of(study: FilterStudy, method: str) -> list[Axis]:
-    own = f"{METHODS}{method}."
-    mine = [a for a in study.plan.axes if a.path.startswith(own)]
-    return mine + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
+    prefix = f"{METHODS}{method}."
+    of_method = [a for a in study.plan.axes if a.path.startswith(prefix)]
+    return of_method + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
 
 
 def _cells_of(study: FilterStudy, method: str) -> list[FilterCell]:

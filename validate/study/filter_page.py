@@ -1,4 +1,4 @@
-"""What a filter study tells: its sentence, its part of results.json and its table of cells."""
+"""Report of a filter study: its sentence, its part of results.json and its table of cells."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ from validate.study.filter_plan import FilterCell
 from validate.study.filters import FilterStudy
 from validate.study.interval import interval
 from validate.study.score import FilterScores
-from validate.study.score_units import shown_unit
+from validate.study.score_units import shown_unit, unit_text
 from validate.study.store import Record
 from validate.study.study_page import CellsTable, Findings, Row
 
 
-def told(study: FilterStudy) -> Findings:
+def findings(study: FilterStudy) -> Findings:
     """The study with the parameters and methods that it began with."""
     experiment, job = study.plan.experiment, study.plan.job
     options = Options(dict(job.values), study.plan.methods, job.quick)
@@ -27,12 +27,13 @@ def told(study: FilterStudy) -> Findings:
 
 
 def sentence(study: FilterStudy) -> str:
-    """What ran and what won, in one sentence."""
+    """Cells that ran, the best filter and its doubts, in one sentence."""
     cells, best = len(study.plan.cells), study.best[0]
     doubts = f" ({best.doubts})" if best.doubts else ""
     more = f" (first of {len(study.rankings)} conditions)" if len(study.rankings) > 1 else ""
     failed = f", {study.failed} failed" if study.failed else ""
-    half, (factor, unit) = best.ranked.score.half, shown_unit(study.unit)
+    half, (factor, shown) = best.ranked.score.half, shown_unit(study.unit)
+    unit = unit_text(shown)
     spread = "" if half is None else f" ± {factor * half:.2g}"
     near = sum(p.near for p in study.picks)
     truth = (
@@ -43,13 +44,13 @@ def sentence(study: FilterStudy) -> str:
     )
     return (
         f"{cells} cells over {over(study)}{failed}; best filter by {study.by}{more}: "
-        f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread} {unit}{doubts}."
+        f"{best.ranked.cell.method}, {factor * best.ranked.score.mean:.4g}{spread}{unit}{doubts}."
         f"{truth}"
     )
 
 
 def document(study: FilterStudy) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """The part of results.json that the study adds: SI, finite numbers."""
     done = study.done
     return {
         "kind": "filters",
@@ -150,11 +151,12 @@ def cells_table(study: FilterStudy) -> CellsTable:
         if (r := place.get(cell.key)) is None:
             rows.append((*what, *(None,) * 10, study.done.records[cell.key].why))
             continue
-        score, seen = r.score, r.result.consistency
+        score, consistency = r.score, r.result.consistency
         rows.append(
             (*what, r.place, score.mean, score.half, score.count,
              None if r.from_best.half is None else r.tied,
-             seen.mean if seen else None, seen.verdict if seen else None, r.result.step_s,
+             consistency.mean if consistency else None,
+             consistency.verdict if consistency else None, r.result.step_s,
              r.result.step_p99_s, r.result.frozen, None)
         )  # fmt: skip
     return head, tuple(rows)

@@ -7,14 +7,13 @@ from typing import Any, Literal
 from validate.errors import UsageError
 from validate.parameters import describe, nearest_names, with_values
 from validate.replay.experiment import Experiment
-from validate.replay.options import Options, configure
+from validate.replay.options import RECORDED, Options, configure, require_case
 from validate.study.job import Job, job_of
 from validate.study.store import key_of
 from validate.study.sweep import Axis, grid, named
 
 METHODS = "methods."
 CASE = "case"  # a condition: the truth is a case of the experiment, by its name
-RECORDED = "recorded"  # the case that the experiment's own recording is
 SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
 EACH = ("each",)  # of hold_out: every marker in turn
 
@@ -24,10 +23,10 @@ class FilterCell:
     """One method, its `settings` and the twin's `condition` as texts by path, over all `seeds`.
 
     `seed_path` is the seed's parameter; "" where there is none. `key` names all that makes its
-    numbers. `given` are the markers that any filter of the study is given, `hold_out` those that
-    are kept from all of them. `baseline` compares filters with the method's model, given "nothing"
-    ("alone"), or with the last measurement ("persistence"). Markers are registered as for the
-    method `tracker`, a filter.
+    numbers. `given` are the markers that any filter of the study is given, `spared` those of them
+    that a filter can lose, having another one. `hold_out` are kept from all filters. `baseline`
+    compares filters with the method's model, given "nothing" ("alone"), or with the last
+    measurement ("persistence"). Markers are registered as for the method `tracker`, a filter.
     """
 
     method: str
@@ -38,6 +37,7 @@ class FilterCell:
     key: str = ""
     timed: bool = False
     given: tuple[str, ...] = ()
+    spared: tuple[str, ...] = ()
     hold_out: tuple[str, ...] = ()
     baseline: Literal["", "alone", "persistence"] = ""
     tracker: str = ""
@@ -56,15 +56,15 @@ class FilterCell:
         return f"{self.name}{given}{seeds}"
 
     def in_turn(self, moving: Sequence[str]) -> bool:
-        """Whether every marker is held out in turn: where that is asked for, or none is free."""
+        """Whether every marker is held out in turn: `--hold-out each`, or no marker is free."""
         return self.hold_out == EACH or set(moving) <= set(self.given)
 
     def scored(self, moving: Sequence[str]) -> tuple[str, ...]:
         """The markers at which a method that is given none is scored as held out."""
         if self.hold_out and self.hold_out != EACH:
             return self.hold_out
-        free = tuple(n for n in moving if n not in self.given)
-        return tuple(moving) if self.in_turn(moving) else free
+        turns = self.spared if self.in_turn(moving) else ()
+        return tuple(n for n in moving if n not in self.given or n in turns)
 
     @property
     def values(self) -> dict[str, str]:
@@ -73,7 +73,8 @@ class FilterCell:
 
 @dataclass(frozen=True)
 class FilterPlan:
-    """The job and its cells, method by method in the order of the grid."""
+    """The job and its cells, method by method in the order of the grid; `single` are the filters
+    of one marker where every marker is held out in turn."""
 
     experiment: Experiment
     job: Job
@@ -81,6 +82,15 @@ class FilterPlan:
     methods: tuple[str, ...]
     seeds: tuple[int, ...]
     cells: tuple[FilterCell, ...]
+    single: tuple[str, ...] = ()
+
+    @property
+    def single_words(self) -> str:
+        """How `--hold-out each` scores filters that are given one marker; "" for none."""
+        if not self.single:
+            return ""
+        given = ", ".join(f"{m} ({self.experiment.methods[m].markers[0]})" for m in self.single)
+        return f"Given one marker, which is scored by its next sample only: {given}."
 
 
 def plan(
@@ -92,10 +102,10 @@ def plan(
 ) -> FilterPlan:
     """Checks every path and value before anything runs.
 
-    `seeds`: so many from the twin's own seed on, or these (None: `SEEDS`; a measured recording has
-    one). An axis of one method multiplies that method's cells only. Raises `UsageError` for an
-    experiment without filters, unknown paths (naming the nearest), values of another type, methods
-    without a sweep's name, and fewer than one seed.
+    `seeds`: so many from the declared seed of the twin on, or these (None: `SEEDS`; a measured
+    recording has one). An axis of one method multiplies its cells only. Raises `UsageError` for
+    an experiment without filters, unknown paths (naming the nearest), values of another type,
+    methods without a sweep's name, and fewer than one seed.
     """
     filters = [n for n, m in experiment.methods.items() if m.markers]
     if not filters:
@@ -108,37 +118,34 @@ def plan(
     seed_path = _seed_path(parameters) if experiment.repeats else ""
     _require(axes, experiment, parameters, methods, seed_path)
     job = job_of(experiment, options.values, options.quick)
-    mine = [m for m in methods if m in filters] or filters
-    given = tuple(dict.fromkeys(n for m in mine for n in experiment.methods[m].markers))
-    alone = [m for m in mine if len(experiment.methods[m].markers) == 1]
-    if hold_out == EACH and alone:
-        raise UsageError(
-            f"--hold-out each leaves nothing to '{alone[0]}', which is given "
-            f"{experiment.methods[alone[0]].markers[0]} alone; name markers, as --hold-out A,B, or "
-            "leave it out: markers given to no filter score anyway"
-        )
+    chosen = [m for m in methods if m in filters] or filters
+    given = tuple(dict.fromkeys(n for m in chosen for n in experiment.methods[m].markers))
+    several = [m for m in chosen if len(experiment.methods[m].markers) > 1]
+    spared = tuple(dict.fromkeys(n for m in several for n in experiment.methods[m].markers))
+    single = tuple(m for m in chosen if m not in several) if hold_out == EACH else ()
     if seeds is None:
         seeds = SEEDS if experiment.repeats and seed_path else 1
-    own = FilterCell(
+    bare = FilterCell(
         "",
         (),
         (),
         seed_path,
         _seeds(seeds, parameters, seed_path),
         given=given,
+        spared=spared,
         hold_out=hold_out,
-        tracker=mine[0],
+        tracker=chosen[0],
     )
     if not options.methods and not experiment.repeats:
         methods = tuple(dict.fromkeys((*methods, *_plain(experiment, methods))))
-    of_methods = [replace(own, method=m) for m in methods]
+    of_methods = [replace(bare, method=m) for m in methods]
     cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
-    beside = [replace(own, method=mine[0], baseline="persistence")]
+    beside = [replace(bare, method=chosen[0], baseline="persistence")]
     if all(m in filters for m in methods):  # no plain solver stands beside them
-        beside.insert(0, replace(own, method=mine[0], baseline="alone"))
+        beside.insert(0, replace(bare, method=chosen[0], baseline="alone"))
     conditions = [a for a in axes if not a.path.startswith(METHODS)]
     cells += [c for one in beside for c in _cells(experiment, job, one, conditions)]
-    return FilterPlan(experiment, job, tuple(axes), methods, own.seeds, tuple(cells))
+    return FilterPlan(experiment, job, tuple(axes), methods, bare.seeds, tuple(cells), single)
 
 
 def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tuple[Any, Any]:
@@ -151,15 +158,16 @@ def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tup
 
 
 def _cells(
-    experiment: Experiment, job: Job, own: FilterCell, axes: Sequence[Axis]
+    experiment: Experiment, job: Job, bare: FilterCell, axes: Sequence[Axis]
 ) -> list[FilterCell]:
-    mine = f"{METHODS}{own.method}."
-    found = []
-    for row in grid([a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(mine)]):
+    prefix = f"{METHODS}{bare.method}."
+    cells = []
+    concerning = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(prefix)]
+    for row in grid(concerning):
         settings = tuple((k, v) for k, v in row.items() if k.startswith(METHODS))
         condition = tuple((k, v) for k, v in row.items() if not k.startswith(METHODS))
-        found.append(_keyed(experiment, job, replace(own, settings=settings, condition=condition)))
-    return found
+        cells.append(_keyed(experiment, job, replace(bare, settings=settings, condition=condition)))
+    return cells
 
 
 def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
@@ -233,7 +241,7 @@ def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tup
         return (0,)
     if isinstance(seeds, tuple):
         if len(set(seeds)) < count:
-            raise UsageError("a seed stands twice: that is no second sample")
+            raise UsageError("a seed is given twice: each seed is one sample; name different seeds")
         return seeds
     first = {p.path: p.default for p in describe(parameters)}[seed_path]
     return tuple(range(int(first), int(first) + count))
@@ -266,11 +274,13 @@ def _require(
 
 
 def _require_cases(experiment: Experiment, axis: Axis) -> None:
-    names = {c.name for c in experiment.cases} if experiment.repeats else set()
     for value in axis.values:
-        if value not in names | {RECORDED}:
-            hint = nearest_names(value, names) if names else "the experiment has none"
-            raise UsageError(f"no case '{value}' of {experiment.name}; {hint}")
+        if value != RECORDED and not experiment.repeats:
+            raise UsageError(
+                f"no case '{value}' of {experiment.name}: its recording is measured; a case needs "
+                "a twin"
+            )
+        require_case(experiment, value)
 
 
 def _require_values(settings: Any, path: str, axis: Axis) -> None:

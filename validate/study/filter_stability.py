@@ -21,7 +21,7 @@ from validate.study.job import Plan, Where
 from validate.study.store import key_of
 from validate.study.study_page import Findings
 
-STEPS = 200  # of a run: what grows shows itself
+STEPS = 200  # of a run: growth shows within them
 _VARIANCE, _SD = (1e-6, 1e6), (1e-3, 1e3)  # factors of noise settings
 _STEPS = (0.25, 0.5, 2.0, 4.0)
 _DROPPED = (0.5, 0.9)
@@ -105,19 +105,19 @@ def filter_endings(
 
 
 def _changes(cell: FilterCell, method: Method, *, quick: bool) -> list[FilterChange]:
-    found = [FilterChange(cell, "as declared")]
+    changes = [FilterChange(cell, "as declared")]
     noise: NoiseSettings = getattr(method.settings, "noise_settings", NoiseSettings("", "", ""))
     for what in ("process", "measurement", "start"):
         name = getattr(noise, what)
         if name and getattr(method.settings, name) != 0:
-            found += [
+            changes += [
                 FilterChange(cell, f"{what} noise", name, f)
                 for f in _factors(method.settings, name)
             ]
     if quick:
-        return found
-    found += [FilterChange(cell, "step", "", f) for f in _STEPS]
-    return found + [FilterChange(cell, "dropped samples", "", share) for share in _DROPPED]
+        return changes
+    changes += [FilterChange(cell, "step", "", f) for f in _STEPS]
+    return changes + [FilterChange(cell, "dropped samples", "", share) for share in _DROPPED]
 
 
 def _factors(settings: Any, name: str) -> tuple[float, float]:
@@ -128,24 +128,24 @@ def _factors(settings: Any, name: str) -> tuple[float, float]:
 def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
     """Raises what the settings or the registration refuse."""
     ready = _changed(bench.ready(change.cell, change.cell.seeds[0])[0], change)
-    steps = min(STEPS, len(ready.seen.t))
+    steps = min(STEPS, len(ready.registered.t))
     ready = replace(ready, method=replace(ready.method, steps=steps))
-    end = ready.run(change.cell.method, KeptFields(ready.seen.t[:1])).outcome
+    end = ready.run(change.cell.method, KeptFields(ready.registered.t[:1])).outcome
     return FilterEnding(end.state, end.step, steps, end.why)
 
 
 def _changed(ready: Ready, change: FilterChange) -> Ready:
     method, factor = ready.method, change.factor
     if change.what == "dropped samples":
-        return replace(ready, seen=_dropped(ready, factor))
+        return replace(ready, registered=_dropped(ready, factor))
     if change.what == "step":
         split, stride = (round(1 / factor), 1) if factor < 1 else (1, round(factor))
         return replace(ready, method=replace(method, split=split, stride=stride))
     if not change.setting:
         return ready
     value = getattr(method.settings, change.setting)
-    if value is None:  # the measurements' own
-        value = float((method.offered(ready.system, ready.seen).sd ** 2).mean())
+    if value is None:  # that of the measurements
+        value = float((method.offered(ready.system, ready.registered).sd ** 2).mean())
     scaled = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
     return replace(
         ready, method=replace(method, settings=replace(method.settings, **{change.setting: scaled}))
@@ -163,11 +163,11 @@ def _dropped(ready: Ready, share: float) -> Any:
         x[rng.random(len(x)) < share] = np.nan
         return replace(sensor, x=x)
 
-    observations = tuple(without(o) for o in ready.seen.observations)
-    return replace(ready.seen, observations=observations)
+    observations = tuple(without(o) for o in ready.registered.observations)
+    return replace(ready.registered, observations=observations)
 
 
-# --- what is shown --------------------------------------------------------------------------------
+# --- report -------------------------------------------------------------------------------------
 
 
 def endings_exhibit(endings: FilterEndings) -> Exhibit:
@@ -207,11 +207,11 @@ def endings_document(endings: FilterEndings) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def with_endings(told: Findings, endings: FilterEndings) -> Findings:
+def with_endings(findings: Findings, endings: FilterEndings) -> Findings:
     """The page of a stability map with how filters end."""
     return replace(
-        told,
-        exhibits=(*told.exhibits, endings_exhibit(endings)),
-        document={**told.document, "filters": endings_document(endings)},
-        passed=None if told.passed is None else told.passed and not endings.bugs,
+        findings,
+        exhibits=(*findings.exhibits, endings_exhibit(endings)),
+        document={**findings.document, "filters": endings_document(endings)},
+        passed=None if findings.passed is None else findings.passed and not endings.bugs,
     )

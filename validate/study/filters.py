@@ -1,13 +1,13 @@
 """The filter sweep: every method and setting over common seeds, ranked with intervals.
 
 from validate.study.filters import study
-found = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))
-print(found.best[0].line)
+result = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))
+print(result.best[0].line)
 """
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.errors import ComparisonError, UsageError
@@ -22,6 +22,7 @@ from validate.study.filter_bench import open_bench
 from validate.study.filter_cell import run_cell
 from validate.study.filter_plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
 from validate.study.job import Plan, Where
+from validate.study.predictive import with_likelihoods
 from validate.study.ranking import Ranked, Ranking, rankings, tied
 from validate.study.score import AHEAD, HELD_OUT, POOLED, WITHHELD, FilterScores
 from validate.study.sweep import axes
@@ -31,9 +32,9 @@ KIND = "filters"
 
 @dataclass(frozen=True)
 class Best:
-    """The best filter of one condition, the command that runs it, and how many filters' cells
-    cannot be told from it; `edges` are the swept paths whose first or last value it has; `better`
-    names what is first where that is no filter."""
+    """The best filter of one condition and the command that runs it; `ties` counts the cells of
+    filters that are not distinguishable from it. `edges` are the swept paths whose first or last
+    value it has; `better` names what is first where that is no filter."""
 
     ranked: Ranked
     line: str
@@ -43,21 +44,22 @@ class Best:
 
     @property
     def doubts(self) -> str:
-        """What speaks against taking it as it is; "" for nothing."""
-        found = [f"place {self.ranked.place}: {self.better} is first"] if self.better else []
+        """Reasons not to take it as it is; "" for none."""
+        reasons = [f"place {self.ranked.place}: {self.better} is first"] if self.better else []
         if self.ranked.score.half is None:
-            found.append("without an interval no two settings can be told apart")
+            reasons.append("without an interval no two settings can be distinguished")
         elif self.ties:
             others = "1 other" if self.ties == 1 else f"{self.ties} others"
-            found.append(f"{others} cannot be told from it")
+            reasons.append(f"{others} not distinguishable from it")
         if self.edges:
-            found.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
-        seen = self.ranked.result.consistency
-        if seen is not None and not seen.band_95.holds(seen.mean):
-            found.append(
-                f"NIS {seen.mean:.3g} is outside its 95 % band: its own interval is not used"
+            reasons.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
+        consistency = self.ranked.result.consistency
+        if consistency is not None and not consistency.band_95.holds(consistency.mean):
+            reasons.append(
+                f"NIS {consistency.mean:.3g} is outside its 95 % band: the interval that it claims "
+                "is not used"
             )
-        return "; ".join(found)
+        return "; ".join(reasons)
 
 
 @dataclass(frozen=True)
@@ -111,12 +113,13 @@ def study(
     withheld); `hold_out` as for `--hold-out`. Raises `UsageError` for bad names and values before
     anything runs, `ComparisonError` when no cell has a score.
     """
-    found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
+    declared = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     options = Options(dict(values or {}), methods, quick)
-    planned = plan(found, options, axes(sweeps), seeds, hold_out)
+    planned = plan(declared, options, axes(sweeps), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
-    done = finish(work, study_folder(found, KIND, out) / CELLS, where, report)
+    done = finish(work, study_folder(declared, KIND, out) / CELLS, where, report)
     _require_filters(planned, done)
+    done = replace(done, records=with_likelihoods(planned.cells, done.records))
     by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
@@ -135,11 +138,10 @@ def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
 
 
 def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
-    """The first of the usual scores that every filter has; the first of its own otherwise."""
+    """The first of the usual scores that every filter has; else the first of a filter."""
     filters = [v for r in done.records.values() if (v := r.value) is not None and v.nis is not None]
     usual = (POOLED, HELD_OUT if in_turn else WITHHELD, AHEAD)
-    own = tuple(filters[0].scores) if filters else ()
-    names = (*usual, *own)
+    names = (*usual, *(filters[0].scores if filters else ()))
     return next((n for n in names if all(n in v.scores for v in filters)), POOLED)
 
 
@@ -159,8 +161,8 @@ def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:
     """The first filter (what has innovations); the first of all where there is none."""
     filters = [r for r in ranking.rows if r.result.nis is not None and not r.cell.baseline]
     rows = filters or list(ranking.rows)
-    apart = [score_difference(r.result, rows[0].result, by, ranking.blocks) for r in rows[1:]]
-    ties, cell = sum(tied(a) for a in apart if a.half is not None), rows[0].cell
+    differences = [score_difference(r.result, rows[0].result, by, ranking.blocks) for r in rows[1:]]
+    ties, cell = sum(tied(d) for d in differences if d.half is not None), rows[0].cell
     first = ranking.rows[0]
     better = "" if first is rows[0] else first.cell.name
     return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell), better)
@@ -168,14 +170,14 @@ def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:
 
 def _edges(planned: FilterPlan, cell: FilterCell) -> tuple[str, ...]:
     """Swept settings of three and more numbers of which the cell has the least or the largest."""
-    found = []
+    edges = []
     for axis in planned.axes:
         numbers = axis.numbers
         if axis.path in dict(cell.settings) and numbers is not None and len(numbers) > 2:
-            own = numbers[axis.values.index(cell.values[axis.path])]
-            if own in (min(numbers), max(numbers)):
-                found.append(axis.path)
-    return tuple(found)
+            value = numbers[axis.values.index(cell.values[axis.path])]
+            if value in (min(numbers), max(numbers)):
+                edges.append(axis.path)
+    return tuple(edges)
 
 
 def run_line(planned: FilterPlan, cell: FilterCell) -> str:
@@ -185,14 +187,15 @@ def run_line(planned: FilterPlan, cell: FilterCell) -> str:
     beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
     methods = tuple(dict.fromkeys((*beside, cell.method)))
     values = {**dict(planned.job.values), **cell.values}
-    values.pop(CASE, None)  # a run shows all cases
+    case = values.pop(CASE, "")
     kept = {k: v for k, v in values.items() if _concerns(k, methods)}
     parts = ["validate", "run", experiment.name]
     for path, value in kept.items():
         parts += ["--set", f"{path}={value}"]
+    parts += ["--case", case] if case else []
     return shlex.join([*parts, "--methods", ",".join(methods)])
 
 
 def _concerns(path: str, methods: Sequence[str]) -> bool:
-    mine = tuple(f"{METHODS}{m}." for m in methods)
-    return not path.startswith(METHODS) or path.startswith(mine)
+    prefixes = tuple(f"{METHODS}{m}." for m in methods)
+    return not path.startswith(METHODS) or path.startswith(prefixes)

@@ -1,4 +1,4 @@
-"""Which cells are best: ranked within a condition of the twin, ties stated, Pareto beside."""
+"""Ranking of cells within a condition of the twin, with ties and the Pareto front."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from validate.study.score import LOG_LOSS, WITHHELD, FilterScores, of_score
 from validate.study.store import Record
 from validate.study.sweep import named
 
-# Medians of one step on a machine that does other things too: closer than this is the same time.
+# Ratio of median step times below which they are equal: noise of a shared machine.
 SAME_TIME = 1.25
 SAME_ERROR = 1 + 1e-6
 
@@ -27,7 +27,7 @@ Condition = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Ranked:
-    """A cell's place by one score; `overlaps` are the places whose intervals overlap its own.
+    """A cell's place by one score; `overlaps` are the places whose intervals overlap its interval.
 
     `from_best` is its score less the best one's over common seeds, or blocks of one recording;
     `tied` when that interval holds zero, or there are too few to say. `dominated_by` is the place
@@ -64,7 +64,7 @@ class Ranking:
 
 
 def _time(scores: FilterScores) -> float:
-    """Seconds of a step; one that cannot keep up with a clock takes for ever."""
+    """Seconds of a step; infinite for what is not timed."""
     return math.inf if scores.step_s is None else scores.step_s
 
 
@@ -85,10 +85,10 @@ def _ranking(
     records: Mapping[str, Record[FilterScores]],
     by: str,
 ) -> Ranking:
-    found = [(c, value) for c in cells if (value := records[c.key].value) is not None]
+    scored = [(c, value) for c in cells if (value := records[c.key].value) is not None]
     failed = [(c, records[c.key].why) for c in cells if records[c.key].value is None]
-    found, other = _comparable(found, by)
-    order = sorted(found, key=lambda one: interval(one[1].scores[by]).mean)
+    scored, other = _comparable(scored, by)
+    order = sorted(scored, key=lambda one: interval(one[1].scores[by]).mean)
     values = {c.key: value for c, value in order}
     names = {c.key: f"{c.name} ({named(c.settings)})" if c.settings else c.name for c, _ in order}
     blocks = blocks_of({names[key]: v for key, v in values.items()})
@@ -97,10 +97,10 @@ def _ranking(
     rows = []
     for i, (cell, value) in enumerate(order):
         better = dominator(i, [m.mean for m in means], times)
-        apart = score_difference(value, order[0][1], by, blocks)
+        difference = score_difference(value, order[0][1], by, blocks)
         rows.append(
             Ranked(
-                i + 1, cell, value, means[i], _overlaps(i, means), apart, tied(apart),
+                i + 1, cell, value, means[i], _overlaps(i, means), difference, tied(difference),
                 None if better is None else better + 1,
             )
         )  # fmt: skip
@@ -112,40 +112,40 @@ def _ranking(
     return Ranking(condition, tuple(rows), (*failed, *other), blocks, chosen)
 
 
-Found = list[tuple[FilterCell, FilterScores]]
+ScoredCells = list[tuple[FilterCell, FilterScores]]
 
 
-def _segmented(order: Found, by: str) -> bool:
+def _segmented(order: ScoredCells, by: str) -> bool:
     return any(v.sums(by) is not None for _, v in order)
 
 
-def _comparable(found: Found, by: str) -> tuple[Found, list[tuple[FilterCell, str]]]:
+def _comparable(scored: ScoredCells, by: str) -> tuple[ScoredCells, list[tuple[FilterCell, str]]]:
     """Those scored on the most markers, and the others with the reason: fewer are another score."""
-    on = {c.key: frozenset(w.name for w in of_score(v.withheld, by)) for c, v in found}
+    on = {c.key: frozenset(w.name for w in of_score(v.withheld, by)) for c, v in scored}
     most = max(on.values(), key=len, default=frozenset())
-    kept = [(c, v) for c, v in found if by in v.scores and (on[c.key] == most or by == LOG_LOSS)]
-    left = [(c, v) for c, v in found if c.key not in {k.key for k, _ in kept}]
+    kept = [(c, v) for c, v in scored if by in v.scores and (on[c.key] == most or by == LOG_LOSS)]
+    left = [(c, v) for c, v in scored if c.key not in {k.key for k, _ in kept}]
     return kept, [(c, _why_not(v, by, on[c.key], most)) for c, v in left]
 
 
-def _why_not(value: FilterScores, by: str, mine: frozenset[str], most: frozenset[str]) -> str:
+def _why_not(value: FilterScores, by: str, names: frozenset[str], most: frozenset[str]) -> str:
+    if by == LOG_LOSS and value.predictions is not None:
+        return f"no {by}: its variance needs samples in two blocks of time"
     if by == LOG_LOSS or (by not in value.scores and not most):
         return f"no innovations, so no {by}"
     return (
-        f"scored on {', '.join(sorted(mine)) or 'nothing'}, the others on "
+        f"scored on {', '.join(sorted(names)) or 'nothing'}, the others on "
         f"{', '.join(sorted(most))}: give it two markers or more, or name --hold-out"
     )
 
 
 def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
-    mine = scores[i]
-    return tuple(j + 1 for j, s in enumerate(scores) if j != i and mine.overlaps(s))
+    return tuple(j + 1 for j, s in enumerate(scores) if j != i and scores[i].overlaps(s))
 
 
-def tied(apart: SeedInterval) -> bool:
-    """Whether the interval of a difference holds zero, or there is none: one sample tells
-    nothing."""
-    return apart.half is None or abs(apart.mean) <= apart.half
+def tied(difference: SeedInterval) -> bool:
+    """Whether the interval of a difference holds zero, or there is none (one sample)."""
+    return difference.half is None or abs(difference.mean) <= difference.half
 
 
 def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | None:

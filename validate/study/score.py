@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.track import rmse, track_error
 from validate.estimate.consistency import Consistency, nis_consistency
-from validate.study.withheld import Innovations, Withheld
+from validate.study.withheld import Innovations, PredictionErrors, Withheld
 
 POOLED = "all.rmse"
 NIS = "nis.per_dof"
@@ -23,7 +23,8 @@ WORDS = {
     "the next sample of those that were given (noise included)",
     HELD_OUT: "rms distance from what was measured of markers that were held out (noise included)",
     AHEAD: "rms distance of a given marker's next sample from its prediction (noise included)",
-    LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in metres",
+    LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in "
+    "metres; without innovations, of a Gaussian with the error variance of the other blocks",
 }
 
 
@@ -35,7 +36,8 @@ class FilterScores:
     `nis` is that of all seeds with `nis_dof` degrees of freedom, None without innovations.
     `frozen` is the step from which a linear filter's gains repeat. `shared`: all seeds were run at
     once with one set of gains. `withheld` are the squared errors at what the method was not given,
-    in segments of `segment_s` s.
+    in segments of `segment_s` s. `predictions` are the errors of a method without innovations at
+    what filters were given.
     """
 
     scores: Mapping[str, tuple[float, ...]]
@@ -50,6 +52,7 @@ class FilterScores:
     shared: bool = False
     withheld: tuple[Withheld, ...] = ()
     innovations: Innovations | None = None
+    predictions: PredictionErrors | None = None
     segment_s: float = 0.0
 
     @property
@@ -85,7 +88,7 @@ def summed(withheld: Sequence[Withheld]) -> tuple[Floats, Floats] | None:
 
 
 def name_of(w: Withheld) -> str:
-    """The name of one quantity's own score."""
+    """The name of the score of one quantity."""
     return f"{w.name}.{AHEAD if w.ahead else HELD_OUT}"
 
 
@@ -97,10 +100,10 @@ def withheld_scores(
     units: dict[str, str] = {}
     named = {n: of_score(withheld, n) for n in (WITHHELD, HELD_OUT, AHEAD)}
     for name, parts in (named | {name_of(w): [w] for w in withheld}).items():
-        found = summed(parts)
-        if found is None or not (found[1].sum(axis=1) > 0).all():
+        sums = summed(parts)
+        if sums is None or not (sums[1].sum(axis=1) > 0).all():
             continue
-        squares, counts = (x.sum(axis=1) for x in found)
+        squares, counts = (x.sum(axis=1) for x in sums)
         scores[name], units[name] = tuple(np.sqrt(squares / counts).tolist()), parts[0].unit
     if innovations is not None and (dof := innovations.dof.sum(axis=1)).all():
         loss = -innovations.log_likelihood.sum(axis=1) / dof
@@ -113,9 +116,9 @@ def error_scores(
 ) -> dict[str, float]:
     """`<probe>.rmse` m and `all.rmse` m from traces (nt,) m and truths (nt, d) m by probe."""
     c = "xyz".index(axis)
-    found, squares = {}, []
+    scores, squares = {}, []
     for probe, reference in truth.items():
         error = track_error(probe, axis, estimates[probe], reference[:, c])
-        found[f"{probe}.rmse"] = rmse(error)
+        scores[f"{probe}.rmse"] = rmse(error)
         squares.append(error.values**2)
-    return {POOLED: float(np.sqrt(np.mean(squares))), **found}
+    return {POOLED: float(np.sqrt(np.mean(squares))), **scores}

@@ -44,14 +44,27 @@ class Withheld:
 
 @dataclass(frozen=True)
 class Innovations:
-    """What the innovations of a filter say, by (seeds, segments): summed log-likelihood and degrees
-    of freedom. `correlation_s` is how long they stay correlated, `lag_1` the largest
+    """Log-likelihood of the innovations of a filter and their degrees of freedom, summed by (seeds,
+    segments). `correlation_s` is how long they stay correlated, `lag_1` the largest
     autocorrelation of neighbouring samples; medians over the seeds, None for too few samples."""
 
     log_likelihood: Floats
     dof: Floats
     correlation_s: float | None
     lag_1: float | None
+
+
+@dataclass(frozen=True)
+class PredictionErrors:
+    """Prediction errors of a method without innovations, at the components that filters are given.
+
+    Sums of `squares` (seeds, components, segments) m^2 over the samples of each segment, their
+    `counts`, and the `noise` variance (seeds, components, segments) m^2 of one measurement.
+    """
+
+    squares: Floats
+    counts: Floats
+    noise: Floats
 
 
 @dataclass(frozen=True)
@@ -71,9 +84,9 @@ class Segments:
 
     def number(self, t: Floats) -> Ints:
         """Of the segment that every time (n,) s lies in, -1 for none."""
-        found = np.searchsorted(self.edges, t - 1e-9 * self.edges[-1], side="right") - 1
-        inside = (t > 1e-9 * self.edges[-1]) & (found < self.count)
-        return np.asarray(np.where(inside, found, -1), dtype=np.int64)
+        segment = np.searchsorted(self.edges, t - 1e-9 * self.edges[-1], side="right") - 1
+        inside = (t > 1e-9 * self.edges[-1]) & (segment < self.count)
+        return np.asarray(np.where(inside, segment, -1), dtype=np.int64)
 
     def sums(self, t: Floats, values: Floats) -> Floats:
         """Sums (segments,) of values (n,) at times (n,) s."""
@@ -81,10 +94,10 @@ class Segments:
         return np.asarray(np.bincount(at[at >= 0], values[at >= 0], self.count), dtype=float)
 
 
-def segments_of(seen: Registered) -> Segments:
+def segments_of(registered: Registered) -> Segments:
     """As many as there are samples of what is compared, `SEGMENTS` at most."""
-    samples = max((len(o.t) - 1 for o in seen.compared), default=1)
-    return Segments(np.linspace(0.0, float(seen.t[-1]), max(1, min(SEGMENTS, samples)) + 1))
+    samples = max((len(o.t) - 1 for o in registered.compared), default=1)
+    return Segments(np.linspace(0.0, float(registered.t[-1]), max(1, min(SEGMENTS, samples)) + 1))
 
 
 # --- markers --------------------------------------------------------------------------------------
@@ -92,8 +105,8 @@ def segments_of(seen: Registered) -> Segments:
 
 @dataclass(frozen=True)
 class MarkerTracks:
-    """Measured displacements z (nt, k, d) m, NaN = not seen, at times t (nt,) s of markers that are
-    free to move; `rows` read them from a field, `rest` (k, d) m are their places."""
+    """Displacements z (nt, k, d) m, NaN = not measured, at times t (nt,) s of markers that are free
+    to move; `rows` read them from a field, `rest` (k, d) m are their places."""
 
     names: tuple[str, ...]
     t: Floats
@@ -120,28 +133,28 @@ class MarkerTracks:
         return replace(self, rows=barycentric_rows(mesh, self.rest))
 
     def and_outlines(self, outlines: "Sequence[OutlineTracks]", mesh: Mesh) -> "MarkerTracks":
-        """With the places of outlines as markers that move along their normals, as last seen."""
-        found = self
+        """With the places of outlines, as last measured, as markers that move along normals."""
+        tracks = self
         for one in outlines:
             last = np.searchsorted(one.t, self.t + 1e-9) - 1
             along = np.where(last[:, None] >= 0, one.distances.z[last], np.nan)
             names = tuple(f"{one.name}.{i}" for i in range(along.shape[1]))
             places = one.distances.rows
-            weights = sparse.csr_array(sparse.vstack([found.rows.weights, places.weights]))
-            found = MarkerTracks(
-                (*found.names, *names), self.t,
-                np.concatenate([found.z, along[:, :, None] * one.distances.normals], axis=1),
-                np.concatenate([found.rest, places.apply(mesh.nodes)]),
-                Rows(weights, np.concatenate([found.rows.outside, places.outside])),
+            weights = sparse.csr_array(sparse.vstack([tracks.rows.weights, places.weights]))
+            tracks = MarkerTracks(
+                (*tracks.names, *names), self.t,
+                np.concatenate([tracks.z, along[:, :, None] * one.distances.normals], axis=1),
+                np.concatenate([tracks.rest, places.apply(mesh.nodes)]),
+                Rows(weights, np.concatenate([tracks.rows.outside, places.outside])),
             )  # fmt: skip
-        return found
+        return tracks
 
     def estimated(self, t: Floats, u: Floats) -> Floats:
         """u (nt, k, d) m at the times of the samples."""
         known, rest = np.append(0.0, t), np.zeros((1, *u.shape[1:]))
         flat = np.concatenate([rest, u]).reshape(len(known), -1)
-        found = np.stack([np.interp(self.t, known, y) for y in flat.T], axis=1)
-        return found.reshape(len(self.t), *u.shape[1:])
+        interpolated = np.stack([np.interp(self.t, known, y) for y in flat.T], axis=1)
+        return interpolated.reshape(len(self.t), *u.shape[1:])
 
     def held(self, given: "MarkerTracks") -> Floats:
         """Persistence: at every sample the last displacement of the nearest of the markers `given`,
@@ -153,12 +166,12 @@ class MarkerTracks:
         return np.asarray(last[:, away.argmin(axis=1)])
 
 
-def marker_tracks(seen: Registered, system: System) -> MarkerTracks | None:
+def marker_tracks(registered: Registered, system: System) -> MarkerTracks | None:
     """The markers that are free to move; None where there is none."""
-    found = seen.of(MarkerObservation)
-    if not found:
+    observations = registered.of(MarkerObservation)
+    if not observations:
         return None
-    markers, d = found[0], system.scene.mesh.dimension
+    markers, d = observations[0], system.scene.mesh.dimension
     free = np.zeros(system.scene.mesh.nodes.size)
     free[system.free] = 1.0
     reach = abs(markers.positions.weights) @ free.reshape(-1, d).max(axis=1)
@@ -175,13 +188,13 @@ def errors_of(
     names: Sequence[str], t: Floats, squared: Floats, segments: Segments, *, ahead: bool
 ) -> tuple[Withheld, ...]:
     """Squared errors (n, k) m^2 at times (n,) s, NaN = no sample, by segment."""
-    found = []
-    for name, own in zip(names, squared.T, strict=True):
-        seen = np.isfinite(own)
-        squares = segments.sums(t[seen], own[seen])
-        counts = segments.sums(t[seen], np.ones(int(seen.sum())))
-        found.append(Withheld(name, "m", squares[None], counts[None], ahead, True))
-    return tuple(found)
+    withheld = []
+    for name, errors in zip(names, squared.T, strict=True):
+        measured = np.isfinite(errors)
+        squares = segments.sums(t[measured], errors[measured])
+        counts = segments.sums(t[measured], np.ones(int(measured.sum())))
+        withheld.append(Withheld(name, "m", squares[None], counts[None], ahead, True))
+    return tuple(withheld)
 
 
 # --- innovations ----------------------------------------------------------------------------------
@@ -190,15 +203,15 @@ def errors_of(
 def ahead_errors(
     t: Floats, names: Sequence[str], y: Floats, measured: Floats, segments: Segments
 ) -> tuple[Withheld, ...]:
-    """Innovations y (nt, m) m of components such as "top.z", where `measured` (nt, m) says that
-    there is one, by marker."""
+    """Innovations y (nt, m) m of components such as "top.z" by marker; `measured` (nt, m) where
+    there is one."""
     owners = [name.rpartition(".")[0] for name in names]
     markers = tuple(dict.fromkeys(owners))
     squared = np.full((len(t), len(markers)), np.nan)
     for j, marker in enumerate(markers):
-        mine = np.array([owner == marker for owner in owners])
-        seen = measured[:, mine].any(axis=1)
-        squared[seen, j] = (y[seen][:, mine] ** 2).sum(axis=1)
+        columns = np.array([owner == marker for owner in owners])
+        sampled = measured[:, columns].any(axis=1)
+        squared[sampled, j] = (y[sampled][:, columns] ** 2).sum(axis=1)
     return errors_of(markers, t, squared, segments, ahead=True)
 
 
@@ -240,6 +253,20 @@ def read_innovations(run: Run, names: Sequence[str]) -> tuple[Floats, Floats]:
     return y, sd
 
 
+def prediction_errors(
+    t: Floats, errors: Floats, noise: Floats, segments: Segments
+) -> PredictionErrors:
+    """Of errors (nt, m) m at times t (nt,) s, NaN = no sample, of components whose measurements
+    have the noise variance (m,) m^2."""
+    squares, counts = [], []
+    for error in errors.T:
+        measured = np.isfinite(error)
+        squares.append(segments.sums(t[measured], error[measured] ** 2))
+        counts.append(segments.sums(t[measured], np.ones(int(measured.sum()))))
+    variances = np.tile(noise[:, None], (1, segments.count))
+    return PredictionErrors(np.array([squares]), np.array([counts]), variances[None])
+
+
 # --- other sensors --------------------------------------------------------------------------------
 
 
@@ -255,54 +282,54 @@ class OutlineTracks:
         """Of displacements u (nt, m, 3) m of its places at times t (nt,) s."""
         along = (u * self.distances.normals).sum(axis=2)
         known = np.append(0.0, t)
-        found = np.stack([np.interp(self.t, known, np.append(0.0, y)) for y in along.T], axis=1)
-        squared = ((found - self.distances.z) ** 2).sum(axis=1, keepdims=True)
+        simulated = np.stack([np.interp(self.t, known, np.append(0.0, y)) for y in along.T], axis=1)
+        squared = ((simulated - self.distances.z) ** 2).sum(axis=1, keepdims=True)
         return errors_of((self.name,), self.t, squared, segments, ahead=True)
 
 
-def outline_tracks(seen: Registered, given: Sequence[str]) -> tuple[OutlineTracks, ...]:
+def outline_tracks(registered: Registered, given: Sequence[str]) -> tuple[OutlineTracks, ...]:
     """The outlines among what filters are given."""
     return tuple(
         OutlineTracks(o.name, o.t, o.along_normals(NORMALS))
-        for o in seen.of(OutlineObservation)
+        for o in registered.of(OutlineObservation)
         if o.name in given
     )
 
 
 def other_errors(
-    run: Run, seen: Registered, segments: Segments, given: Sequence[str]
+    run: Run, registered: Registered, segments: Segments, given: Sequence[str]
 ) -> tuple[Withheld, ...]:
     """Of outlines (distance to the simulated wall) and signals that are compared and not `given`,
     at their own samples."""
-    others = [o for o in _others(seen) if o.name not in given]
+    others = [o for o in _others(registered) if o.name not in given]
     return tuple(w for o in others for w in _of_sensor(o, run, segments))
 
 
-def _others(seen: Registered) -> list[Observation]:
-    """Those that were sampled over time: a sensor of one experiment's own says less."""
-    return [o for o in seen.compared if isinstance(o, OutlineObservation | SignalObservation)]
+def _others(registered: Registered) -> list[Observation]:
+    """Those that were sampled over time; sensors of one experiment alone are left out."""
+    return [o for o in registered.compared if isinstance(o, OutlineObservation | SignalObservation)]
 
 
-def other_times(seen: Registered) -> Floats | None:
+def other_times(registered: Registered) -> Floats | None:
     """Times (n,) s at which fields are needed to compare sensors other than markers."""
-    if not (others := _others(seen)):
+    if not (others := _others(registered)):
         return None
     t = np.unique(np.concatenate([o.t for o in others]))
-    return np.asarray(t[(t >= seen.t[0] / 2) & (t <= seen.t[-1])])
+    return np.asarray(t[(t >= registered.t[0] / 2) & (t <= registered.t[-1])])
 
 
 def _of_sensor(sensor: Observation, run: Run, segments: Segments) -> list[Withheld]:
-    found: dict[str, Withheld] = {}
+    withheld: dict[str, Withheld] = {}
     at = np.where(sensor.t <= run.t[-1], segments.number(sensor.t), -1)
     for i in range(segments.count):
         t = sensor.t[(at == i) & (sensor.t >= run.t[0] / 2)]
         if not len(t):
             continue
         for d in sensor.deviations(run, Selection(f"part {i + 1}", t)):
-            one = found.setdefault(d.quantity, _none(d.quantity, d.unit, segments))
+            one = withheld.setdefault(d.quantity, _none(d.quantity, d.unit, segments))
             one.squares[0, i] = float((d.values**2).sum())
             one.counts[0, i] = len(d.values)
-    return [w for w in found.values() if w.counts.any()]
+    return [w for w in withheld.values() if w.counts.any()]
 
 
 def _none(name: str, unit: str, segments: Segments) -> Withheld:
@@ -337,10 +364,26 @@ def _joined(every: Sequence[tuple[Withheld, ...]], axis: int) -> tuple[Withheld,
     )
 
 
+def joined_predictions(
+    every: Sequence[PredictionErrors | None], axis: int
+) -> PredictionErrors | None:
+    """Of all seeds (axis 0) or recordings (axis 2); None where any has none, or has other
+    components."""
+    present = [p for p in every if p is not None]
+    components = {p.squares.shape[1] for p in present}
+    if len(present) < len(every) or len(components) != 1:
+        return None
+    return PredictionErrors(
+        np.concatenate([p.squares for p in present], axis=axis),
+        np.concatenate([p.counts for p in present], axis=axis),
+        np.concatenate([p.noise for p in present], axis=axis),
+    )
+
+
 def joined_innovations(every: Sequence[Innovations | None], axis: int) -> Innovations | None:
     """Of all seeds (axis 0) or recordings (axis 1); None where any has none."""
-    found = [i for i in every if i is not None]
-    if not found or len(found) < len(every):
+    present = [i for i in every if i is not None]
+    if not present or len(present) < len(every):
         return None
 
     def median(values: list[float | None]) -> float | None:
@@ -348,8 +391,8 @@ def joined_innovations(every: Sequence[Innovations | None], axis: int) -> Innova
         return float(np.median(known)) if known else None
 
     return Innovations(
-        np.concatenate([i.log_likelihood for i in found], axis=axis),
-        np.concatenate([i.dof for i in found], axis=axis),
-        median([i.correlation_s for i in found]),
-        median([i.lag_1 for i in found]),
+        np.concatenate([i.log_likelihood for i in present], axis=axis),
+        np.concatenate([i.dof for i in present], axis=axis),
+        median([i.correlation_s for i in present]),
+        median([i.lag_1 for i in present]),
     )
