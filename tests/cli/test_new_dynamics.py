@@ -19,7 +19,7 @@ from validate.register.markers import MarkerObservation
 from validate.replay import compare
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.followed import Followed
+from validate.replay.followed import MAIN, Followed
 from validate.replay.options import folder_of
 from validate.replay.solved import solve
 from validate.study.filters import study
@@ -252,3 +252,36 @@ def test_large_strain_agrees_where_strains_are_small(here: Path) -> None:
     mine = experiment(here)
     assert mine.accepted == ("large",)
     assert off(run(mine, "large")) < 1.5e-4
+
+
+@pytest.mark.slow
+def test_statics_of_a_film_alone_names_inertia_first(here: Path) -> None:
+    """No marker is judged: the outline's motion has causes, too."""
+    changes = (
+        STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""),
+        ('layout = "as seen", still = "0.2s"', 'markers = "none"'), (', marker = "0.5mm"', ""),
+        (', marker = "a fifteenth of the swing, peak to peak"', ""),
+    )  # fmt: skip
+    assert new(here, "filmed", *changes)[0] == 0
+    result = compare(experiment(here))
+    assert "Likely causes, in order: inertia" in result.sentence
+    causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0]
+    assert {row[1] for row in causes.rows} == {"outline"}
+
+
+def test_a_report_has_one_largest_motion_and_says_where_it_rests(here: Path) -> None:
+    """Note and exhibit are of the whole recording, which begins at rest and ends in motion."""
+    new(here, "pushed")
+    mine = experiment(here)
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    assert mine.identify is not None
+    (note,) = mine.identify(recordings, mine.parameters, mine.methods).notes
+    followed = mine.follows(mine, recordings, mine.parameters)
+    cases = {MAIN: {"modal": run(mine, "modal")}}
+    (shown,) = followed.exhibits(mine.parameters, cases, lambda *_: None).exhibits
+    facts = {row[0]: row for row in shown.tables[0].rows}
+    largest = facts["largest motion, peak to peak"][1]
+    assert f"{largest:.3g} mm peak to peak" in note
+    for words in (note, facts["moves from"][3]):
+        assert "at rest until 0.26 s, not at rest at the end" in words
+    assert [s.label for s in shown.charts[0].series] == ["measured", mine.methods["modal"].label]

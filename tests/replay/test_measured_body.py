@@ -115,6 +115,16 @@ def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
     assert rms["force.rms@high"] < 4e-3  # noise alone
 
 
+def test_a_force_that_differs_has_likely_causes(tmp_path: Path) -> None:
+    """Under a displacement it is the modulus: the given one is half of the true one."""
+    soft = replace(BASE, material=replace(BASE.material, E=E / 2))
+    result = compare(experiment(tmp_path, soft, recording(signals=log()), "force"))
+    assert "Likely causes, in order: load or modulus" in result.sentence
+    assert "measured is 2 times simulated, everywhere and always: as if the modulus were" in (
+        result.sentence
+    )
+
+
 def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> None:
     """States more than a second apart: the force was looked for at rest, where it is zero."""
     slow = {n: replace(s, t=20 * s.t) for n, s in log().items()}

@@ -19,8 +19,8 @@ from validate.replay.measured_body import static_scene
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.measured_drive import RELEASE, drive_kind
 from validate.replay.moving_body import against_mode
-from validate.replay.moving_seen import motion_of, started, steps_of, without_rest
-from validate.replay.recorded_motion import FRACTION
+from validate.replay.moving_seen import started, steps_of, without_rest
+from validate.replay.recorded_motion import FRACTION, motion_of
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene

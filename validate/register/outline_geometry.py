@@ -7,6 +7,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError
 
 _TURN = 2 * np.pi
+EVERY_TEN = np.deg2rad(np.arange(0.0, 360.0, 10.0))  # rad
 
 
 def normal_distances(outline: Floats, points: Floats) -> Floats:
@@ -35,6 +36,11 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     centre, at, radius = _rays(outline)
     found = np.interp(np.mod(angles, _TURN), at, radius, period=_TURN)
     return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+
+
+def outline_places(angles: Floats) -> tuple[str, ...]:
+    """Names of places at polar angles (a,) rad."""
+    return tuple(f"outline at {deg:.0f} deg" for deg in np.rad2deg(angles))
 
 
 def ray_points(outline: Floats, angles: Floats) -> Floats:

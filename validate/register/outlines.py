@@ -14,6 +14,7 @@ from validate.register.clock import SAME, around, with_clock
 from validate.register.draws import AnyDraw
 from validate.register.observation import (
     Deviation,
+    History,
     Role,
     Selection,
     Simulated,
@@ -22,18 +23,20 @@ from validate.register.observation import (
     nearest_sample,
 )
 from validate.register.outline_geometry import (
+    EVERY_TEN,
     angular_points,
     angular_weights,
     enclosed,
     normal_distances,
     normals,
+    outline_places,
     polar_angles,
     ray_points,
 )
 from validate.register.plane import SurfaceSampler, from_image, require_rigid, section
 
 _TINY = np.finfo(float).tiny
-_ANGLES = np.deg2rad(np.arange(0.0, 360.0, 10.0))
+_ANGLES = EVERY_TEN
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,19 @@ class OutlineObservation:
         pairs = zip(self.t.tolist(), self.outlines, strict=True)
         off = [ray_points(self.simulated(field_at(run, t)), polar_angles(o)) - o for t, o in pairs]
         return np.concatenate(off).ravel()
+
+    def history(self, run: Simulated) -> History:
+        """Displacements since rest at equal polar angles about the outlines' own centroids."""
+        times = self.t.tolist()
+        sections = [self.simulated(field_at(run, t)) for t in times]
+        still = self.simulated(field_at(run, self.rest)), self.measured(self.rest)
+        simulated, measured = (
+            np.array([_moved(start, one, _ANGLES) for one in outlines])
+            for start, outlines in zip(still, (sections, self.outlines), strict=True)
+        )
+        return History(
+            self.name, self.t, outline_places(_ANGLES), measured, simulated, "m", self.sd
+        )
 
     def anew(self, left: Floats, draw: AnyDraw) -> "OutlineObservation":
         """The outlines where `left` (2 k,) m has them; clock and noise (along normals) drawn."""

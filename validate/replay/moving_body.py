@@ -28,14 +28,13 @@ from validate.replay.method import Method
 from validate.replay.motion_exhibit import motion_exhibit
 from validate.replay.moving_seen import (
     FIRST,
-    motion_of,
     moving_markers,
     place_moving,
     preload,
     started,
     without_rest,
 )
-from validate.replay.recorded_motion import RecordedMotion
+from validate.replay.recorded_motion import RecordedMotion, motion_of
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
 from validate.solve.explicit_linear import ExplicitLinear
@@ -111,7 +110,6 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
         sets=_sets,
         identify=partial(_identify, build=build, folder=folder),
         follows=following,
-        exhibits=motion_exhibit,
         uncertainty=uncertainty,
         frames=200,
     )
@@ -120,12 +118,19 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
 def following(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
 ) -> Experiment:
-    """Charts follow the axis of the largest recorded motion, where something moved."""
+    """Charts follow the axis of the largest recorded motion, where something moved; an exhibit
+    shows that motion."""
     try:
-        axis = motion_of(recordings[0], p.seen.markers).axis
+        shown = motion_of(recordings[0], judged(p))
     except ValidateError:
         return experiment
-    return replace(experiment, axis=axis)
+    axis = shown.axis if p.seen.markers else experiment.axis
+    return replace(experiment, axis=axis, exhibits=partial(motion_exhibit, shown=shown))
+
+
+def judged(p: MeasuredBody) -> str | None:
+    """The topic whose motion a report describes: that of what is judged."""
+    return p.seen.markers or p.seen.outline or p.seen.force
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -188,7 +193,7 @@ def _identify(
             "material.E is not set: of a motion in time the modulus must be known; set it, or "
             "identify it on a static log"
         )
-    shown = motion_of(recordings[0], p.seen.markers)
+    shown = motion_of(recordings[0], judged(p))
     first = _first_of(recordings[0], p, methods, build)
     headline = f"dynamic: {against_mode(shown, first)}"
     seen = f"Recorded motion: {shown.words()}."
@@ -224,7 +229,7 @@ def _ring_down(
     that window served for it."""
     window = float(p.motion.fit_window or 0.0)
     begun = started(recording, replace(p, motion=replace(p.motion, length=window)))
-    found = motion_of(begun.recording, p.seen.markers).ringing
+    found = motion_of(begun.recording, judged(p)).ringing
     if found is None or found.damping <= 0:
         raise ComparisonError(
             f"motion.fit_window = {window:g} s: no ring-down is found in it (three periods or more "

@@ -33,7 +33,7 @@ from validate.replay.measured_drive import (
 )
 from validate.replay.measured_markers import BodyAt, markers_topic, registered
 from validate.replay.measured_outline import observed_outline
-from validate.replay.recorded_motion import RecordedMotion, recorded_motion
+from validate.replay.recorded_motion import motion_of
 from validate.scene.scene import Scene
 
 FILM = "film"  # the label of outlines
@@ -55,24 +55,6 @@ class Started:
     rest: int
     sd_t: float
     noise: float
-
-
-def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
-    """The motion of the markers of a topic (none: the only one), or of a signal in m.
-
-    Raises `ComparisonError` where there are none, or nothing moves.
-    """
-    if topic is None and recording.markers:
-        topic = next(iter(recording.markers))
-    if topic in recording.markers:
-        seen = recording.marker(str(topic))
-        named = {name: seen.x[:, j] for j, name in enumerate(seen.names)}
-        return recorded_motion(seen.t, named, seen.sd)
-    lengths = {t: s for t, s in recording.signals.items() if s.unit == "m"}
-    if not lengths:
-        raise ComparisonError(f"{recording.name}: no markers and no signal in m; nothing moves")
-    name, signal = next(iter(lengths.items()))
-    return recorded_motion(signal.t, {name: signal.y[:, :1]}, signal.sd)
 
 
 def started(recording: Recording, p: MeasuredBody) -> Started:

@@ -1,19 +1,23 @@
 """What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
-first principal axis of its displacements). From it and the first natural frequency of the body
+first principal axis of its displacements); of outlines that of their places at every 10 degrees
+about the centroid, of a signal that of its channels. From it and the body's first natural frequency
 follows whether inertia matters: statics answers at once, and is off by (f / f_1)^2 of what moves at
 f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first mode.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.ringing import Ringing, ringing, spectrum
+from validate.recording.types import Contours, Markers, Recording, Signal
+from validate.register.outline_geometry import EVERY_TEN, angular_points, outline_places
+from validate.report.numbers import with_unit
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
@@ -29,7 +33,8 @@ _AXES = "xyz"
 @dataclass(frozen=True)
 class RecordedMotion:
     """Displacements `y` (nt,) m at `t` (nt,) s of `marker` along `direction` (d,), since the first
-    sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz.
+    sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz. Of a
+    signal, which is a "marker" of its own, y and noise are in its `unit`.
 
     `rests_from` s is where it rests until the end (None: nowhere), `starts` s its last instant of
     rest before it moves, `drift` m from the first to the last sample, `gap` s the longest interval
@@ -49,6 +54,7 @@ class RecordedMotion:
     gaps: int
     missing: float
     ringing: Ringing | None
+    unit: str = "m"
 
     @property
     def axis(self) -> str:
@@ -57,7 +63,7 @@ class RecordedMotion:
 
     @property
     def size(self) -> float:
-        """Peak to peak, m."""
+        """Peak to peak of the whole recording, noise included, m."""
         return float(np.ptp(self.y))
 
     @property
@@ -68,6 +74,17 @@ class RecordedMotion:
     def rate(self) -> float:
         """Samples a second."""
         return float(1 / np.median(np.diff(self.t)))
+
+    @property
+    def rests(self) -> str:
+        """When it is at rest, in words."""
+        usual = 1 / self.rate
+        first = f"at rest until {self.starts:.3g} s"
+        if self.starts - self.t[0] < _GAP * usual:
+            first = "in motion from the first sample on"
+        if self.rests_from is None:
+            return f"{first}, not at rest at the end"
+        return f"{first}, at rest from {self.rests_from:.3g} s to the end"
 
     def above(self, frequency: float) -> float:
         """Rms m of what moves at this frequency Hz or faster, less what noise explains there."""
@@ -93,18 +110,50 @@ class RecordedMotion:
     def words(self) -> str:
         """The facts in one sentence."""
         along = ", ".join(f"{x:+.2f}" for x in self.direction)
-        f = f"{self.frequency:.3g} Hz (resolved to {self.resolution:.2g} Hz)"
-        rest = (
-            "nowhere at rest"
-            if self.rests_from is None
-            else f"at rest from {self.rests_from:.3g} s"
-        )
+        way = f" along ({along})" if len(self.direction) > 1 else ""
+        f = f"mostly at {self.frequency:.3g} Hz (resolved to {self.resolution:.2g} Hz)"
         return (
-            f"'{self.marker}' moves most, {1e3 * self.size:.3g} mm peak to peak along ({along}), "
-            f"mostly at {f}; {rest}, {1e3 * self.drift:+.2g} mm from first to last, "
+            f"'{self.marker}' {'moves' if self.unit == 'm' else 'changes'} most, "
+            f"{with_unit(self.size, self.unit)} peak to peak{way}, "
+            f"{f if self.resolution else 'too few samples for a spectrum'}; {self.rests}; "
+            f"{with_unit(self.drift, self.unit, 2)} from first to last sample; "
             f"{self.rate:.4g} samples a second, {self.gaps} gaps (longest {self.gap:.3g} s), "
             f"{100 * self.missing:.2g} % missing"
         )
+
+
+def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
+    """The motion of a topic; none: of the first markers, else signal in m, else outlines.
+
+    Raises `ComparisonError` where there are none, or nothing moves.
+    """
+    if topic is None:
+        lengths = [t for t, s in recording.signals.items() if s.unit == "m"]
+        topics = (*recording.markers, *lengths, *recording.contours)
+        if not topics:
+            raise ComparisonError(
+                f"{recording.name}: no markers, no signal in m and no outlines; nothing moves"
+            )
+        topic = topics[0]
+    if topic not in recording.streams:
+        raise ComparisonError(f"no stream '{topic}'; it has {sorted(recording.streams)}")
+    return motion_in(topic, recording.streams[topic])
+
+
+def motion_in(topic: str, stream: object) -> RecordedMotion:
+    """The motion of one stream; raises `ComparisonError` for images, and where nothing moves."""
+    if isinstance(stream, Markers):
+        named = {name: stream.x[:, j] for j, name in enumerate(stream.names)}
+        return recorded_motion(stream.t, named, stream.sd)
+    if isinstance(stream, Signal):
+        names = (topic, *(f"{topic}, channel {c + 1}" for c in range(1, stream.y.shape[1])))
+        named = {name: stream.y[:, [c]] for c, name in enumerate(names)}
+        return replace(recorded_motion(stream.t, named, stream.sd), unit=stream.unit)
+    if isinstance(stream, Contours):
+        places = np.array([angular_points(o, EVERY_TEN) for o in stream.outlines])
+        named = dict(zip(outline_places(EVERY_TEN), places.transpose(1, 0, 2), strict=True))
+        return recorded_motion(stream.t, named, stream.sd)
+    raise ComparisonError(f"'{topic}': images show no motion by themselves; find outlines in them")
 
 
 def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) -> RecordedMotion:
