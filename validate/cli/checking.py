@@ -9,6 +9,7 @@ from validate.cli.chosen import each
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table, warn
 from validate.cli.progress import progress
 from validate.compare.result import KINDS, Result
+from validate.replay.described_motion import described
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import run_folder
 from validate.replay.options import Options
@@ -32,9 +33,13 @@ def check(
         if content is None:
             with progress(f"check {experiment.name}") as report:
                 content = _content(compare(experiment, Options({}), report))
-        found.append(_document(content, declared=bool(experiment.published)))
+        motion = described(experiment)
+        held = _document(content, declared=bool(experiment.published))
+        found.append({**held, "motion": motion})
         if not as_json:
             _print(content)
+            for line in motion:
+                say(line, indent="  ")
         return bool(found[-1]["holds"])
 
     def failed(name: str, why: str) -> None:

@@ -1,23 +1,41 @@
-"""`validate inspect`: what a recording holds; loads what reads the file and nothing else."""
+"""`validate inspect`: what a recording holds, and how it moves."""
 
 import json
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.display import say, table
+from validate.errors import ValidateError
 from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
+from validate.recording.readers import named, recognised
+from validate.report.motion_words import motion_lines
 
 
 def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> int:
     """Print what a file of any format holds; return 1 where it has a defect, else 0."""
-    found = inspect_file(file, kind, pairs(mapping, "--map"))
+    options = pairs(mapping, "--map")
+    found = inspect_file(file, kind, options)
+    motion = _motion(file, kind, options)
     if as_json:
-        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        print(json.dumps({**found.to_dict(), "motion": motion}, indent=2, allow_nan=False))
     else:
         _print(found)
+        for line in motion:
+            say(line, indent="  ")
     return FAILED if found.defects else OK
+
+
+def _motion(file: Path, kind: str | None, options: Mapping[str, str]) -> tuple[str, ...]:
+    """Lines on what moves; none of a file that cannot be read as a recording, as its inspection
+    says."""
+    try:
+        reader = named(kind) if kind else recognised(file)
+        return motion_lines(reader.read(file, options))
+    except ValidateError:
+        return ()
 
 
 def messages(file: Path, topic: str, most: int, as_json: bool) -> None:

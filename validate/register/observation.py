@@ -171,15 +171,6 @@ class History:
 
 
 @runtime_checkable
-class OverTime(Observation, Protocol):
-    """An observation that has a history of named quantities."""
-
-    def history(self, run: Simulated) -> History | None:
-        """None where the run says nothing of it."""
-        ...
-
-
-@runtime_checkable
 class Drawable(Observation, Protocol):
     """An observation that can be made anew, as a perfect model would have it."""
 
@@ -190,6 +181,15 @@ class Drawable(Observation, Protocol):
     def anew(self, left: Floats, draw: AnyDraw) -> Observation:
         """What would have been measured where exact readings are `left` off the samples, with
         noise, registration and clock drawn as declared."""
+        ...
+
+
+@runtime_checkable
+class OverTime(Drawable, Protocol):
+    """An observation that has a history of named quantities."""
+
+    def history(self, run: Simulated) -> History | None:
+        """None where the run says nothing of it."""
         ...
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial.distance import cdist
 
 from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
@@ -24,8 +23,10 @@ from validate.register.observation import (
 )
 from validate.register.outline_geometry import (
     EVERY_TEN,
+    along_normals,
     angular_points,
     angular_weights,
+    at_normals,
     enclosed,
     normal_distances,
     normals,
@@ -91,7 +92,7 @@ class OutlineObservation:
         evenly in polar angle; to first order what the wall's own displacement along them is."""
         still = self.simulated(np.zeros((self.wall.rows.weights.shape[1], 3)))
         places = ray_points(still, np.linspace(0, 2 * np.pi, count, endpoint=False))
-        places, across = _at_normals(still, places)
+        places, across = at_normals(still, places)
         rows = self.wall.rows_at(from_image(self.pose, places))
         directions = across @ self.pose[:3, :2].T
         away = np.array([normal_distances(o, places) for o in self.outlines])
@@ -118,12 +119,12 @@ class OutlineObservation:
         return np.concatenate(off).ravel()
 
     def history(self, run: Simulated) -> History:
-        """Displacements since rest at equal polar angles about the outlines' own centroids."""
-        times = self.t.tolist()
-        sections = [self.simulated(field_at(run, t)) for t in times]
+        """Displacements since rest along the normals at places of the outline at rest, at equal
+        polar angles about its centroid."""
+        sections = [self.simulated(field_at(run, t)) for t in self.t.tolist()]
         still = self.simulated(field_at(run, self.rest)), self.measured(self.rest)
         simulated, measured = (
-            np.array([_moved(start, one, _ANGLES) for one in outlines])
+            along_normals(start, outlines, _ANGLES)
             for start, outlines in zip(still, (sections, self.outlines), strict=True)
         )
         return History(
@@ -245,15 +246,6 @@ class NormalDistances:
             sparse.kron(self.rows.weights[[i]], self.normals[[i]]) for i in range(len(self.normals))
         ]
         return sparse.csr_array(sparse.vstack(each))
-
-
-def _at_normals(outline: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """The outline's vertices nearest to points (m, 2) m, and the outward normals there."""
-    nearest = cdist(points, outline).argmin(axis=1)
-    across = normals(outline)
-    middle = enclosed(outline)[1]
-    outward = np.sign(((outline - middle) * across).sum(axis=1, keepdims=True))
-    return outline[nearest], (outward * across)[nearest]
 
 
 def _moved(start: Floats, end: Floats, angles: Floats) -> Floats:

@@ -19,11 +19,11 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.result import MethodResult
 from validate.errors import ValidateError
+from validate.identify.recorded_motion import RecordedMotion, recorded_motion
 from validate.identify.ringing import Ringing
 from validate.register.observation import History
 from validate.replay.first_modes import first_frequencies
 from validate.replay.followed import Followed
-from validate.replay.recorded_motion import RecordedMotion, recorded_motion
 from validate.report.numbers import with_unit
 
 Failed = Collection[str]  # quantities of checks, as force.rms

@@ -7,12 +7,13 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.errors import ValidateError
+from validate.identify.recorded_motion import FRACTION, RecordedMotion, recorded_motion
 from validate.identify.ringing import spectrum
 from validate.replay.experiment import Progress, Told
-from validate.replay.first_modes import first_frequencies
+from validate.replay.first_modes import assumed_density, first_frequencies
 from validate.replay.followed import MAIN, Cases, Followed
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.recorded_motion import FRACTION, RecordedMotion, recorded_motion
+from validate.report.motion_words import rests
 from validate.report.numbers import scale, shown_unit
 from validate.scene.scene import Scene
 
@@ -23,7 +24,8 @@ def motion_exhibit(p: MeasuredBody, cases: Cases, tell: Progress, *, shown: Reco
     """The recorded motion `shown`, and the runs of its marker where they are compared with it."""
     main = cases[MAIN]
     scene = next(iter(main.values())).scene
-    facts = _facts(shown, _modes(scene) if isinstance(scene, Scene) else ())
+    modes = _modes(scene) if isinstance(scene, Scene) else ()
+    facts = _facts(shown, modes, assumed_density(p))
     charts = (*_over_time(shown, main), *_spectrum(shown))
     words = f"'{shown.marker}' moves most; along its direction, in the recording's frame."
     return Told((Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),))
@@ -36,7 +38,7 @@ def _modes(scene: Scene) -> tuple[float, ...]:
         return ()
 
 
-def _facts(shown: RecordedMotion, modes: tuple[float, ...]) -> NumberTable:
+def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> NumberTable:
     along = ", ".join(f"{x:+.3f}" for x in shown.direction)
     way = f" along ({along})" if len(shown.direction) > 1 else ""
     rings, size, unit = shown.ringing, scale(shown.unit), shown_unit(shown.unit)
@@ -46,13 +48,13 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...]) -> NumberTable:
         ("samples a second", shown.rate, "Hz", ""),
         ("gaps", shown.gaps, "1", f"longest interval {shown.gap:.4g} s, "
                                   f"{100 * shown.missing:.2g} % of the samples missing"),
-        ("moves from", shown.starts, "s", shown.rests),
+        ("rests until", shown.rests_until, "s", rests(shown)),
         ("largest peak of the spectrum", shown.frequency, "Hz",
          f"resolved to {shown.resolution:.2g} Hz"),
         ("ring-down, frequency", rings.frequency if rings else None, "Hz",
          f"damping {rings.damping:.3g} (sd {rings.damping_sd:.1g})" if rings else "none seen"),
-        *((f"natural frequency {i}", f, "Hz", "of the body as it is held, undamped")
-          for i, f in enumerate(modes, 1)),
+        *((f"natural frequency {i}", f, "Hz", "of the body as it is held, undamped"
+           + (assumed and f", {assumed}")) for i, f in enumerate(modes, 1)),
     ]  # fmt: skip
     if modes:
         share = shown.above(FRACTION * modes[0]) / shown.size

@@ -18,11 +18,12 @@ from validate.estimate.kf_fem import KfFem
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
+from validate.identify.recorded_motion import RecordedMotion, motion_of
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import moved
 from validate.replay.experiment import Experiment, Identified, Input, StepLadder
-from validate.replay.first_modes import first_frequencies
+from validate.replay.first_modes import assumed_density, first_frequencies
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.method import Method
 from validate.replay.motion_exhibit import motion_exhibit
@@ -34,7 +35,7 @@ from validate.replay.moving_seen import (
     started,
     without_rest,
 )
-from validate.replay.recorded_motion import RecordedMotion, motion_of
+from validate.report.motion_words import motion_words
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
 from validate.solve.explicit_linear import ExplicitLinear
@@ -195,8 +196,8 @@ def _identify(
         )
     shown = motion_of(recordings[0], judged(p))
     first = _first_of(recordings[0], p, methods, build)
-    headline = f"dynamic: {against_mode(shown, first)}"
-    seen = f"Recorded motion: {shown.words()}."
+    headline = f"dynamic: {against_mode(shown, first, p)}"
+    seen = f"Recorded motion: {motion_words(shown)}."
     if p.motion.fit_window is not None:
         p, scores, note, names = _ring_down(recordings[0], p, folder, build, methods)
         return Identified(p, scores, (seen, note), headline, calibrated=names)
@@ -206,10 +207,13 @@ def _identify(
     return Identified(p, (), (seen,), headline)
 
 
-def against_mode(shown: RecordedMotion, first: float | None) -> str:
+def against_mode(shown: RecordedMotion, first: float | None, p: MeasuredBody) -> str:
     """The recorded frequency beside the body's first natural one, in words."""
     recorded = f"recorded motion mostly at {shown.frequency:.3g} Hz"
-    return recorded + (f", first mode of the body at {first:.3g} Hz" if first else "")
+    if not first:
+        return recorded
+    assumed = assumed_density(p)
+    return f"{recorded}, first mode of the body at {first:.3g} Hz{assumed and f' ({assumed})'}"
 
 
 def _first_of(
@@ -297,14 +301,14 @@ def doubting(
         return found
     first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
     if not shown.inertia_matters(first):
-        slow = f"Quasi-static: {against_mode(shown, first)}; inertia is small."
+        slow = f"Quasi-static: {against_mode(shown, first, p)}; inertia is small."
         return replace(found, notes=(*found.notes, slow)) if first else found
     why = (
-        f"statics, although inertia matters: {against_mode(shown, first)}; answer motion.how = "
+        f"statics, although inertia matters: {against_mode(shown, first, p)}; answer motion.how = "
         "dynamic in `validate new`"
     )
     headline = f"{why}; {found.headline}" if found.headline else why
-    seen = f"Recorded motion: {shown.words()}."
+    seen = f"Recorded motion: {motion_words(shown)}."
     return replace(
         found, headline=headline, doubts=(*found.doubts, why), notes=(*found.notes, seen)
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
+from validate.identify.recorded_motion import motion_of
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.register.clock import clock_sd
@@ -33,7 +34,6 @@ from validate.replay.measured_drive import (
 )
 from validate.replay.measured_markers import BodyAt, markers_topic, registered
 from validate.replay.measured_outline import observed_outline
-from validate.replay.recorded_motion import motion_of
 from validate.scene.scene import Scene
 
 FILM = "film"  # the label of outlines

@@ -1,10 +1,11 @@
 """What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
-first principal axis of its displacements); of outlines that of their places at every 10 degrees
-about the centroid, of a signal that of its channels. From it and the body's first natural frequency
-follows whether inertia matters: statics answers at once, and is off by (f / f_1)^2 of what moves at
-f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first mode.
+first principal axis of its displacements); of outlines that of places at every 10 degrees about the
+centroid, along their normals; of a signal that of its channels. From it and the body's first
+natural frequency follows whether inertia matters: statics answers at once, and is off by
+(f / f_1)^2 of what moves at f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first
+mode.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.ringing import Ringing, ringing, spectrum
 from validate.recording.types import Contours, Markers, Recording, Signal
-from validate.register.outline_geometry import EVERY_TEN, angular_points, outline_places
-from validate.report.numbers import with_unit
+from validate.register.outline_geometry import EVERY_TEN, along_normals, outline_places
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
@@ -36,9 +36,10 @@ class RecordedMotion:
     sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz. Of a
     signal, which is a "marker" of its own, y and noise are in its `unit`.
 
-    `rests_from` s is where it rests until the end (None: nowhere), `starts` s its last instant of
-    rest before it moves, `drift` m from the first to the last sample, `gap` s the longest interval
-    and `gaps` how many are longer than 1.5 usual ones, `missing` the share of samples without it.
+    It stands still from the first sample until `rests_until` s and from `rests_from` s to the last
+    one (None: not at all); `starts` s is the instant of rest that its first swing begins at. From
+    the first to the last sample it drifts by `drift` m. The longest interval is `gap` s, `gaps` are
+    longer than 1.5 usual ones, and in a share `missing` of the samples it was not seen.
     """
 
     marker: str
@@ -49,6 +50,7 @@ class RecordedMotion:
     frequency: float
     resolution: float
     starts: float
+    rests_until: float | None
     rests_from: float | None
     gap: float
     gaps: int
@@ -75,17 +77,6 @@ class RecordedMotion:
         """Samples a second."""
         return float(1 / np.median(np.diff(self.t)))
 
-    @property
-    def rests(self) -> str:
-        """When it is at rest, in words."""
-        usual = 1 / self.rate
-        first = f"at rest until {self.starts:.3g} s"
-        if self.starts - self.t[0] < _GAP * usual:
-            first = "in motion from the first sample on"
-        if self.rests_from is None:
-            return f"{first}, not at rest at the end"
-        return f"{first}, at rest from {self.rests_from:.3g} s to the end"
-
     def above(self, frequency: float) -> float:
         """Rms m of what moves at this frequency Hz or faster, less what noise explains there."""
         if self.resolution == 0 or frequency >= self.rate / 2:
@@ -106,20 +97,6 @@ class RecordedMotion:
                 found.damping > 3 * found.damping_sd
             )  # fmt: skip
         return self.above(FRACTION * first) > _SHARE * self.size
-
-    def words(self) -> str:
-        """The facts in one sentence."""
-        along = ", ".join(f"{x:+.2f}" for x in self.direction)
-        way = f" along ({along})" if len(self.direction) > 1 else ""
-        f = f"mostly at {self.frequency:.3g} Hz (resolved to {self.resolution:.2g} Hz)"
-        return (
-            f"'{self.marker}' {'moves' if self.unit == 'm' else 'changes'} most, "
-            f"{with_unit(self.size, self.unit)} peak to peak{way}, "
-            f"{f if self.resolution else 'too few samples for a spectrum'}; {self.rests}; "
-            f"{with_unit(self.drift, self.unit, 2)} from first to last sample; "
-            f"{self.rate:.4g} samples a second, {self.gaps} gaps (longest {self.gap:.3g} s), "
-            f"{100 * self.missing:.2g} % missing"
-        )
 
 
 def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
@@ -150,8 +127,8 @@ def motion_in(topic: str, stream: object) -> RecordedMotion:
         named = {name: stream.y[:, [c]] for c, name in enumerate(names)}
         return replace(recorded_motion(stream.t, named, stream.sd), unit=stream.unit)
     if isinstance(stream, Contours):
-        places = np.array([angular_points(o, EVERY_TEN) for o in stream.outlines])
-        named = dict(zip(outline_places(EVERY_TEN), places.transpose(1, 0, 2), strict=True))
+        moved = along_normals(stream.outlines[0], stream.outlines, EVERY_TEN)
+        named = dict(zip(outline_places(EVERY_TEN), moved.transpose(1, 0, 2), strict=True))
         return recorded_motion(stream.t, named, stream.sd)
     raise ComparisonError(f"'{topic}': images show no motion by themselves; find outlines in them")
 
@@ -177,8 +154,9 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     starts = _starts(t, y, found)
     return RecordedMotion(
         name, direction, t, y, found, frequency, resolution,
-        _released(t, y, starts, rings) if rings else starts, _rests(t, y, found),
-        float(steps.max()), int((steps > _GAP * usual).sum()), float(1 - seen.mean()), rings,
+        _released(t, y, starts, rings) if rings else starts, _still(t, y, found),
+        _rests(t, y, found), float(steps.max()), int((steps > _GAP * usual).sum()),
+        float(1 - seen.mean()), rings,
     )  # fmt: skip
 
 
@@ -250,6 +228,13 @@ def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
     at = np.arctan2(w * s - d * p, w * p + d * s) / w
     at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
     return float(max(starts + at, t[0]))
+
+
+def _still(t: Floats, y: Floats, noise: float) -> float | None:
+    """Until when it stays within a hundredth of the motion about its start, or within noise."""
+    away = np.abs(y - y[0]) > max(6 * noise, _STILL * np.ptp(y))
+    first = int(away.argmax())
+    return float(t[first - 1]) if first > 1 else None
 
 
 def _rests(t: Floats, y: Floats, noise: float) -> float | None:
