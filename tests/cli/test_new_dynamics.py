@@ -158,7 +158,8 @@ def test_what_rings_is_proposed_as_dynamic_and_its_questions_are_open(here: Path
     assert "motion.damping (damping: of the stiffness as a time" in said
     listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
     assert 'motion.how = "dynamic"' in listing[1]
-    assert "first mode of the body at 2.93 Hz: inertia matters" in listing[1]
+    assert "first mode of the body at 2.93 Hz (with an assumed density of 1000" in listing[1]
+    assert "inertia matters from 0.33 of it on" in listing[1]
 
 
 @pytest.mark.parametrize(("change", "why"), [

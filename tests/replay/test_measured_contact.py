@@ -188,6 +188,19 @@ def test_an_indenter_starts_above_the_middle_of_its_place(
     assert gaps.min() == pytest.approx(card.gap, abs=1e-9)
 
 
+def test_an_uncertain_gap_moves_no_instant_to_the_other_window(tmp_path: Path) -> None:
+    """Half of the way is a state of its own; what presses already is deeper everywhere."""
+    made = experiment(tmp_path, BLOCK, 0.0)
+    (log_,) = made.load(BLOCK, tmp_path)
+    windows = []
+    for gap in (0.0, -1e-6):
+        p = replace(BLOCK, seen=replace(BLOCK.seen, states=8), machine=Machine(0.0),
+                    indenter=replace(BLOCK.indenter, gap=gap))  # fmt: skip
+        scene = made.build(log_, p, made.methods["linear"].scene)
+        windows.append([len(s.t) for s in made.place(log_, p, scene).selections])
+    assert windows[0] == windows[1] == [4, 4]
+
+
 def test_a_quarter_has_the_force_of_the_whole(tmp_path: Path) -> None:
     """A tip a little off the middle presses a whole body, with cells as large."""
     forces = []

@@ -25,6 +25,7 @@ from validate.scene.scene import Scene
 LOW, HIGH = "low", "high"
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
 _FEWEST = 3  # instants of a window
+_TIE = 1e-9
 _AGAINST = 0.2  # of the farthest marker's way: so far back the mean of all may go
 
 
@@ -56,7 +57,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
         )
     still = [o.name for o in compared if not isinstance(o, SignalObservation)]
     return Registered(
-        (drive, *compared), _selections(p, drive, kind),
+        (drive, *compared), _selections(recording, p, drive, kind),
         Selection("rest", t[:1], of=(*still, drive.name)),  # a force is counted from there
         findings=findings,
     )  # fmt: skip
@@ -164,14 +165,20 @@ def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amou
 # --- windows --------------------------------------------------------------------------------------
 
 
-def _selections(p: MeasuredBody, drive: SignalObservation, kind: Kind) -> tuple[Selection, ...]:
+def _selections(
+    recording: Recording, p: MeasuredBody, drive: SignalObservation, kind: Kind
+) -> tuple[Selection, ...]:
     """The one state under gravity; else the instants up to `fit_to` of the largest load, on which
-    an open modulus is identified, and those beyond."""
+    an open modulus is identified, and those beyond. Loads count as they were recorded: an uncertain
+    gap or compliance moves no instant from one window to the other."""
     after = drive.t[1:]
     if kind == "weighs":
         return (Selection("loaded", after, "the last instant"),)
     size = np.linalg.norm(drive.y[1:], axis=1)
-    low = size <= p.seen.fit_to * size.max()
+    if drive.name in recording.signals:
+        signal = recording.signals[drive.name]
+        size = np.abs(np.interp(drive.t, signal.t, signal.y[:, 0]) - signal.y[0, 0])[1:]
+    low = size <= (1 + _TIE) * p.seen.fit_to * size.max()
     share = f"{100 * p.seen.fit_to:g} % of the largest load"
     return (
         _window(LOW, after[low], f"instants up to {share}"),

@@ -120,13 +120,16 @@ def following(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
 ) -> Experiment:
     """Charts follow the axis of the largest recorded motion, where something moved; an exhibit
-    shows that motion."""
+    shows that motion, but where a force alone is judged in statics."""
     try:
         shown = motion_of(recordings[0], judged(p))
     except ValidateError:
         return experiment
-    axis = shown.axis if p.seen.markers else experiment.axis
-    return replace(experiment, axis=axis, exhibits=partial(motion_exhibit, shown=shown))
+    if p.seen.markers:
+        experiment = replace(experiment, axis=shown.axis)
+    if shown.unit != "m" and p.motion.how == "static":
+        return experiment
+    return replace(experiment, exhibits=partial(motion_exhibit, shown=shown))
 
 
 def judged(p: MeasuredBody) -> str | None:
