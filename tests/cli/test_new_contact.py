@@ -10,10 +10,11 @@ from scipy.sparse.linalg import spsolve
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from tests.cli.test_new_body import called
+from tests.replay.machine_logs import machine_log
 from validate.arrays import Floats
 from validate.cli.new_contact import _first_touch
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Recording
 from validate.replay import compare
 from validate.replay.find import load_file
 
@@ -39,11 +40,7 @@ def log(power: float = 1.5) -> Recording:
     depth = np.linspace(-GAP, DEPTH, len(T))
     force = K * np.maximum(depth, 0.0) ** power
     force += np.random.default_rng(1).normal(0, 1e-3 * force.max(), len(T))
-    signals = {
-        "displacement": Signal(T, (GAP + depth)[:, None], "m", 0.0, "machine"),
-        "force": Signal(T, force[:, None], "N", 0.0, "machine"),
-    }
-    return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
+    return machine_log(T, GAP + depth, force)
 
 
 @pytest.mark.parametrize(("shape", "power"), [("sphere", 1.5), ("plate", 1.0)])
@@ -55,11 +52,7 @@ def test_the_first_touch_is_found_with_its_uncertainty(shape: str, power: float)
 
 
 def test_a_log_that_never_presses_has_no_first_touch() -> None:
-    quiet = log()
-    flat = Recording("log", quiet.source, 0, signals={
-        "displacement": quiet.signals["displacement"],
-        "force": Signal(T, np.zeros((len(T), 1)), "N", 0.0, "machine"),
-    })  # fmt: skip
+    flat = machine_log(T, log().signals["displacement"].y[:, 0], np.zeros(len(T)))
     assert _first_touch(flat, {"moved.by": "displacement"}, "sphere") is None
 
 
@@ -151,12 +144,7 @@ def test_a_cylinder_presses_with_the_force_of_another_code(
     depth = np.linspace(0.0, 2.5e-4, 26)
     force = line_contact(depth)
     t = np.linspace(0.0, 5.0, len(depth))
-    signals = {
-        "displacement": Signal(t, depth[:, None], "m", 0.0, "machine"),
-        "force": Signal(t, force[:, None], "N", 1e-6, "machine"),
-    }
-    write_recording(Recording("log", Source("x", "", 0, "x"), 0, signals=signals),
-                    tmp_path / "log.mcap")  # fmt: skip
+    write_recording(machine_log(t, depth, force, 1e-6), tmp_path / "log.mcap")
     (tmp_path / "a.toml").write_text(PRESSED, "utf-8")
     code, said = called("new", "bar", "--from", "log.mcap", "--answers", "a.toml")
     assert code == 0, said

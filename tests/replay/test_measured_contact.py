@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.replay.machine_logs import machine_log, on_a_body
 from validate.compare.result import Result
-from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Recording
 from validate.replay import compare
 from validate.replay.contact_cards import Indenter, Machine
 from validate.replay.experiment import Experiment
 from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_body import gridded, measured_body
+from validate.replay.measured_body import gridded
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -65,20 +65,12 @@ def log(compliance: float = C) -> Recording:
 
 
 def recorded(u: Any, F: Any) -> Recording:
-    signals = {
-        "displacement": Signal(T, u[:, None], "m", 0.0, "machine"),
-        "force": Signal(T, F[:, None], "N", NOISE, "machine"),
-    }
-    return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
+    return machine_log(T, u, F, NOISE)
 
 
 def experiment(folder: Path, p: MeasuredBody, compliance: float = C) -> Experiment:
-    write_recording(log(compliance), folder / "log.mcap")
-    made = measured_body(
-        "log", "log", "x", p, {"linear": touching("linear", "linear")}, ("linear",),
-        (Accept("force", 0.05, "of a test"),), folder,
-    )  # fmt: skip
-    return replace(made, path=folder / "log.py")
+    methods = {"linear": touching("linear", "linear")}
+    return on_a_body(folder, p, log(compliance), methods, {"force": 0.05})
 
 
 def verdicts(result: Result) -> set[tuple[str, str]]:
