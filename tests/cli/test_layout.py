@@ -13,7 +13,7 @@ import pytest
 from commands import here
 
 from validate.cli.arguments import complain
-from validate.cli.check_bars import check_blocks
+from validate.cli.check_bars import check_passages
 from validate.cli.layout import laid, width, wrapped
 from validate.compare.verdict import Check
 from validate.report.store import check_members
@@ -109,5 +109,5 @@ def test_a_check_that_nothing_bounds_is_a_row_all_the_same() -> None:
     check = Check("force", 1.0, 2.0, math.inf, 0.1, math.inf, 0.1, "N", 3, "no answer",
                   "undecided", "why")  # fmt: skip
     members = {"method": "fem", **check_members(check)}
-    (block,) = check_blocks([members])
+    (block,) = check_passages([members])
     assert block.lines == ("  force  ███████░░░░░░░│░░░░░>  1.00 ± no bound of 2.00 N  undecided",)

@@ -4,6 +4,7 @@ The recordings are those of `benchmarks/moving_bodies.py`.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,15 @@ from benchmarks.moving_bodies import written
 from validate.cli.main import cli
 from validate.cli.new_motion import damping, held
 from validate.compare.result import Result
-from validate.errors import UsageError
+from validate.errors import RegistrationError, UsageError
+from validate.recording.mcap.write import write_recording
+from validate.recording.readers import read_recording
 from validate.register.markers import MarkerObservation
 from validate.replay import compare
+from validate.replay.described_motion import described
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.followed import Followed
+from validate.replay.followed import MAIN, Followed
 from validate.replay.options import folder_of
 from validate.replay.solved import solve
 from validate.study.filters import study
@@ -182,7 +186,8 @@ def test_what_rings_is_proposed_as_dynamic_and_its_questions_are_open(here: Path
     assert "motion.damping (damping: of the stiffness as a time" in said
     listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
     assert 'motion.how = "dynamic"' in listing[1]
-    assert "first mode of the body at 2.93 Hz: inertia matters" in listing[1]
+    assert "first mode of the body at 2.93 Hz (with an assumed density of 1000" in listing[1]
+    assert "inertia matters from 0.33 of it on" in listing[1]
 
 
 @pytest.mark.parametrize(("change", "why"), [
@@ -241,6 +246,42 @@ def test_identified_damping_is_fitted_and_only_later_is_evidence(here: Path) -> 
     assert labels == {"first": 240, "later": 110}
 
 
+def test_an_assumed_density_is_said_where_it_makes_a_frequency(here: Path) -> None:
+    """Statics asks for none: 1000 kg/m3 in place of the true 1050."""
+    changes = (STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""))
+    assert new(here, "pushed", *changes)[0] == 0
+    words = "first mode of the body at 2.93 Hz (with an assumed density of 1000 kg/m3, near that"
+    listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
+    assert words in listing[1]
+    mine = experiment(here)
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    assert mine.identify is not None
+    assert words in mine.identify(recordings, mine.parameters, mine.methods).headline
+    assert "of the body: 2.93, 2.94, 15.1 Hz (with an assumed density" in described(mine)[-1]
+    p = replace(mine.parameters, material=replace(mine.parameters.material, rho=1050.0))
+    assert "assumed" not in "".join(described(replace(mine, parameters=p)))
+
+
+def test_millimetres_declared_as_metres_are_doubted_with_the_command(here: Path) -> None:
+    """`new` and `run` name the factor, and the command makes a recording that is good."""
+    true = read_recording(here / "pushed.mcap")
+    wide = true.markers["markers"]
+    wide = replace(wide, x=1000 * wide.x, sd=1000 * wide.sd)
+    write_recording(replace(true, markers={"markers": wide}), here / "wide.mcap")
+    (here / "wide.toml").write_bytes((here / "pushed.toml").read_bytes())
+    code, said = new(here, "wide")
+    assert code == 0
+    doubt = "markers span 60 m, the body is 0.12 m: mm declared as m, a factor 1000? `validate "
+    assert f"{doubt}import wide.mcap --map unit=mm -o NEW.mcap`" in said
+    with pytest.raises(RegistrationError, match=r"'tip' by 121938.* a factor 1000") as refused:
+        run(experiment(here), "modal")
+    assert "stalks" not in str(refused.value)
+    assert called("import", "wide.mcap", "--map", "unit=mm", "-o", "narrow.mcap")[0] == 0
+    narrow = read_recording(here / "narrow.mcap")
+    np.testing.assert_allclose(narrow.markers["markers"].x, true.markers["markers"].x, atol=1e-12)
+    assert narrow.metadata["taken_as"] == {"markers": "declared in m, taken as mm"}
+
+
 def judged(result: Result) -> set[tuple[str, str]]:
     return {(c.validation, c.acceptance) for c in result.checks}
 
@@ -280,3 +321,36 @@ def test_large_strain_agrees_where_strains_are_small(here: Path) -> None:
     mine = experiment(here)
     assert mine.accepted == ("large",)
     assert off(run(mine, "large")) < 1.5e-4
+
+
+@pytest.mark.slow
+def test_statics_of_a_film_alone_names_inertia_first(here: Path) -> None:
+    """No marker is judged: the outline's motion has causes, too."""
+    changes = (
+        STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""),
+        ('layout = "as seen", still = "0.2s"', 'markers = "none"'), (', marker = "0.5mm"', ""),
+        (', marker = "a fifteenth of the swing, peak to peak"', ""),
+    )  # fmt: skip
+    assert new(here, "filmed", *changes)[0] == 0
+    result = compare(experiment(here))
+    assert "Likely causes, in order: inertia" in result.sentence
+    causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0]
+    assert {row[1] for row in causes.rows} == {"outline"}
+
+
+def test_a_report_has_one_largest_motion_and_says_where_it_rests(here: Path) -> None:
+    """Note and exhibit are of the whole recording, which begins at rest and ends in motion."""
+    new(here, "pushed")
+    mine = experiment(here)
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    assert mine.identify is not None
+    (note,) = mine.identify(recordings, mine.parameters, mine.methods).notes
+    followed = mine.follows(mine, recordings, mine.parameters)
+    cases = {MAIN: {"modal": run(mine, "modal")}}
+    (shown,) = followed.exhibits(mine.parameters, cases, lambda *_: None).exhibits
+    facts = {row[0]: row for row in shown.tables[0].rows}
+    largest = facts["largest motion, peak to peak"][1]
+    assert f"{largest:.3g} mm peak to peak" in note
+    for words in (note, facts["rests until"][3]):
+        assert "at rest until 0.265 s, not at rest at the end" in words
+    assert [s.label for s in shown.charts[0].series] == ["measured", mine.methods["modal"].label]

@@ -14,7 +14,7 @@ from report_samples import CHECK, small_result
 
 from validate.cli.display import say
 from validate.cli.run_screen import show_run
-from validate.cli.screen import LINES, Block, bar, fitted, rows, show
+from validate.cli.screen import LINES, Passage, bar, fitted, rows, show
 
 PAGE = Path("report.html")
 
@@ -22,7 +22,7 @@ PAGE = Path("report.html")
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 4)), max_size=6))
 def test_blocks_share_a_screen_and_count_what_is_left_out(sizes: list[tuple[int, int]]) -> None:
     blocks = [
-        Block(f"block {i}", tuple(f"{i}.{k}" for k in range(n)), keep=keep)
+        Passage(f"block {i}", tuple(f"{i}.{k}" for k in range(n)), keep=keep)
         for i, (n, keep) in enumerate(sizes)
     ]
     found = fitted(blocks, LINES)
@@ -96,7 +96,7 @@ def test_a_run_ends_in_a_screen_with_the_worst_check_first(
 
 
 def test_quiet_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    show([Block("", ("one: good", "  enough")), Block("more", ("x",))], "short")
+    show([Passage("", ("one: good", "  enough")), Passage("more", ("x",))], "short")
     assert capsys.readouterr().out == "one: good enough\n"
 
 

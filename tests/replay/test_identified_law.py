@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.replay.machine_logs import machine_log, on_a_body
 from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Recording
 from validate.replay import compare
 from validate.replay.compression import compression, pressed
 from validate.replay.compression_cards import (
@@ -28,7 +29,7 @@ from validate.replay.compression_cards import (
 )
 from validate.replay.experiment import Experiment
 from validate.replay.fitted_moduli import Moves, sentence
-from validate.replay.measured_body import measured_body, solid
+from validate.replay.measured_body import solid
 from validate.replay.measured_cards import (
     HeldAt,
     MeasuredBody,
@@ -76,11 +77,7 @@ def log(noise: float, *, large: bool, seed: int = 0) -> Recording:
     curve = uniaxial(grid) if large else E * AREA * grid
     force = np.interp(strain, grid, curve) + 0.3
     force = force + np.random.default_rng(seed).normal(0.0, noise, len(t))
-    signals = {
-        "displacement": Signal(t, (strain * HEIGHT)[:, None], "m", 0.0, "machine"),
-        "force": Signal(t, force[:, None], "N", 0.0, "machine"),
-    }
-    return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
+    return machine_log(t, strain * HEIGHT, force)
 
 
 def experiment(folder: Path, seen: Recording, **ranges: float) -> Experiment:
@@ -196,24 +193,15 @@ def test_a_body_s_modulus_is_its_own_law_s(tmp_path: Path) -> None:
     strain = 0.1 * np.clip((t - 0.5) / 5.0, 0.0, 1.0)
     force = uniaxial(strain) * size[0] * size[1] / AREA
     force = force + np.random.default_rng(5).normal(0.0, 2e-3, len(t))
-    signals = {
-        "displacement": Signal(t, (strain * HEIGHT)[:, None], "m", 0.0, "machine"),
-        "force": Signal(t, force[:, None], "N", 2e-3, "machine"),
-    }
-    source = Source("x", "", 0, "x")
-    write_recording(Recording("body", source, 0, signals=signals), tmp_path / "body.mcap")
     parameters = MeasuredBody(
         "body.mcap", Solid(block=size, cells=4), Tissue(None, NU),
         HeldAt(x="xmin", y="ymin", z="zmin"),
         MovedBy("displacement", "zmax", "-z", sideways=False),
         SeenOf(force="force", states=16, still=0.4),
     )  # fmt: skip
-    made = measured_body(
-        "body", "body", "x", parameters,
-        {"solid": solid("neo-Hooke"), "linear": solid("linear", "linear")}, ("solid", "linear"),
-        (Accept("force", 0.1, "test"),), tmp_path,
-    )  # fmt: skip
-    result = compare(replace(made, path=tmp_path / "body.py"))
+    seen = machine_log(t, strain * HEIGHT, force, 2e-3)
+    methods = {"solid": solid("neo-Hooke"), "linear": solid("linear", "linear")}
+    result = compare(on_a_body(tmp_path, parameters, seen, methods, {"force": 0.1}))
     found = values(result)
     assert found["solid"].value == pytest.approx(E, rel=0.01)
     assert found["linear"].value > 1.02 * E

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.replay.machine_logs import machine_log, on_a_body
 from validate.compare.result import Result
-from validate.compare.verdict import Accept
 from validate.errors import (
     ComparisonError,
     RecordingError,
@@ -20,7 +20,6 @@ from validate.errors import (
     UsageError,
 )
 from validate.parameters import with_values
-from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
 from validate.register.fitting import MarkerFit
 from validate.replay import (
@@ -33,7 +32,7 @@ from validate.replay import (
 )
 from validate.replay import measured_body as measured_body_module
 from validate.replay.experiment import Experiment
-from validate.replay.measured_body import body_of, gridded, measured_body, solid
+from validate.replay.measured_body import body_of, gridded, solid
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -81,8 +80,7 @@ def stretched(x: Any) -> Any:
 def log() -> dict[str, Signal]:
     d = 1e-3 * np.clip((T - 0.5) / 3.0, 0, 1)
     force = E * SIZE[0] * SIZE[1] * d / SIZE[2] + np.random.default_rng(1).normal(0, 2e-3, len(T))
-    return {"displacement": Signal(T, d[:, None], "m", 0.0, "machine"),
-            "force": Signal(T, force[:, None], "N", 2e-3, "machine")}  # fmt: skip
+    return dict(machine_log(T, d, force, 2e-3).signals)
 
 
 BASE = MeasuredBody(
@@ -95,13 +93,9 @@ BASE = MeasuredBody(
 def experiment(
     folder: Path, parameters: MeasuredBody, seen: Recording, *names: str, order: int = 1
 ) -> Experiment:
-    write_recording(seen, folder / "body.mcap")
     limits = {"force": 0.1, "marker": 1e-4, "contour": 4e-4}
-    made = measured_body(
-        "body", "body", "x", parameters, {"linear": solid("linear", "linear", order)}, ("linear",),
-        tuple(Accept(n, limits[n], "of a test") for n in names), folder,
-    )  # fmt: skip
-    return replace(made, path=folder / "body.py")
+    methods = {"linear": solid("linear", "linear", order)}
+    return on_a_body(folder, parameters, seen, methods, {n: limits[n] for n in names})
 
 
 def verdicts(result: Result) -> dict[str, str]:
@@ -113,6 +107,16 @@ def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
     assert verdicts(result) == {"force.max@low": "good enough", "force.max@high": "good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["force.rms@high"] < 4e-3  # noise alone
+
+
+def test_a_force_that_differs_has_likely_causes(tmp_path: Path) -> None:
+    """Under a displacement it is the modulus: the given one is half of the true one."""
+    soft = replace(BASE, material=replace(BASE.material, E=E / 2))
+    result = compare(experiment(tmp_path, soft, recording(signals=log()), "force"))
+    assert "Likely causes, in order: load or modulus" in result.sentence
+    assert "measured is 2 times simulated, everywhere and always: as if the modulus were" in (
+        result.sentence
+    )
 
 
 def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> None:
@@ -502,7 +506,7 @@ def test_a_body_that_is_not_driven_or_cannot_be_squeezed_has_no_ladder(
 
 def moved_by(*names: str, noted: tuple[float, ...] = ()) -> SimpleNamespace:
     seen = SimpleNamespace(markers="m", still=0.5, layout="a.fcsv", outline="o")
-    moved = SimpleNamespace(markers=names, noted=noted, scale=1.0)
+    moved = SimpleNamespace(by="markers", markers=names, noted=noted, scale=1.0)
     return SimpleNamespace(seen=seen, moved=moved)
 
 
@@ -558,12 +562,11 @@ def test_a_layout_without_the_recorded_names_and_markers_that_all_drive(
         RegistrationError, match=r"a.fcsv has 'Left'; the recording has 'left', 'right'"
     ):
         measured_markers.registered(recording, moved_by(), (None, Path()))  # type: ignore[arg-type]
-    monkeypatch.setattr(measured_seen, "registered", lambda *_: rest)
-    monkeypatch.setattr(measured_seen, "rested", lambda *_: (rest, (), 3))
+    monkeypatch.setattr(measured_markers, "registered", lambda *_: rest)
     with pytest.raises(
         ComparisonError, match="every marker moves the body: none is left to be comp"
     ):
-        measured_seen._markers(recording, moved_by(*names), "follows", None)  # type: ignore[arg-type]
+        measured_markers.compared_markers(recording, moved_by(*names), None)  # type: ignore[arg-type]
 
 
 def test_outlines_need_triangles_and_an_open_modulus_a_force(

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.replay.machine_logs import machine_log, on_a_body
 from validate.compare.result import Result
-from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build
 from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Recording
 from validate.replay import compare
 from validate.replay.contact_cards import Indenter, Machine
 from validate.replay.experiment import Experiment
 from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_body import gridded, measured_body
+from validate.replay.measured_body import gridded
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -65,20 +65,12 @@ def log(compliance: float = C) -> Recording:
 
 
 def recorded(u: Any, F: Any) -> Recording:
-    signals = {
-        "displacement": Signal(T, u[:, None], "m", 0.0, "machine"),
-        "force": Signal(T, F[:, None], "N", NOISE, "machine"),
-    }
-    return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
+    return machine_log(T, u, F, NOISE)
 
 
 def experiment(folder: Path, p: MeasuredBody, compliance: float = C) -> Experiment:
-    write_recording(log(compliance), folder / "log.mcap")
-    made = measured_body(
-        "log", "log", "x", p, {"linear": touching("linear", "linear")}, ("linear",),
-        (Accept("force", 0.05, "of a test"),), folder,
-    )  # fmt: skip
-    return replace(made, path=folder / "log.py")
+    methods = {"linear": touching("linear", "linear")}
+    return on_a_body(folder, p, log(compliance), methods, {"force": 0.05})
 
 
 def verdicts(result: Result) -> set[tuple[str, str]]:
@@ -186,6 +178,19 @@ def test_an_indenter_starts_above_the_middle_of_its_place(
     assert at == pytest.approx([SIZE[0] / 2, SIZE[1] / 2, start], abs=1e-9)
     gaps = part.shape.gap(mesh.nodes[np.isclose(mesh.nodes[:, 2], SIZE[2])])
     assert gaps.min() == pytest.approx(card.gap, abs=1e-9)
+
+
+def test_an_uncertain_gap_moves_no_instant_to_the_other_window(tmp_path: Path) -> None:
+    """Half of the way is a state of its own; what presses already is deeper everywhere."""
+    made = experiment(tmp_path, BLOCK, 0.0)
+    (log_,) = made.load(BLOCK, tmp_path)
+    windows = []
+    for gap in (0.0, -1e-6):
+        p = replace(BLOCK, seen=replace(BLOCK.seen, states=8), machine=Machine(0.0),
+                    indenter=replace(BLOCK.indenter, gap=gap))  # fmt: skip
+        scene = made.build(log_, p, made.methods["linear"].scene)
+        windows.append([len(s.t) for s in made.place(log_, p, scene).selections])
+    assert windows[0] == windows[1] == [4, 4]
 
 
 def test_a_quarter_has_the_force_of_the_whole(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ def test_a_cut_shows_the_whole_section() -> None:
         ROD.mesh,
         still,
         (),
+        (),
         None,
         None,
         (0.0, 0.0),

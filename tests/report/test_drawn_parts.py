@@ -12,11 +12,12 @@ from report_samples import small_result
 from validate.compare.effects import Change, Effect
 from validate.recording.types import Recording, Source
 from validate.report import curves, cut, markers, outlines
-from validate.report.body import shown_body
+from validate.report.body import ShownIndenter, shown_body
 from validate.report.discrimination import _budget
 from validate.report.provenance import _assumed, _metadata, _points
 from validate.report.registration import _residuals
-from validate.report.renders import _fill, _View, renders
+from validate.report.renders import _fill, _View, drawn_indenter, renders
+from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere, Shape
 
 
 class Plotter:
@@ -176,3 +177,19 @@ def test_what_was_assumed_of_a_file_stands_apart_and_unfolded() -> None:
     assumed = _assumed(recording)
     assert (assumed.rows, assumed.folded) == ((("test", "tension: said by the user"),), False)
     assert _metadata(recording).rows == (("header", "a", "b"),)
+
+
+@pytest.mark.parametrize(("shape", "low", "high"), [
+    (RigidSphere((0.0, 0.0, 0.02), 0.005), (-5, -5, 15), (5, 5, 25)),
+    (RigidCylinder((0.0, 0.0, 0.02), (0.0, 1.0, 0.0), 0.005), (-5, -12, 15), (5, 12, 25)),
+    (RigidPunch((0.0, 0.0, 0.015), (0.0, 0.0, -1.0), 0.005), (-5, -5, 15), (5, 5, 20)),
+    (RigidPlane((0.0, 0.0, 0.015), (0.0, 0.0, -1.0)), (-15, -15, 15), (15, 15, 16.5)),
+])  # fmt: skip
+def test_an_indenter_is_drawn_where_it_stands(
+    shape: Shape, low: tuple[float, ...], high: tuple[float, ...]
+) -> None:
+    """In mm; its lowest point touches at 15 mm, endless ones are a fifth longer than the body."""
+    drawn = drawn_indenter(ShownIndenter(shape, np.zeros(3), np.array([15.0, 20.0, 0.0])))
+    points = np.asarray(drawn.points)
+    np.testing.assert_allclose(points.min(axis=0), low, atol=0.02)
+    np.testing.assert_allclose(points.max(axis=0), high, atol=0.02)

@@ -1,4 +1,4 @@
-"""Bodies that touch rigid ones: pressed blocks, graded half-spaces, an inclined plane, a bar."""
+"""Bodies that touch rigid ones: pressed blocks, graded half-spaces, an inclined plane."""
 
 from itertools import pairwise
 
@@ -11,7 +11,6 @@ from validate.scene.contact import RigidContact, RigidPlane, Shape
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene, Support, Weight
-from validate.scene.select import InBox
 from validate.solve.types import Scheme, State
 
 E, NU = 1e4, 0.3
@@ -66,23 +65,6 @@ def on_a_slope(mesh: Mesh, angle: float, friction: float, gap: float = 0.0) -> S
     floor = RigidPlane((0.0, 0.0, -gap), (0.0, 0.0, 1.0))
     contacts = (RigidContact("floor", "z0", floor, friction=friction),)
     return build(Scene(mesh, Material(1e5, NU, rho=1000.0), loads=(fall,), contacts=contacts))
-
-
-LENGTH, CELLS, MODULUS, DENSITY = 0.1, 16, 1e5, 1000.0
-SPEED = float(np.sqrt(MODULUS / DENSITY))  # of sound m/s, without Poisson's effect
-
-
-def bar(mesh: Mesh, law: LawName = "linear") -> System:
-    """A free bar that can only move along z, above a plate that is pushed upward."""
-    plate = RigidPlane((0.0, 0.0, -1e-9), (0.0, 0.0, 1.0))
-    return build(
-        Scene(
-            mesh,
-            Material(MODULUS, 0.0, law, DENSITY),
-            (Support(InBox((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)).points, (0, 1)),),
-            contacts=(RigidContact("plate", "z0", plate, (0.0, 0.0, 1.0)),),
-        )
-    )
 
 
 def walked(scheme: Scheme, system: System, inputs: Floats) -> list[State]:

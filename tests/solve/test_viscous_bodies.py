@@ -18,7 +18,6 @@ from validate.fem.stretch_response import response
 from validate.fem.system import System, build
 from validate.fem.viscous import cell_branches
 from validate.scene.box import grid
-from validate.scene.contact import RigidContact, RigidPlane
 from validate.scene.material import Region
 from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import quadratic
@@ -218,9 +217,6 @@ def test_what_explicit_branches_do_not_have_is_refused() -> None:
     bricks = grid((SIDE, SIDE, SIDE), (2, 2, 2))
     with pytest.raises(SceneError, match="explicit hexahedra remember no stress"):
         CentralDifference().prepare(build(replace(system.scene, mesh=bricks, dilatation="mixed")))
-    floor = RigidContact("floor", "x1", RigidPlane((2 * SIDE, 0.0, 0.0), (-1.0, 0.0, 0.0)))
-    with pytest.raises(SceneError, match="explicit contact knows no Prony series"):
-        CentralDifference().prepare(build(replace(system.scene, contacts=(floor,))))
 
 
 def test_schemes_that_remember_nothing_refuse_a_series() -> None:

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from validate.cli import studying
 from validate.cli.main import run
+from validate.cli.screen import show
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.estimate import displacement_filter
 from validate.fem.factor import factorise
@@ -398,7 +399,7 @@ def test_a_row_of_the_front_in_its_own_units(
     assert told["rate / Hz"] == pytest.approx(2.5e5)
     assert told["error / mm"] == pytest.approx(2.0)
     assert told["of the motion / %"] == pytest.approx(0.2 / measured.moved)
-    studying._show_trade(found)
+    show(studying._trade_passages(found))
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines.count(["fast", "P1", "1", "2.00", "4.00"]) == 2
 
@@ -411,12 +412,12 @@ def test_a_ladder_has_the_error_of_its_rungs(
              Made(rung="large", verdict="nothing ran", best=None, evidence="none"))  # fmt: skip
     choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=(), excluded=())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(studying, "words", lambda choice: ())
-        studying._show_choice(choice)
-    told = capsys.readouterr().out.split("The ladder")[1]
-    modal, large = (next(x for x in told.splitlines() if x.startswith(r)) for r in ("mod", "lar"))
-    assert modal.split() == ["modal", "meets", "2.00", "one"]
-    assert "none" in large
+        patch.setattr(studying, "words", lambda choice: iter(["none"]))
+        show(studying._choice_passages(choice))
+    found = capsys.readouterr().out.split("Candidate methods")[1]
+    modal, large = (next(x for x in found.splitlines() if r in x) for r in ("modal", "large"))
+    assert modal.split() == ["modal", "2.00", "meets"]
+    assert large.split() == ["large", "–", "nothing", "ran"]
     assert "0.00" not in large
 
 

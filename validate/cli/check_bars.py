@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from validate.cli.display import error_shown
-from validate.cli.screen import Block, bar, legend, rows
+from validate.cli.screen import Passage, bar, legend, rows
 from validate.report.numbers import scale, shown_unit, significant
 
 Json = Mapping[str, Any]  # a check as in results.json, and the "method" that it is of
@@ -29,7 +29,7 @@ def _fraction(check: Json) -> float:
     return float(error / doubt) if doubt else 0.0
 
 
-def check_blocks(checks: Sequence[Json]) -> list[Block]:
+def check_passages(checks: Sequence[Json]) -> list[Passage]:
     """Requirements; and, where nothing is required, errors against their uncertainty."""
     several = len({c["method"] for c in checks}) > 1
     blocks = []
@@ -44,7 +44,7 @@ def check_blocks(checks: Sequence[Json]) -> list[Block]:
             cells = [row[:-1] for row in cells]
         title = f"Checks{common}, worst first ({legend(against)})"
         lines = rows([""] * len(cells[0]), cells)
-        blocks.append(Block(title, lines, 3, 8, "more, none of them worse: --verbose"))
+        blocks.append(Passage(title, lines, 3, 8, "more, none of them worse: --verbose"))
     return blocks
 
 

@@ -5,13 +5,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from validate.cli.check_bars import check_blocks
+from validate.cli.check_bars import check_passages
 from validate.cli.chosen import each
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
 from validate.cli.progress import progress
 from validate.cli.run_screen import figures_line
-from validate.cli.screen import Block, Detail, rows, sentence_lines, show
+from validate.cli.screen import Detail, Passage, rows, sentence_lines, show
 from validate.compare.result import KINDS, Result
+from validate.replay.described_motion import described
 from validate.replay.experiment import Experiment
 from validate.replay.named_run import run_folder
 from validate.replay.options import Options
@@ -41,7 +42,9 @@ def check(
         if content is None:
             with progress(f"check {experiment.name}") as report:
                 content = _content(compare(experiment, Options({}), report))
-        found.append(_document(content, declared=bool(experiment.published)))
+        motion = described(experiment)
+        held = _document(content, declared=bool(experiment.published))
+        found.append({**held, "motion": motion})
         if not as_json:
             _show(content, found[-1], detail)
         return bool(found[-1]["holds"])
@@ -127,15 +130,16 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
     full = detail == "full"
     show(
         (
-            Block("", sentence_lines(f"{content['experiment']}: {holds}; {', '.join(parts)}.")),
-            Block("", tuple(k for w in warnings for k in sentence_lines(f"warning: {w}", 2))),
-            Block("", tuple(k for w in known for k in sentence_lines(w, 2)), keep=1, most=4),
-            Block("", tuple(k for p in fallen for k in sentence_lines(
+            Passage("", sentence_lines(f"{content['experiment']}: {holds}; {', '.join(parts)}.")),
+            Passage("", tuple(k for w in warnings for k in sentence_lines(f"warning: {w}", 2))),
+            Passage("", tuple(k for w in known for k in sentence_lines(w, 2)), keep=1, most=4),
+            Passage("", tuple(k for p in fallen for k in sentence_lines(
                 f"{p['name']}: {p['fault']}", 2)), keep=2, most=6),
-            *([] if full else check_blocks(checks)),
-            Block("Printed figures: ours, theirs", () if full or not cells else rows(
+            *([] if full else check_passages(checks)),
+            Passage("Printed figures: ours, theirs", () if full or not cells else rows(
                 [""] * 4, cells), 3, 8),
-            Block("", figures_line(results)),
+            Passage("", figures_line(results)),
+            Passage("", tuple(k for w in document["motion"] for k in sentence_lines(w, 2)), 1, 3),
         ),
         detail,
     )  # fmt: skip

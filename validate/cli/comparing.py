@@ -84,7 +84,7 @@ def _show(found: SideBySide, *, everything: bool) -> None:
     head = [*sentence_lines(_headline(found)), *warnings]
     parameters = _parameters(found, columns, everything=everything)
     shown, more, unseen = pairs(found, every=everything)
-    room = None if everything else max(6, LINES - len(head) - len(parameters) - 3)
+    room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
     lines, rows, drawn = _pairs(shown, columns, room)
     for line in (*head, *lines, *parameters):
         say(line)

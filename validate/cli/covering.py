@@ -4,7 +4,7 @@ from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.screen import Block, rows, sentence_lines
+from validate.cli.screen import Passage, rows, sentence_lines
 from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
@@ -32,11 +32,11 @@ def covering(
         )  # fmt: skip
     page = written(experiment, coverage_page.told(found), place, common)
     if not common.as_json:
-        answer(_blocks(found), found.done, page, common.detail)
+        answer(_passages(found), found.done, page, common.detail)
     return OK if found.passed else FAILED
 
 
-def _blocks(found: Coverage) -> list[Block]:
+def _passages(found: Coverage) -> list[Passage]:
     """Whether the verdicts are right as often as they say, then every quantity."""
     cells = [
         [f"{row[0]}: {row[1]}", row[2], row[3], row[-1]] for row in map(share_row, found.quantities)
@@ -53,7 +53,7 @@ def _blocks(found: Coverage) -> list[Block]:
     ]  # fmt: skip
     title = "A perfect model under these verdicts"
     return [
-        Block("", sentence_lines(f"{quick}{coverage_page.sentence(found)}")),
-        Block(title, rows(["", *HEAD[2:4], "finding"], cells) if cells else (), 4),
-        Block("", tuple(k for note in notes for k in sentence_lines(note, 2)), keep=2, most=6),
+        Passage("", sentence_lines(f"{quick}{coverage_page.sentence(found)}")),
+        Passage(title, rows(["", *HEAD[2:4], "finding"], cells) if cells else (), 4),
+        Passage("", tuple(k for note in notes for k in sentence_lines(note, 2)), keep=2, most=6),
     ]

@@ -5,7 +5,7 @@ from pathlib import Path
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import shown
-from validate.cli.screen import Block, Detail, rows, sentence_lines
+from validate.cli.screen import Detail, Passage, rows, sentence_lines
 from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
@@ -36,11 +36,11 @@ def identifying(
         )  # fmt: skip
     page = written(experiment, identify_page.told(found), place, common)
     if not common.as_json:
-        answer(_blocks(found, common.detail), found.done, page, common.detail)
+        answer(_passages(found, common.detail), found.done, page, common.detail)
     return OK if found.identified else FAILED
 
 
-def _blocks(found: IdentifyStudy, detail: Detail) -> list[Block]:
+def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
     """How many parameters are identified, why others are not, then every value."""
     estimates = [(one, e) for one in found.calibrated for e in one.found.estimates]
     known = sum(e.identified for _, e in estimates)
@@ -54,9 +54,9 @@ def _blocks(found: IdentifyStudy, detail: Detail) -> list[Block]:
         numbers = [shown(v, units(one)[e.name]) for v in (e.value, e.low, e.high)]
         cells.append([name, *numbers, "yes" if e.identified else "no"])
     blocks = [
-        Block("", sentence_lines(first)),
-        Block("", tuple(missing), keep=3),
-        Block("Fitted values", rows(_HEAD, cells) if cells else (), 6),
+        Passage("", sentence_lines(first)),
+        Passage("", tuple(missing), keep=3),
+        Passage("Fitted values", rows(_HEAD, cells) if cells else (), 6),
     ]
     for one in found.calibrated if detail == "full" else ():
         names = one.found.space.names
@@ -66,5 +66,5 @@ def _blocks(found: IdentifyStudy, detail: Detail) -> list[Block]:
         ]  # fmt: skip
         on = f"{one.problem.calibration.method} on {one.on}"
         words = f"{on}; correlations: {'; '.join(pairs_)}" if pairs_ else on
-        blocks.append(Block("", sentence_lines(words, 2), keep=1))
+        blocks.append(Passage("", sentence_lines(words, 2), keep=1))
     return blocks

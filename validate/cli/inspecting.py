@@ -1,23 +1,45 @@
-"""`validate inspect`: what a recording holds; loads what reads the file and nothing else."""
+"""`validate inspect`: what a recording holds, and how it moves."""
 
 import json
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
-from validate.cli.display import say, table
+from validate.cli.screen import Detail, Passage, rows, sentence_lines, show
+from validate.errors import ValidateError
 from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
+from validate.recording.readers import named, recognised
+from validate.report.motion_words import motion_lines
+
+_UNREAD = "not read: "  # before the reason, in a topic's kind
 
 
-def inspect(file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...]) -> int:
+def inspect(
+    file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...],
+    detail: Detail = "screen",
+) -> int:  # fmt: skip
     """Print what a file of any format holds; return 1 where it has a defect, else 0."""
-    found = inspect_file(file, kind, pairs(mapping, "--map"))
+    options = pairs(mapping, "--map")
+    found = inspect_file(file, kind, options)
+    motion = _motion(file, kind, options)
     if as_json:
-        print(json.dumps(found.to_dict(), ensure_ascii=False, indent=2, allow_nan=False))
+        document = {**found.to_dict(), "motion": motion}
+        print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
     else:
-        _print(found)
+        show(_passages(found, motion, detail), detail)
     return FAILED if found.defects else OK
+
+
+def _motion(file: Path, kind: str | None, options: Mapping[str, str]) -> tuple[str, ...]:
+    """Lines on what moves; none of a file that cannot be read as a recording, as its inspection
+    says."""
+    try:
+        reader = named(kind) if kind else recognised(file)
+        return motion_lines(reader.read(file, options))
+    except ValidateError:
+        return ()
 
 
 def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
@@ -30,17 +52,35 @@ def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
         print(json.dumps(one, ensure_ascii=False, allow_nan=False))
 
 
-def _print(found: Inspection) -> None:
-    head = ["topic", "kind", "n", "duration s", "rate Hz", "gaps", "unit", "frame"]
-    rows = [_row(topic) for topic in found.topics]
-    say(found.source.path, "bold")
-    table("", [*head, "schema (encoding)"], rows)
-    say(_head(found) if found.chunks or found.read_as == "mcap" else _other(found), indent="  ")
-    for line in (*found.clock_offsets, *(found.facts if found.read_as == "mcap" else ())):
-        say(line, indent="  ")
-    say(f"defects: {len(found.defects)}")
-    for defect in found.defects:
-        say(f"  {defect}", indent="    ")
+def _passages(found: Inspection, motion: Sequence[str], detail: Detail) -> list[Passage]:
+    """Defects first, then streams, fields that are not read, motion, clocks and the file."""
+    streams = [t for t in found.topics if not t.kind.startswith(_UNREAD)]
+    unread = [f"{t.name}: {t.kind}" for t in found.topics if t.kind.startswith(_UNREAD)]
+    full = detail == "full"
+    if len(unread) > 1 and not full:
+        unread = [f"{len(unread)} fields are not read; the first: {unread[0]}"]
+    defects = len(found.defects)
+    counted = f"{defects or 'no'} defect{'' if defects == 1 else 's'}"
+    names = f"{len(streams)} stream{'' if len(streams) == 1 else 's'}"
+    head = ["", "kind", "n", "duration / s", "rate / Hz", "gaps", "unit", "frame"]
+    mcap = found.chunks or found.read_as == "mcap"
+    facts = [*found.clock_offsets, *(found.facts if found.read_as == "mcap" else ())]
+    file = (_head(found) if mcap else _other(found)).strip().splitlines()
+
+    def lines(texts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(k for text in texts for k in sentence_lines(text, None if full else 2))
+
+    return [
+        Passage("", sentence_lines(f"{found.source.path}: {names}, {counted}.")),
+        Passage("Defects" if defects else "", lines([f"  {d}" for d in found.defects]), 4, 8),
+        Passage("Streams", rows(head, [_row(t)[:-1] for t in streams]), 4, 12),
+        Passage("", lines(unread), 2),
+        Passage("", lines(motion), 3),
+        Passage("", lines(facts), 1),
+        Passage("", lines(file), 3),
+        Passage("Schemas", rows(["", "schema (encoding)"], [[t.name, _row(t)[-1]] for t in streams])
+              if full else ()),
+    ]  # fmt: skip
 
 
 def _row(topic: Topic) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.cli.display import say, table
-from validate.cli.screen import Block, Detail, cut, rows, sentence_lines
+from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines
 from validate.cli.screen import show as show_screen
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
@@ -26,7 +26,7 @@ def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "sc
         document = _summary(experiment) | _details(experiment)
         print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
     elif detail == "screen":
-        show_screen(_blocks(experiment))
+        show_screen(_passages(experiment))
     else:
         _in_full(experiment)
 
@@ -90,7 +90,7 @@ def _in_full(experiment: Experiment) -> None:
     table("Expected verdicts", ["method", "check", "verdict", "why"], known)
 
 
-def _blocks(experiment: Experiment) -> list[Block]:
+def _passages(experiment: Experiment) -> list[Passage]:
     """What it is, the parameters that matter most, methods and requirements."""
     cells = [[p.path, cut(_default(p), _DEFAULT), p.doc] for p in _by_weight(experiment)]
     methods = [
@@ -104,7 +104,7 @@ def _blocks(experiment: Experiment) -> list[Block]:
     ]  # fmt: skip
     known = [[f"{e.method}: {e.check}", e.verdict, e.why] for e in experiment.expected]
     return [
-        Block("", sentence_lines(f"{experiment.name}: {experiment.title}. {experiment.source}")),
+        Passage("", sentence_lines(f"{experiment.name}: {experiment.title}. {experiment.source}")),
         _block("Parameters (--set PATH=VALUE)", cells, _FIRST),
         _block("Methods", methods, 3),
         _block("Requirements, limits in SI", required, 2),
@@ -112,12 +112,12 @@ def _blocks(experiment: Experiment) -> list[Block]:
     ]
 
 
-def _block(title: str, cells: Sequence[Sequence[str]], keep: int) -> Block:
+def _block(title: str, cells: Sequence[Sequence[str]], keep: int) -> Passage:
     """The first rows of a list, a line each; the last column is cut at the screen's edge."""
     first = [[*map(str, row[:-1]), " ".join(row[-1].split())] for row in cells[:_FIRST]]
     columns = len(first[0]) if first else 0
     lines = rows([""] * columns, first, soft=columns - 1)
-    return Block(title, lines, keep, None, "more: --all", len(cells) - len(first))
+    return Passage(title, lines, keep, None, "more: --all", len(cells) - len(first))
 
 
 def _by_weight(experiment: Experiment) -> list[Parameter]:

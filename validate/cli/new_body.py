@@ -47,6 +47,7 @@ from validate.cli.new_motion import (
 from validate.cli.rendered import rendered
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
+from validate.recording.scales import another_unit
 from validate.recording.types import Recording
 from validate.replay.measured_body import body_of
 from validate.replay.measured_cards import MeasuredBody
@@ -373,7 +374,13 @@ def _used(recording: Recording, found: Answers) -> set[str]:
 
 
 def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
-    return ()
+    """Streams whose metres are another unit, beside the body's size."""
+    mesh = _mesh_of(found)
+    size = float(np.ptp(mesh.nodes, axis=0).max()) if mesh is not None else np.inf
+    judged = {t: recording.streams[t] for t in _used(recording, found) if t in recording.streams}
+    doubts = {topic: another_unit(stream, size) for topic, stream in judged.items()}
+    file = Path(recording.source.path).name
+    return [f"'{topic}': {why}".replace("FILE", file) for topic, why in doubts.items() if why]
 
 
 BODY = NewKind(

@@ -12,6 +12,7 @@ from validate.cli.asking import Answers, Question
 from validate.cli.new_body_questions import by_path, parsed
 from validate.errors import UsageError, ValidateError
 from validate.fem.system import build
+from validate.identify.recorded_motion import FRACTION, motion_of
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.first_modes import first_frequencies
@@ -19,8 +20,7 @@ from validate.replay.measured_body import static_scene
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.measured_drive import RELEASE, drive_kind
 from validate.replay.moving_body import against_mode
-from validate.replay.moving_seen import motion_of, started, steps_of, without_rest
-from validate.replay.recorded_motion import FRACTION
+from validate.replay.moving_seen import started, steps_of, without_rest
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
@@ -53,7 +53,7 @@ def proposal(recording: Recording, p: MeasuredBody, folder: Path) -> Proposal:
     except ValidateError as none:
         return Proposal(STATIC, str(none))
     first = _first(recording, p, folder) if p.material.E else None
-    facts = against_mode(shown, first)
+    facts = against_mode(shown, first, p)
     if shown.inertia_matters(first):
         return Proposal(DYNAMIC, f"{facts}: inertia matters from {FRACTION:.2g} of it on")
     return Proposal(STATIC, f"{facts}: slow enough for statics")

@@ -5,7 +5,8 @@ from typing import Any
 
 import click
 
-from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, output, require_new
+from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, detailed, output, require_new
+from validate.cli.screen import Detail
 
 
 @click.command()
@@ -15,8 +16,15 @@ from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, output, require
 @click.option("--map", "mapping", multiple=True, metavar="KEY=VALUE", help="As of `import`.")
 @click.option("--messages", "topic", metavar="TOPIC", help="MCAP: its messages, a line each.")
 @click.option("--most", type=int, default=10, show_default=True, help="So many of them.")
+@detailed
 def inspect(
-    file: Path, as_json: bool, kind: str | None, mapping: tuple[str, ...], topic: str, most: int
+    file: Path,
+    as_json: bool,
+    kind: str | None,
+    mapping: tuple[str, ...],
+    topic: str,
+    most: int,
+    detail: Detail,
 ) -> int:
     """Show what a recording holds, and its defects.
 
@@ -31,7 +39,7 @@ def inspect(
     if topic:
         inspecting.messages(file, topic, most, as_json)
         return OK
-    return inspecting.inspect(file, as_json, kind, mapping)
+    return inspecting.inspect(file, as_json, kind, mapping, detail)
 
 
 @click.command("import")

@@ -8,9 +8,9 @@ from statistics import median
 from typing import Any
 
 from validate.catalogue import experiment_files
-from validate.cli.check_bars import check_blocks, worst_first
+from validate.cli.check_bars import check_passages, worst_first
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
-from validate.cli.screen import Block, Detail, cut, rows, sentence_lines, show, width
+from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines, show, width
 from validate.compare.result import KINDS, Result
 from validate.compare.verdict import Check
 from validate.replay.experiment import Experiment
@@ -40,16 +40,16 @@ def show_run(
     end = f"{seconds:.1f} s wall time; report: {relative(page)}"
     show(
         (
-            Block("", sentence_lines(headline(result))),
-            Block("", _recording(result)),
-            Block("", _warnings(result, lines), keep=2, most=4),
-            *([] if verbose else check_blocks(_checks(result))),
-            Block("", _unfinished(result, lines), keep=2, most=4),
-            Block("", _identified(result, lines), keep=2, most=4),
+            Passage("", sentence_lines(headline(result))),
+            Passage("", _recording(result)),
+            Passage("", _warnings(result, lines), keep=2, most=4),
+            *([] if verbose else check_passages(_checks(result))),
+            Passage("", _unfinished(result, lines), keep=2, most=4),
+            Passage("", _identified(result, lines), keep=2, most=4),
             *([ranking] if ranking else []),
-            Block("", figures_line([figure_members(p) for p in result.published], name)),
-            Block("Next", () if verbose else tuple(_next(result, name))[:3]),
-            Block("", () if verbose else (end,)),
+            Passage("", figures_line([figure_members(p) for p in result.published], name)),
+            Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
+            Passage("", () if verbose else (end,)),
         ),
         detail,
     )
@@ -130,7 +130,7 @@ def _identified(result: Result, most: int | None) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _ranking(result: Result) -> Block | None:
+def _ranking(result: Result) -> Passage | None:
     """Methods by the error that decides, with their rates; None where fewer than two have it."""
     by = _ranked_by(result)
     if by is None:
@@ -151,7 +151,7 @@ def _ranking(result: Result) -> Block | None:
     where = f" {at_load(load)}" if load else ""
     title = cut(f"Methods by {quantity}{where}, against {_the(scored[0][1].against)}", width())
     lines = rows(["", "error", "rate", "p99 of a step"], cells)
-    return Block(title, lines, 4, _FIRST + 1, "more methods: --verbose")
+    return Passage(title, lines, 4, _FIRST + 1, "more methods: --verbose")
 
 
 def _the(against: str) -> str:

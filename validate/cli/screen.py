@@ -1,6 +1,6 @@
 """One screen of text: blocks of lines that share a number of lines, and bars in characters.
 
-show([Block("Checks", rows, keep=2, most=8)])  # on at most 25 lines
+show([Passage("Checks", rows, keep=2, most=8)])  # on at most 25 lines
 """
 
 import math
@@ -20,7 +20,7 @@ _NAME = 12  # characters of a name that is cut
 
 
 @dataclass(frozen=True)
-class Block:
+class Passage:
     """Lines below a title ("" for none), of which the first `most` are shown.
 
     `keep` lines stay however little room there is (None: all). `rest` follows the number of lines
@@ -39,7 +39,7 @@ class Block:
         return bool(self.title) + shown + (shown < len(self.lines) + self.hidden)
 
 
-def fitted(blocks: Sequence[Block], most: float = LINES) -> list[Block]:
+def fitted(blocks: Sequence[Passage], most: float = LINES) -> list[Passage]:
     """The blocks that have lines, the longest shortened until all have room."""
     found = [b for b in blocks if b.lines]
     counts = [min(len(b.lines), b.most or len(b.lines)) for b in found]
@@ -56,7 +56,7 @@ def fitted(blocks: Sequence[Block], most: float = LINES) -> list[Block]:
     ]  # fmt: skip
 
 
-def show(blocks: Sequence[Block], detail: Detail = "screen") -> None:
+def show(blocks: Sequence[Passage], detail: Detail = "screen") -> None:
     """Print the blocks with their titles in bold: on one screen, whole, or the first one alone."""
     screen = console()
     found = [b for b in blocks if b.lines]

@@ -10,7 +10,7 @@ from validate.cli.arguments import FAILED, OK, command_line, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import relative, say, table
 from validate.cli.progress import progress
-from validate.cli.screen import Block, Detail, cut, rows, sentence_lines, show
+from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines, show
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, sources_of
@@ -89,7 +89,7 @@ def filters(
         )  # fmt: skip
     page = written(experiment, filter_page.findings(found), place, common)
     if not common.as_json:
-        answer(_filter_blocks(found, common.detail), found.done, page, common.detail)
+        answer(_filter_passages(found, common.detail), found.done, page, common.detail)
     return OK
 
 
@@ -115,7 +115,7 @@ def stability_map(name: str, common: StudyOptions) -> int:
     page = written(experiment, told, place, common)
     if not common.as_json:
         ended = "" if endings is None else ending_words(endings)
-        answer(_stability_blocks(found, ended), found.done, page, common.detail)
+        answer(_stability_passages(found, ended), found.done, page, common.detail)
     return OK if found.passed and not (endings and endings.bugs) else FAILED
 
 
@@ -129,7 +129,7 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
     page = written(experiment, told, place, common)
     if not common.as_json:
         lines = (*sentence_lines(told.sentence), f"report: {relative(page)}")
-        show([Block("", lines)], common.detail)
+        show([Passage("", lines)], common.detail)
     return FAILED if told.passed is False else OK
 
 
@@ -145,7 +145,7 @@ def tradeoff(name: str, common: StudyOptions, guests: tuple[str, ...] = ()) -> i
         )  # fmt: skip
     page = written(experiment, trade_page.told(found), place, common)
     if not common.as_json:
-        answer(_trade_blocks(found), found.done, page, common.detail)
+        answer(_trade_passages(found), found.done, page, common.detail)
     return OK
 
 
@@ -169,7 +169,7 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
     if not common.as_json:
         if common.detail == "full":
             _choice_in_full(choice)
-        answer(_choice_blocks(choice), choice.trade.done, page, common.detail)
+        answer(_choice_passages(choice), choice.trade.done, page, common.detail)
     return OK if choice.pick is not None else FAILED
 
 
@@ -218,47 +218,50 @@ def written(experiment: Experiment, told: Findings, place: str, common: StudyOpt
     return page
 
 
-def answer(blocks: Sequence[Block], done: Finished[Any], page: Path, detail: Detail) -> None:
+def answer(blocks: Sequence[Passage], done: Finished[Any], page: Path, detail: Detail) -> None:
     """Print a study on one screen, with the count of its cells and the place of its report."""
     where = f" on {done.workers}" if done.workers else ""
     ends = (
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
         f"{where}; report: {relative(page)}"
     )
-    show([*blocks, Block("", sentence_lines(ends))], detail)
+    show([*blocks, Passage("", sentence_lines(ends))], detail)
 
 
 # --- terminals ------------------------------------------------------------------------------------
 
 
-def _filter_blocks(found: FilterStudy, detail: Detail) -> list[Block]:
+def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
     """The best settings first, then the places of each condition."""
     best = [line for b in found.best for line in sentence_lines(b.line)]
     blocks = [
-        Block("", sentence_lines(filter_page.sentence(found))),
-        Block("", tuple(best), keep=1, most=4),
+        Passage("", sentence_lines(filter_page.sentence(found))),
+        Passage("", tuple(best), keep=1, most=4),
     ]
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
         title = f"Ranking by {found.by}{under}"
-        blocks.append(Block(title, _places(ranking, found), 2, 11))
+        blocks.append(Passage(title, _places(ranking, found), 2, 11))
         notes: list[str] = []
         if len(found.plan.seeds) == 1:
             notes += [] if ranking.blocks is None else [ranking.blocks.words]
             notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
         lines = tuple(k for note in notes for k in sentence_lines(note))
-        blocks.append(Block("", lines, keep=1))
+        blocks.append(Passage("", lines, keep=1))
     if detail == "screen" and len(found.rankings) > _RANKINGS:
         left = len(found.rankings) - _RANKINGS
-        blocks = [*blocks[: 2 + 2 * _RANKINGS], Block("", (f"{left} more conditions: --verbose",))]
+        blocks = [
+            *blocks[: 2 + 2 * _RANKINGS],
+            Passage("", (f"{left} more conditions: --verbose",)),
+        ]
     if found.plan.single_words:
-        blocks.append(Block("", sentence_lines(found.plan.single_words)))
+        blocks.append(Passage("", sentence_lines(found.plan.single_words)))
     failed = (
         f"failed: {cell.name} ({named(cell.values)}): {why}"
         for r in found.rankings for cell, why in r.failed
     )  # fmt: skip
     lines = tuple(k for text in failed for k in sentence_lines(text, 2))
-    return [*blocks, Block("", lines, keep=1, most=4)]
+    return [*blocks, Passage("", lines, keep=1, most=4)]
 
 
 def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
@@ -280,7 +283,7 @@ def _text(value: float | int | str | None) -> str:
     return significant(value) if isinstance(value, float) else str(value)
 
 
-def _stability_blocks(found: Stability, endings: str) -> list[Block]:
+def _stability_passages(found: Stability, endings: str) -> list[Passage]:
     quick = "QUICK: fewer points; " if found.quick else ""
     cells = [
         [p.name, _text(p.value), significant(p.limit), str(p.count),
@@ -289,16 +292,16 @@ def _stability_blocks(found: Stability, endings: str) -> list[Block]:
     ]  # fmt: skip
     head = ["prediction", "worst / 1", "limit / 1", "count", "verdict"]
     return [
-        Block("", sentence_lines(f"{quick}{stability_page.sentence(found)}")),
-        Block("", sentence_lines(endings) if endings else ()),
-        Block("Predictions against measured spectral radii", rows(head, cells), 3),
+        Passage("", sentence_lines(f"{quick}{stability_page.sentence(found)}")),
+        Passage("", sentence_lines(endings) if endings else ()),
+        Passage("Predictions against measured spectral radii", rows(head, cells), 3),
     ]
 
 
-def _trade_blocks(found: Trade) -> list[Block]:
+def _trade_passages(found: Trade) -> list[Passage]:
     blocks = [
-        Block("", sentence_lines(trade_page.sentence(found))),
-        Block("", _warned(found.locking), keep=2, most=4),
+        Passage("", sentence_lines(trade_page.sentence(found))),
+        Passage("", _warned(found.locking), keep=2, most=4),
     ]
     head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
     for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
@@ -310,11 +313,11 @@ def _trade_blocks(found: Trade) -> list[Block]:
         ]  # fmt: skip
         dominated = found.front(by).dominated
         lines = sentence_lines(f"dominated ({by}): {'; '.join(dominated)}", 2) if dominated else ()
-        blocks += [Block(title, rows(head, cells) if cells else (), 3), Block("", lines)]
+        blocks += [Passage(title, rows(head, cells) if cells else (), 3), Passage("", lines)]
     return blocks
 
 
-def _choice_blocks(choice: Choice) -> list[Block]:
+def _choice_passages(choice: Choice) -> list[Passage]:
     """The answer, then what each candidate method reaches."""
     first, *others = words(choice)
     cells = []
@@ -325,11 +328,13 @@ def _choice_blocks(choice: Choice) -> list[Block]:
     head = ["", f"error / {choice.trade.shown_unit}", "verdict"]
     ladder = rows(head, cells)
     return [
-        Block("", sentence_lines(first)),
-        Block("", tuple(k for w in others for k in sentence_lines(w)), keep=4),
-        Block("", _warned(choice.trade.locking), keep=2, most=4),
-        Block("Candidate methods", ladder, 4),
-        Block("", tuple(k for w in choice.rejected for k in sentence_lines(w, 2)), keep=1, most=4),
+        Passage("", sentence_lines(first)),
+        Passage("", tuple(k for w in others for k in sentence_lines(w)), keep=4),
+        Passage("", _warned(choice.trade.locking), keep=2, most=4),
+        Passage("Candidate methods", ladder, 4),
+        Passage(
+            "", tuple(k for w in choice.rejected for k in sentence_lines(w, 2)), keep=1, most=4
+        ),
     ]
 
 

@@ -5,6 +5,7 @@ back where images enter.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ _EXTENTS = (1e-4, 5.0)  # m: of an image, from a cell's to a room's
 _OUTLINES = (1e-5, 5.0)  # m: of an outline in such an image
 _SPREADS = (1e-3, 50.0)  # m: of markers, from a biopsy's to a hall's
 _UNITS = (("mm", 1e-3), ("um", 1e-6))
+_OF_BODY = (0.01, 5.0)  # of a body's size: what its markers span or move, in the right unit
 
 
 def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = None) -> str:
@@ -46,24 +48,80 @@ def odd_stream(stream: object) -> str:
     return _odd_outlines(stream) if isinstance(stream, Contours) else ""
 
 
+def another_unit(stream: object, size: float) -> str:
+    """Which unit the metres of markers or outlines may be, on a body of `size` m; "" where they fit
+    it, and for other streams."""
+    if isinstance(stream, Markers):
+        what, span = max((("move by", _moved(stream.x)), ("span", _spread(stream.x))),
+                         key=lambda found: found[1])  # fmt: skip
+    elif isinstance(stream, Contours):
+        what, span = "span", _extent(stream)
+    else:
+        return ""
+    low, high = (share * size for share in _OF_BODY)
+    meant = [(unit, f) for unit, f in _UNITS if low <= span * f <= high]
+    if span <= high or not meant:
+        return ""
+    unit, f = meant[0]
+    kind = "markers" if isinstance(stream, Markers) else "outlines"
+    return (
+        f"{kind} {what} {span:.3g} m, the body is {size:.3g} m: {unit} declared as m, a factor "
+        f"{round(1 / f)}? `validate import FILE --map unit={unit} -o NEW.mcap`"
+    )
+
+
+def in_unit(recording: Recording, unit: str, factor: float) -> Recording:
+    """The recording with markers and outlines that were declared in m taken as in `unit`, of
+    `factor` m; the record "taken_as" says so."""
+    markers = {
+        n: replace(m, x=factor * m.x, sd=factor * m.sd) for n, m in recording.markers.items()
+    }
+    contours = {n: _scaled(c, factor) for n, c in recording.contours.items()}
+    told = dict.fromkeys((*markers, *contours), f"declared in m, taken as {unit}")
+    records = {**recording.metadata, "taken_as": told}
+    return replace(recording, markers=markers, contours=contours, metadata=records)
+
+
+def _scaled(c: Contours, factor: float) -> Contours:
+    each = None if c.each is None else c.each * (factor, 1.0)
+    return replace(
+        c, outlines=tuple(factor * o for o in c.outlines), sd=factor * c.sd, each=each
+    )  # fmt: skip
+
+
 def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
     for topic, stream in recording.streams.items():
         yield topic, odd_stream(stream)
 
 
 def _odd_spread(x: Floats) -> str:
-    """Of markers x (nt, k, d) m, by the first instant at which two of them are seen."""
-    seen = np.asarray(np.isfinite(x).all(axis=2))
-    at = np.flatnonzero(seen.sum(axis=1) >= 2)
-    size = float(np.ptp(x[at[0]][seen[at[0]]], axis=0).max()) if len(at) else 1.0
+    """Of markers x (nt, k, d) m."""
+    size = _spread(x)
     low, high = _SPREADS
     if low <= size <= high or size == 0:
         return ""
     return f"markers {size:.3g} m apart are outside {low:g} to {high:g} m{_factor(size, _SPREADS)}"
 
 
+def _spread(x: Floats) -> float:
+    """m between markers x (nt, k, d) m at the first instant at which two are seen; 0: never."""
+    seen = np.asarray(np.isfinite(x).all(axis=2))
+    at = np.flatnonzero(seen.sum(axis=1) >= 2)
+    return float(np.ptp(x[at[0]][seen[at[0]]], axis=0).max()) if len(at) else 0.0
+
+
+def _moved(x: Floats) -> float:
+    """m peak to peak of the marker of x (nt, k, d) m that moves most along an axis."""
+    seen = [x[np.isfinite(x[:, j]).all(axis=1), j] for j in range(x.shape[1])]
+    return max((float(np.ptp(one, axis=0).max()) for one in seen if len(one)), default=0.0)
+
+
+def _extent(contours: Contours) -> float:
+    return max(float(np.ptp(outline, axis=0).max()) for outline in contours.outlines)
+
+
 def _odd_outlines(contours: Contours) -> str:
-    size = max(float(np.ptp(outline, axis=0).max()) for outline in contours.outlines)
+    size = _extent(contours)
     low, high = _OUTLINES
     if low <= size <= high:
         return ""

@@ -8,6 +8,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
 from validate.fem.locate import require_inside, standing_rows
+from validate.recording.scales import another_unit
 from validate.recording.types import Markers
 from validate.register.markers import MarkerObservation
 from validate.scene.mesh import Mesh
@@ -48,15 +49,19 @@ def since_rest(
 ) -> MarkerObservation:
     """The registered markers from where they stood at rest, a mean of so many samples; `sd` m.
 
-    Raises `RegistrationError` for one that stands off the body by more than `stands` m.
+    Raises `RegistrationError` for one that stands off the body by more than `stands` m, with the
+    factor where its unit is another one.
     """
     rest: Floats = whole.x[0]
     rows = standing_rows(mesh, rest)
     try:
         require_inside(rows, whole.names, stands)
     except RegistrationError as error:
+        size = float(np.ptp(mesh.nodes, axis=0).max())
+        seen = Markers(np.arange(len(whole.x), dtype=float), whole.names, whole.x, 0.0, "body")
+        unit = another_unit(seen, size)
         raise RegistrationError(
-            f"{error}; of markers on stalks say how far: --set seen.stands=15mm"
+            f"{error}; {unit or 'of markers on stalks say how far: --set seen.stands=15mm'}"
         ) from None
     moved = np.nan_to_num(whole.x - rest)
     most = moved[np.linalg.norm(moved, axis=2).max(axis=1).argmax()]

@@ -20,7 +20,14 @@ from validate.register.clock import SAME, clock_sd, interpolated, slopes, with_c
 from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.fitting import MarkerFit
 from validate.register.labels import require_steady_labels
-from validate.register.observation import Deviation, Role, Selection, Simulated, frame_at
+from validate.register.observation import (
+    Deviation,
+    History,
+    Role,
+    Selection,
+    Simulated,
+    frame_at,
+)
 from validate.register.quality import LINE, Registration, register_points
 from validate.register.transform import spread
 from validate.scene.mesh import Mesh
@@ -111,6 +118,12 @@ class MarkerObservation:
         nothing of the run is compared with it."""
         off = np.nan_to_num(self._exact(run) - self.x)
         return np.asarray(off.ravel())
+
+    def history(self, run: Simulated) -> History:
+        """Displacements since rest."""
+        measured = self.x - self.rest
+        simulated = measured + self.left(run).reshape(measured.shape)
+        return History(self.name, self.t, self.names, measured, simulated, "m", self.sd, each=True)
 
     def anew(self, left: Floats, draw: AnyDraw) -> "MarkerObservation":
         """The markers where `left` (nt k d,) m has them; registration, which all samples share,

@@ -145,6 +145,31 @@ class Observation(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class History:
+    """What was measured over time, and what an exact sensor would have read of a run.
+
+    `measured` and `simulated` (nt, k, d) in `unit` at t (nt,) s are of the named quantities since
+    rest; NaN = not seen. `sd` is the measurement's standard deviation per component. `each`: every
+    name is a sensor of its own, which may be exchanged or loose.
+    """
+
+    name: str
+    t: Floats
+    names: tuple[str, ...]
+    measured: Floats
+    simulated: Floats
+    unit: str
+    sd: float
+    each: bool = False
+
+    def at(self, kept: Ints) -> "History":
+        """Its samples of these indices alone."""
+        return replace(
+            self, t=self.t[kept], measured=self.measured[kept], simulated=self.simulated[kept]
+        )
+
+
 @runtime_checkable
 class Drawable(Observation, Protocol):
     """An observation that can be made anew, as a perfect model would have it."""
@@ -156,6 +181,15 @@ class Drawable(Observation, Protocol):
     def anew(self, left: Floats, draw: AnyDraw) -> Observation:
         """What would have been measured where exact readings are `left` off the samples, with
         noise, registration and clock drawn as declared."""
+        ...
+
+
+@runtime_checkable
+class OverTime(Drawable, Protocol):
+    """An observation that has a history of named quantities."""
+
+    def history(self, run: Simulated) -> History | None:
+        """None where the run says nothing of it."""
         ...
 
 

@@ -1,12 +1,16 @@
 """Distances between closed planar outlines."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
+from scipy.spatial.distance import cdist
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 
 _TURN = 2 * np.pi
+EVERY_TEN = np.deg2rad(np.arange(0.0, 360.0, 10.0))  # rad
 
 
 def normal_distances(outline: Floats, points: Floats) -> Floats:
@@ -37,6 +41,11 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
     return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
 
 
+def outline_places(angles: Floats) -> tuple[str, ...]:
+    """Names of places at polar angles (a,) rad."""
+    return tuple(f"outline at {deg:.0f} deg" for deg in np.rad2deg(angles))
+
+
 def ray_points(outline: Floats, angles: Floats) -> Floats:
     """Where rays from the outline's centroid at polar angles (a,) rad cross its straight segments:
     (a, 2) m, on the outline itself."""
@@ -50,6 +59,23 @@ def ray_points(outline: Floats, angles: Floats) -> Floats:
     whole = radius[before] * radius[after] * np.sin(span) / np.where(corner, 1.0, across)
     found = np.where(corner, radius[after], whole)
     return np.asarray(centre + found[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+
+
+def at_normals(outline: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """The outline's vertices nearest to points (m, 2) m, and the outward normals there."""
+    nearest = cdist(points, outline).argmin(axis=1)
+    across = normals(outline)
+    middle = enclosed(outline)[1]
+    outward = np.sign(((outline - middle) * across).sum(axis=1, keepdims=True))
+    return outline[nearest], (outward * across)[nearest]
+
+
+def along_normals(still: Floats, outlines: Sequence[Floats], angles: Floats) -> Floats:
+    """Displacements (nt, a, 2) m of outlines along the normals of the one at rest, at its places at
+    polar angles (a,) rad; to first order those of the material."""
+    places, across = at_normals(still, ray_points(still, angles))
+    away = np.array([normal_distances(outline, places) for outline in outlines])
+    return np.asarray((away - normal_distances(still, places))[:, :, None] * across)
 
 
 def polar_angles(outline: Floats) -> Floats:

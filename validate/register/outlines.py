@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial.distance import cdist
 
 from validate.arrays import Floats, rms
 from validate.fem.locate import Rows
@@ -14,6 +13,7 @@ from validate.register.clock import SAME, around, with_clock
 from validate.register.draws import AnyDraw
 from validate.register.observation import (
     Deviation,
+    History,
     Role,
     Selection,
     Simulated,
@@ -22,18 +22,22 @@ from validate.register.observation import (
     nearest_sample,
 )
 from validate.register.outline_geometry import (
+    EVERY_TEN,
+    along_normals,
     angular_points,
     angular_weights,
+    at_normals,
     enclosed,
     normal_distances,
     normals,
+    outline_places,
     polar_angles,
     ray_points,
 )
 from validate.register.plane import SurfaceSampler, from_image, require_rigid, section
 
 _TINY = np.finfo(float).tiny
-_ANGLES = np.deg2rad(np.arange(0.0, 360.0, 10.0))
+_ANGLES = EVERY_TEN
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ class OutlineObservation:
         evenly in polar angle; to first order what the wall's own displacement along them is."""
         still = self.simulated(np.zeros((self.wall.rows.weights.shape[1], 3)))
         places = ray_points(still, np.linspace(0, 2 * np.pi, count, endpoint=False))
-        places, across = _at_normals(still, places)
+        places, across = at_normals(still, places)
         rows = self.wall.rows_at(from_image(self.pose, places))
         directions = across @ self.pose[:3, :2].T
         away = np.array([normal_distances(o, places) for o in self.outlines])
@@ -113,6 +117,19 @@ class OutlineObservation:
         pairs = zip(self.t.tolist(), self.outlines, strict=True)
         off = [ray_points(self.simulated(field_at(run, t)), polar_angles(o)) - o for t, o in pairs]
         return np.concatenate(off).ravel()
+
+    def history(self, run: Simulated) -> History:
+        """Displacements since rest along the normals at places of the outline at rest, at equal
+        polar angles about its centroid."""
+        sections = [self.simulated(field_at(run, t)) for t in self.t.tolist()]
+        still = self.simulated(field_at(run, self.rest)), self.measured(self.rest)
+        simulated, measured = (
+            along_normals(start, outlines, _ANGLES)
+            for start, outlines in zip(still, (sections, self.outlines), strict=True)
+        )
+        return History(
+            self.name, self.t, outline_places(_ANGLES), measured, simulated, "m", self.sd
+        )
 
     def anew(self, left: Floats, draw: AnyDraw) -> "OutlineObservation":
         """The outlines where `left` (2 k,) m has them; clock and noise (along normals) drawn."""
@@ -229,15 +246,6 @@ class NormalDistances:
             sparse.kron(self.rows.weights[[i]], self.normals[[i]]) for i in range(len(self.normals))
         ]
         return sparse.csr_array(sparse.vstack(each))
-
-
-def _at_normals(outline: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """The outline's vertices nearest to points (m, 2) m, and the outward normals there."""
-    nearest = cdist(points, outline).argmin(axis=1)
-    across = normals(outline)
-    middle = enclosed(outline)[1]
-    outward = np.sign(((outline - middle) * across).sum(axis=1, keepdims=True))
-    return outline[nearest], (outward * across)[nearest]
 
 
 def _moved(start: Floats, end: Floats, angles: Floats) -> Floats:

@@ -14,6 +14,7 @@ from validate.register.clock import clock_sd, slopes, with_clock
 from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.observation import (
     Deviation,
+    History,
     Role,
     Selection,
     Simulated,
@@ -84,6 +85,14 @@ class SignalObservation:
         if trace is None:
             return np.zeros(len(self.t))
         return from_rest(run.t, trace.y[:, None], self.t)[:, 0] - self.y[:, 0]
+
+    def history(self, run: Simulated) -> History | None:
+        """Its first channel; None where the run has no such trace."""
+        if self.trace not in run.traces:
+            return None
+        y = self.y[:, :1, None]
+        simulated = y + self.left(run)[:, None, None]
+        return History(self.name, self.t, (self.name,), y, simulated, self.unit, self.sd)
 
     def anew(self, left: Floats, draw: AnyDraw) -> "SignalObservation":
         """The signal as measured samples with `left` (nt,) would be, clock and noise drawn."""

@@ -7,12 +7,20 @@ import numpy as np
 from validate.errors import SceneError
 from validate.fem.modes import modes_of
 from validate.fem.system import build
+from validate.replay.measured_cards import MeasuredBody, Tissue
 from validate.replay.own_body import with_law
 from validate.scene.scene import Scene
 
 COUNT = 3
 _MOST = 60_000  # unknowns
 _RIGID = 1e-3  # Hz: below it a motion is one of the whole body
+
+
+def assumed_density(p: MeasuredBody) -> str:
+    """Words on a density that nobody stated; empty of one that was asked for, or set."""
+    if p.motion.how == "dynamic" or p.moved.by == "gravity" or p.material.rho != Tissue().rho:
+        return ""
+    return f"with an assumed density of {p.material.rho:g} kg/m3, near that of water"
 
 
 def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:

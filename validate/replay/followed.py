@@ -6,9 +6,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.compare.residual import Residual, reached_end
 from validate.errors import SceneError
+from validate.register.observation import History, Observation, OverTime
 from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import AnyScene, Meshless
@@ -83,6 +84,22 @@ class Followed:
     def whole(self) -> bool:
         """Whether the run reached the last recorded time."""
         return reached_end(self.seen, self.run)
+
+    @property
+    def histories(self) -> tuple[History, ...]:
+        """What the first recording's run is compared with over time, at the compared samples; none
+        of a run that stopped before the end."""
+        if not self.whole or isinstance(self.scene, Meshless):
+            return ()
+        seen = [o for o in self.seen.observations if o.role == "validates"]
+        found = [(o, o.history(self.run)) for o in seen if isinstance(o, OverTime)]
+        return tuple(h.at(self._compared(o)) for o, h in found if h is not None)
+
+    def _compared(self, of: Observation) -> Ints:
+        """Indices of an observation's samples at the selected instants, or in the run's time."""
+        parts = [s for s in self.seen.selections if not s.of or of.name in s.of]
+        at = [s.samples(of.t, self.run.t, of.name) for s in parts]
+        return np.unique(np.concatenate([*at, np.zeros(0, dtype=np.int64)]))
 
     @property
     def over_time(self) -> bool:

@@ -1,13 +1,14 @@
-"""Likely causes of a difference between a computed and a measured motion, in order.
+"""Likely causes of a difference between a computed and a measured history, in order.
 
-Each cause is a correction of the computed motion with one or two numbers: a lag of the clock, a
-factor (unit, or load over modulus), an oscillator in place of statics, another frequency, another
-damping, a cubic stiffening, a loop between loading and unloading, one marker left out. The share of
+A history is that of markers, of an outline's places, or of a force. Each cause is a correction of
+the computed one with one or two numbers: a lag of the clock, a factor (unit, or load over modulus),
+another zero, an oscillator in place of statics, another frequency, another damping, a cubic
+stiffening, a loop between loading and unloading, one marker left out. The share of
 the residual's mean square that the best correction removes ranks them. A share says what the
 residual looks like, not what is true: each cause names the measurement or run that would tell.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -18,14 +19,16 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.result import MethodResult
 from validate.errors import ValidateError
+from validate.identify.recorded_motion import RecordedMotion, recorded_motion
 from validate.identify.ringing import Ringing
-from validate.register.markers import MarkerObservation
+from validate.register.observation import History
 from validate.replay.first_modes import first_frequencies
 from validate.replay.followed import Followed
-from validate.replay.recorded_motion import RecordedMotion, recorded_motion
-from validate.scene.scene import Scene
+from validate.report.numbers import with_unit
 
-_FEWEST = 16  # samples
+Failed = Collection[str]  # quantities of checks, as force.rms
+
+_FEWEST = 8  # samples
 _LEAST = 0.05  # of the residual: a correction that removes less is no cause
 _LAGS = 101  # that are tried
 _REACH = 0.25  # of the recorded period: the longest lag
@@ -46,31 +49,42 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Motions:
-    """Measured and simulated displacements (nt, k, d) m of named markers at t (nt,) s, NaN = not
-    seen; `inertia` says whether the simulation has any, `first` Hz is the body's first mode,
-    `noise` m that of a measured component."""
+class Difference:
+    """A `history`; `inertia` says whether the simulation has any, `first` Hz is the body's first
+    mode."""
 
-    t: Floats
-    names: tuple[str, ...]
-    measured: Floats
-    simulated: Floats
+    history: History
     inertia: bool
     first: float | None
-    noise: float = 0.0
+
+    @property
+    def t(self) -> Floats:
+        return self.history.t
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.history.names
+
+    @property
+    def measured(self) -> Floats:
+        return self.history.measured
+
+    @property
+    def simulated(self) -> Floats:
+        return self.history.simulated
 
     def explained(self, other: Floats) -> float:
         """Share 0..1 of the residual's mean square that is gone with another simulation."""
         return 1 - _square(other - self.measured) / _square(self.simulated - self.measured)
 
 
-def likely_causes(found: Motions) -> tuple[Cause, ...]:
+def likely_causes(found: Difference) -> tuple[Cause, ...]:
     """Those that remove a twentieth of the residual or more, the best first."""
     size = float(np.nanmax(np.abs(found.measured), initial=0.0))
     if len(found.t) < _FEWEST or not size > 0 or not _square(found.simulated - found.measured) > 0:
         return ()
     shown = _motion(found.t, found.names, found.measured)
-    tried = (_inertia, _frequency, _damping, _law, _loop, _clock, _marker, _factor)
+    tried = (_inertia, _frequency, _damping, _law, _loop, _clock, _marker, _zero, _factor)
     causes = [cause for one in tried if (cause := one(found, shown)) and cause.share >= _LEAST]
     return tuple(sorted(causes, key=lambda c: -c.share))
 
@@ -89,7 +103,7 @@ def _motion(t: Floats, names: tuple[str, ...], x: Floats) -> RecordedMotion | No
 # --- causes ---------------------------------------------------------------------------------------
 
 
-def _inertia(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _inertia(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """Statics drives one oscillator at the body's first mode."""
     if found.inertia or found.first is None or shown is None:
         return None
@@ -121,7 +135,7 @@ def _oscillated(t: Floats, u: Floats, first: float, damping: float) -> Floats:
     return np.asarray(q.reshape(u.shape))
 
 
-def _rung(found: Motions, shown: RecordedMotion | None) -> tuple[Ringing, Ringing] | None:
+def _rung(found: Difference, shown: RecordedMotion | None) -> tuple[Ringing, Ringing] | None:
     """How the marker that moves most rings, measured and simulated."""
     if shown is None or not found.inertia:
         return None
@@ -132,7 +146,7 @@ def _rung(found: Motions, shown: RecordedMotion | None) -> tuple[Ringing, Ringin
     return shown.ringing, other.ringing
 
 
-def _frequency(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _frequency(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """The simulation on a clock that runs as fast as it rings too slowly."""
     rung = _rung(found, shown)
     if rung is None:
@@ -147,7 +161,7 @@ def _frequency(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _damping(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _damping(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """The simulated swing about its end fades as the recorded one does."""
     rung = _rung(found, shown)
     if rung is None:
@@ -162,7 +176,7 @@ def _damping(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _law(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _law(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """A part that grows as the cube of the motion, beyond one in proportion to it."""
     u, y = found.simulated, found.measured
     cube = u * np.linalg.norm(np.nan_to_num(u), axis=2, keepdims=True) ** 2
@@ -174,7 +188,7 @@ def _law(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _loop(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _loop(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """Another sign where the motion goes back: friction in a support or contact, or a relaxing
     material."""
     u, y = found.simulated, found.measured
@@ -189,7 +203,7 @@ def _loop(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _clock(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _clock(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """One lag for all markers."""
     if shown is None:
         return None
@@ -206,21 +220,21 @@ def _clock(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _marker(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _marker(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """Two markers whose names were exchanged, or one that is far worse than the others."""
     k = len(found.names)
-    if k < 2:
+    if k < 2 or not found.history.each:
         return None
     swapped = _swapped(found)
     if swapped:
         return swapped
     each = [_square((found.simulated - found.measured)[:, j]) for j in range(k)]
-    off = np.maximum(np.array(each) - found.noise**2, 0.0)
+    off = np.maximum(np.array(each) - found.history.sd**2, 0.0)
     size = np.array([max(_square(found.measured[:, j]), 1e-30) for j in range(k)])
     odd = np.sqrt(off / size)
     worst = int(odd.argmax())
     rest = float(np.median(np.delete(odd, worst)))
-    if not odd[worst] > _ODD * rest or not off[worst] > found.noise**2:
+    if not odd[worst] > _ODD * rest or not off[worst] > found.history.sd**2:
         return None
     share = float(off[worst] / off.sum())
     return Cause(
@@ -232,7 +246,7 @@ def _marker(found: Motions, shown: RecordedMotion | None) -> Cause | None:
     )  # fmt: skip
 
 
-def _swapped(found: Motions) -> Cause | None:
+def _swapped(found: Difference) -> Cause | None:
     """The best exchange of two names, where it removes most of the residual."""
     best: tuple[float, int, int] = (0.5, 0, 0)
     for i, j in permutations(range(len(found.names)), 2):
@@ -250,7 +264,20 @@ def _swapped(found: Motions) -> Cause | None:
     )  # fmt: skip
 
 
-def _factor(found: Motions, shown: RecordedMotion | None) -> Cause | None:
+def _zero(found: Difference, shown: RecordedMotion | None) -> Cause | None:
+    """The same offset at all times: of each sensor its mean residual, where it is beyond noise."""
+    off = np.nanmean(found.measured - found.simulated, axis=0)
+    largest = float(np.abs(off).max())
+    if not largest > found.history.sd:
+        return None
+    return Cause(
+        "zero", found.explained(found.simulated + off),
+        f"the residual has a mean of {with_unit(largest, found.history.unit)} at all times",
+        "look at the first samples, before the load: tare the sensor, or set seen.still",
+    )  # fmt: skip
+
+
+def _factor(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     """One factor for everything: a wrong unit where it is one, else load over modulus."""
     u, y = found.simulated, found.measured
     seen = np.isfinite(u) & np.isfinite(y)
@@ -262,9 +289,10 @@ def _factor(found: Motions, shown: RecordedMotion | None) -> Cause | None:
             "wrong unit", share, f"measured is {factor:.4g} times simulated: near {unit:.4g}",
             "compare one length of the body, and one load, with a ruler and a scale",
         )  # fmt: skip
+    of = "load over modulus" if found.history.unit == "m" else "the modulus"
     return Cause(
         "load or modulus", share, f"measured is {factor:.3g} times simulated, everywhere and "
-        "always: as if load over modulus were so many times the given one",
+        f"always: as if {of} were so many times the given one",
         "identify E on a static log with a force; calibrate the force",
     )  # fmt: skip
 
@@ -277,7 +305,7 @@ def _fit(basis: Sequence[Floats], y: Floats) -> Floats:
     return np.asarray(sum(c * b for c, b in zip(factors, basis, strict=True)))
 
 
-def _at(found: Motions, t: Floats) -> Floats:
+def _at(found: Difference, t: Floats) -> Floats:
     """The simulated motion at other times, at rest before the first."""
     u = np.nan_to_num(found.simulated).reshape(len(found.t), -1)
     before = np.vstack([np.zeros(u.shape[1]), u])
@@ -289,49 +317,42 @@ def _at(found: Motions, t: Floats) -> Floats:
 # --- of a run -------------------------------------------------------------------------------------
 
 
-def motions_of(followed: Followed, inertia: bool) -> Motions | None:
-    """The motion of the first recording's markers beside the run's; None where there is none in
-    time."""
-    seen = followed.seen.of(MarkerObservation)
-    if not seen or not followed.whole or not isinstance(followed.scene, Scene):
-        return None
-    markers = seen[0]
-    if len(markers.t) < _FEWEST:
-        return None
-    measured = markers.x - markers.rest
-    off = markers.left(followed.run).reshape(measured.shape)
+def difference_of(followed: Followed, history: History, inertia: bool) -> Difference:
+    """A history of a run, beside the body's first mode."""
     try:
-        first = first_frequencies(followed.scene, 1)[0]
+        first = first_frequencies(followed.body, 1)[0]
     except (ValidateError, np.linalg.LinAlgError):
         first = None
-    simulated = measured + off
-    return Motions(markers.t, markers.names, measured, simulated, inertia, first, markers.sd)
+    return Difference(history, inertia, first)
 
 
 def explained_by(
-    results: Sequence[MethodResult], motions: Callable[[str], Motions | None]
+    results: Sequence[MethodResult], differences: Callable[[str, Failed], Sequence[Difference]]
 ) -> tuple[str, tuple[Exhibit, ...]]:
     """A sentence with the likeliest cause of the first method with a check that fails, and a table
-    of all causes by method; nothing where every check passes or nothing moved in time."""
+    of all causes by method and history; nothing where every check passes or nothing was recorded
+    over time. `differences` are those of a method's observations with a failed quantity."""
     rows, sentence = [], ""
     for method in results:
-        failed = [c.name for c in method.checks
+        failed = {c.name.split("@")[0] for c in method.checks
                   if "differs" in (c.validation, c.acceptance)
-                  or c.acceptance == "not good enough"]  # fmt: skip
-        found = motions(method.name) if failed else None
-        causes = likely_causes(found) if found else ()
-        if causes and not sentence:
-            names = ", ".join(c.name for c in causes[:3])
-            sentence = f" Likely causes, in order: {names}: {causes[0].words}; {causes[0].tells}."
-        rows += [(method.label, i, c.name, 100 * min(c.share, 1.0), c.words, c.tells)
-                 for i, c in enumerate(causes, 1)]  # fmt: skip
+                  or c.acceptance == "not good enough"}  # fmt: skip
+        for found in differences(method.name, failed) if failed else ():
+            causes = likely_causes(found)
+            if causes and not sentence:
+                names = ", ".join(c.name for c in causes[:3])
+                sentence = (
+                    f" Likely causes, in order: {names}: {causes[0].words}; {causes[0].tells}."
+                )
+            rows += [(method.label, found.history.name, i, c.name, 100 * min(c.share, 1.0), c.words,
+                      c.tells) for i, c in enumerate(causes, 1)]  # fmt: skip
     if not rows:
         return "", ()
     table = NumberTable(
         "likely_causes",
         "What the residual looks like, and how much of its mean square would be gone. Shares "
         "overlap; they rank causes and prove none.",
-        ("method", "order", "cause", "share / %", "what is seen", "what would tell"),
+        ("method", "of", "order", "cause", "share / %", "what is seen", "what would tell"),
         tuple(rows), below="what would tell",
     )  # fmt: skip
     return sentence, (Exhibit("likely-causes", "Likely causes of the difference", (),

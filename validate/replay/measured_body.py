@@ -45,7 +45,6 @@ from validate.replay.measured_contact import (
 from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
-from validate.replay.motion_exhibit import motion_exhibit
 from validate.replay.moving_body import doubting, following, in_motion
 from validate.replay.similar_grids import divided, fitting, member
 from validate.scene.box import box
@@ -101,7 +100,7 @@ def measured_body(
     )  # fmt: skip
     if parameters.motion.how == "dynamic":
         return in_motion(bare, bare.build, folder)
-    return replace(_as_set(bare, (), parameters, folder=folder), exhibits=motion_exhibit)
+    return _as_set(bare, (), parameters, folder=folder)
 
 
 def _as_set(

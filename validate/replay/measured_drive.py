@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import RegistrationError, UsageError
+from validate.errors import ComparisonError, RegistrationError, UsageError
 from validate.fem.system import build
 from validate.identify.modulus import MIN_SAMPLES, load_noise
+from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording, Signal
 from validate.register.clock import clock_sd, interpolated
 from validate.register.signals import SignalObservation
@@ -97,6 +98,28 @@ def zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
     scatter = load_noise(s.y[:, 0]) if len(s.t) >= MIN_SAMPLES else 0.0
     sd = max(s.sd, scatter) * float(np.sqrt(1 + 1 / len(early)))
     return replace(s, y=s.y - early.mean(axis=0), sd=sd)
+
+
+def zeroed_force(recording: Recording, p: MeasuredBody, kind: Kind, until: float) -> Signal:
+    """The force on the moved place from its mean until then; raises `ComparisonError` where no
+    displacement moves a place."""
+    if kind != "moves":
+        raise ComparisonError(
+            f"seen.force = {p.seen.force}: a force is predicted where a displacement moves a "
+            f"place; here the body {kind}. Set seen.force=none"
+        )
+    return zeroed(recording, str(p.seen.force), "N", until)
+
+
+def observed_force(
+    recording: Recording, p: MeasuredBody, force: Signal, t: Floats, y: Floats
+) -> SignalObservation:
+    """The force y (nt, 1) N at t (nt,) s but its first sample, which is at rest."""
+    topic = str(p.seen.force)
+    return SignalObservation(
+        topic, "validates", t[1:], y[1:], "N", force.sd, "force", "moved.force",
+        clock_sd(recording, topic), repeats_share(recording),
+    )  # fmt: skip
 
 
 def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: BodyAt) -> Prescribed:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import RecordingError, RegistrationError, UsageError
+from validate.errors import ComparisonError, RecordingError, RegistrationError, UsageError
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording
 from validate.register.clock import clock_sd
@@ -67,6 +67,22 @@ def _declared(
     return observe_markers(
         markers, dict(zip(markers.names, rest, strict=True)), mesh, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic), registration=as_declared(markers.names, rest, markers.sd),
+    )  # fmt: skip
+
+
+def compared_markers(recording: Recording, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
+    """The registered markers but those that move the body.
+
+    Raises `ComparisonError` where none is left, and as `registered` does.
+    """
+    whole = registered(recording, p, at)
+    driving = p.moved.markers if p.moved.by == "markers" else ()
+    kept = [i for i, name in enumerate(whole.names) if name not in driving]
+    if not kept:
+        raise ComparisonError("every marker moves the body: none is left to be compared")
+    return replace(
+        whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
+        rest=whole.rest[kept], tre=whole.tre[kept],
     )  # fmt: skip
 
 

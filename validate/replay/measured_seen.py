@@ -7,17 +7,22 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, RegistrationError, UsageError
-from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
-from validate.register.clock import clock_sd
 from validate.register.from_rest import noise, rested, since_rest
 from validate.register.markers import MarkerObservation, Together
 from validate.register.observation import Observation, Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_drive import NOTED, Kind, drive_kind, driven, zeroed
-from validate.replay.measured_markers import BodyAt, listed_names, markers_topic, registered
+from validate.replay.measured_drive import (
+    NOTED,
+    Kind,
+    drive_kind,
+    driven,
+    observed_force,
+    zeroed_force,
+)
+from validate.replay.measured_markers import BodyAt, compared_markers, listed_names, markers_topic
 from validate.replay.measured_outline import observed_outline
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
@@ -25,6 +30,7 @@ from validate.scene.scene import Scene
 LOW, HIGH = "low", "high"
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers since rest, per axis"),)
 _FEWEST = 3  # instants of a window
+_TIE = 1e-9
 _AGAINST = 0.2  # of the farthest marker's way: so far back the mean of all may go
 
 
@@ -42,7 +48,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
     if p.seen.force:
         compared.append(_force(recording, p, kind, drive, rest))
     if p.seen.markers:
-        markers, findings = _markers(recording, p, kind, (scene.mesh, folder))
+        markers, findings = _markers(recording, p, (scene.mesh, folder))
         _require_along(p, markers, kind, float(drive.y[-1, 0]))
         compared.append(markers)
     if p.seen.outline:
@@ -56,7 +62,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
         )
     still = [o.name for o in compared if not isinstance(o, SignalObservation)]
     return Registered(
-        (drive, *compared), _selections(p, drive, kind),
+        (drive, *compared), _selections(recording, p, drive, kind),
         Selection("rest", t[:1], of=(*still, drive.name)),  # a force is counted from there
         findings=findings,
     )  # fmt: skip
@@ -97,14 +103,8 @@ def _force(
 ) -> SignalObservation:
     """Force on the moved place against its motion; raises `ComparisonError` where that is none of
     the run's, `RegistrationError` for a force that falls as the place moves."""
-    if kind != "moves":
-        raise ComparisonError(
-            f"seen.force = {p.seen.force}: a force is predicted where a displacement moves a "
-            f"place; here the body {kind}. Set seen.force=none"
-        )
-    topic = str(p.seen.force)
-    force = zeroed(recording, topic, "N", rest + p.seen.still)
-    t = drive.t
+    topic, t = str(p.seen.force), drive.t
+    force = zeroed_force(recording, p, kind, rest + p.seen.still)
     y = np.interp(t, force.t, force.y[:, 0])
     far = int(np.abs(drive.y[:, 0]).argmax())
     if y[far] * drive.y[far, 0] < 0 and abs(y[far]) > 5 * force.sd:
@@ -113,28 +113,17 @@ def _force(
             "force and motion must have one sign; turn one as it is imported, with "
             "--map force=COLUMN:UNIT:-"
         )
-    return SignalObservation(
-        topic, "validates", t[1:], y[1:, None], "N", force.sd, "force", "moved.force",
-        clock_sd(recording, topic), repeats_share(recording),
-    )  # fmt: skip
+    return observed_force(recording, p, force, t, y[:, None])
 
 
 def _markers(
-    recording: Recording, p: MeasuredBody, kind: Kind, at: BodyAt
+    recording: Recording, p: MeasuredBody, at: BodyAt
 ) -> tuple[MarkerObservation, tuple[str, ...]]:
     """All markers that move nothing themselves, from where they stood at rest."""
-    whole = registered(recording, p, at)
+    part = compared_markers(recording, p, at)
     source, unseen, samples = rested(recording.marker(markers_topic(recording, p)), p.seen.still)
-    driving = p.moved.markers if kind == "follows" else ()
-    kept = [i for i, n in enumerate(whole.names) if n not in driving]
-    if not kept:
-        raise ComparisonError("every marker moves the body: none is left to be compared")
-    part = replace(
-        whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
-        rest=whole.rest[kept], tre=whole.tre[kept],
-    )  # fmt: skip
     found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
-    bare = [n for n in source.names if n not in whole.names]
+    bare = [n for n in source.names if n not in (*part.names, *p.moved.markers)]
     left = (("not seen at rest", unseen), ("not in the layout", bare))
     said = tuple(
         f"markers {why} are left out: {listed_names(names)}" for why, names in left if names
@@ -164,14 +153,20 @@ def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amou
 # --- windows --------------------------------------------------------------------------------------
 
 
-def _selections(p: MeasuredBody, drive: SignalObservation, kind: Kind) -> tuple[Selection, ...]:
+def _selections(
+    recording: Recording, p: MeasuredBody, drive: SignalObservation, kind: Kind
+) -> tuple[Selection, ...]:
     """The one state under gravity; else the instants up to `fit_to` of the largest load, on which
-    an open modulus is identified, and those beyond."""
+    an open modulus is identified, and those beyond. Loads count as they were recorded: an uncertain
+    gap or compliance moves no instant from one window to the other."""
     after = drive.t[1:]
     if kind == "weighs":
         return (Selection("loaded", after, "the last instant"),)
     size = np.linalg.norm(drive.y[1:], axis=1)
-    low = size <= p.seen.fit_to * size.max()
+    if drive.name in recording.signals:
+        signal = recording.signals[drive.name]
+        size = np.abs(np.interp(drive.t, signal.t, signal.y[:, 0]) - signal.y[0, 0])[1:]
+    low = size <= (1 + _TIE) * p.seen.fit_to * size.max()
     share = f"{100 * p.seen.fit_to:g} % of the largest load"
     return (
         _window(LOW, after[low], f"instants up to {share}"),

@@ -18,24 +18,24 @@ from validate.estimate.kf_fem import KfFem
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
+from validate.identify.recorded_motion import RecordedMotion, motion_of
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import moved
 from validate.replay.experiment import Experiment, Identified, Input, StepLadder
-from validate.replay.first_modes import first_frequencies
+from validate.replay.first_modes import assumed_density, first_frequencies
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.method import Method
 from validate.replay.motion_exhibit import motion_exhibit
 from validate.replay.moving_seen import (
     FIRST,
-    motion_of,
     moving_markers,
     place_moving,
     preload,
     started,
     without_rest,
 )
-from validate.replay.recorded_motion import RecordedMotion
+from validate.report.motion_words import motion_words
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
 from validate.solve.explicit_linear import ExplicitLinear
@@ -111,7 +111,6 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
         sets=_sets,
         identify=partial(_identify, build=build, folder=folder),
         follows=following,
-        exhibits=motion_exhibit,
         uncertainty=uncertainty,
         frames=200,
     )
@@ -120,12 +119,22 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
 def following(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
 ) -> Experiment:
-    """Charts follow the axis of the largest recorded motion, where something moved."""
+    """Charts follow the axis of the largest recorded motion, where something moved; an exhibit
+    shows that motion, but where a force alone is judged in statics."""
     try:
-        axis = motion_of(recordings[0], p.seen.markers).axis
+        shown = motion_of(recordings[0], judged(p))
     except ValidateError:
         return experiment
-    return replace(experiment, axis=axis)
+    if p.seen.markers:
+        experiment = replace(experiment, axis=shown.axis)
+    if shown.unit != "m" and p.motion.how == "static":
+        return experiment
+    return replace(experiment, exhibits=partial(motion_exhibit, shown=shown))
+
+
+def judged(p: MeasuredBody) -> str | None:
+    """The topic whose motion a report describes: that of what is judged."""
+    return p.seen.markers or p.seen.outline or p.seen.force
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -188,10 +197,10 @@ def _identify(
             "material.E is not set: of a motion in time the modulus must be known; set it, or "
             "identify it on a static log"
         )
-    shown = motion_of(recordings[0], p.seen.markers)
+    shown = motion_of(recordings[0], judged(p))
     first = _first_of(recordings[0], p, methods, build)
-    headline = f"dynamic: {against_mode(shown, first)}"
-    seen = f"Recorded motion: {shown.words()}."
+    headline = f"dynamic: {against_mode(shown, first, p)}"
+    seen = f"Recorded motion: {motion_words(shown)}."
     if p.motion.fit_window is not None:
         p, scores, note, names = _ring_down(recordings[0], p, folder, build, methods)
         return Identified(p, scores, (seen, note), headline, calibrated=names)
@@ -201,10 +210,13 @@ def _identify(
     return Identified(p, (), (seen,), headline)
 
 
-def against_mode(shown: RecordedMotion, first: float | None) -> str:
+def against_mode(shown: RecordedMotion, first: float | None, p: MeasuredBody) -> str:
     """The recorded frequency beside the body's first natural one, in words."""
     recorded = f"recorded motion mostly at {shown.frequency:.3g} Hz"
-    return recorded + (f", first mode of the body at {first:.3g} Hz" if first else "")
+    if not first:
+        return recorded
+    assumed = assumed_density(p)
+    return f"{recorded}, first mode of the body at {first:.3g} Hz{assumed and f' ({assumed})'}"
 
 
 def _first_of(
@@ -224,7 +236,7 @@ def _ring_down(
     that window served for it."""
     window = float(p.motion.fit_window or 0.0)
     begun = started(recording, replace(p, motion=replace(p.motion, length=window)))
-    found = motion_of(begun.recording, p.seen.markers).ringing
+    found = motion_of(begun.recording, judged(p)).ringing
     if found is None or found.damping <= 0:
         raise ComparisonError(
             f"motion.fit_window = {window:g} s: no ring-down is found in it (three periods or more "
@@ -292,14 +304,14 @@ def doubting(
         return found
     first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
     if not shown.inertia_matters(first):
-        slow = f"Quasi-static: {against_mode(shown, first)}; inertia is small."
+        slow = f"Quasi-static: {against_mode(shown, first, p)}; inertia is small."
         return replace(found, notes=(*found.notes, slow)) if first else found
     why = (
-        f"statics, although inertia matters: {against_mode(shown, first)}; answer motion.how = "
+        f"statics, although inertia matters: {against_mode(shown, first, p)}; answer motion.how = "
         "dynamic in `validate new`"
     )
     headline = f"{why}; {found.headline}" if found.headline else why
-    seen = f"Recorded motion: {shown.words()}."
+    seen = f"Recorded motion: {motion_words(shown)}."
     return replace(
         found, headline=headline, doubts=(*found.doubts, why), notes=(*found.notes, seen)
     )

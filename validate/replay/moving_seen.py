@@ -14,9 +14,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.recording.scatter import repeats_share
+from validate.identify.recorded_motion import motion_of
 from validate.recording.types import Contours, Markers, Recording, Signal
-from validate.register.clock import clock_sd
 from validate.register.from_rest import since_rest
 from validate.register.markers import MarkerObservation
 from validate.register.observation import EVERYTHING, Observation, Selection
@@ -28,12 +27,12 @@ from validate.replay.measured_drive import (
     Kind,
     drive_kind,
     driven,
+    observed_force,
     released_force,
-    zeroed,
+    zeroed_force,
 )
-from validate.replay.measured_markers import BodyAt, markers_topic, registered
+from validate.replay.measured_markers import BodyAt, compared_markers, markers_topic
 from validate.replay.measured_outline import observed_outline
-from validate.replay.recorded_motion import RecordedMotion, recorded_motion
 from validate.scene.scene import Scene
 
 FILM = "film"  # the label of outlines
@@ -55,24 +54,6 @@ class Started:
     rest: int
     sd_t: float
     noise: float
-
-
-def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
-    """The motion of the markers of a topic (none: the only one), or of a signal in m.
-
-    Raises `ComparisonError` where there are none, or nothing moves.
-    """
-    if topic is None and recording.markers:
-        topic = next(iter(recording.markers))
-    if topic in recording.markers:
-        seen = recording.marker(str(topic))
-        named = {name: seen.x[:, j] for j, name in enumerate(seen.names)}
-        return recorded_motion(seen.t, named, seen.sd)
-    lengths = {t: s for t, s in recording.signals.items() if s.unit == "m"}
-    if not lengths:
-        raise ComparisonError(f"{recording.name}: no markers and no signal in m; nothing moves")
-    name, signal = next(iter(lengths.items()))
-    return recorded_motion(signal.t, {name: signal.y[:, :1]}, signal.sd)
 
 
 def started(recording: Recording, p: MeasuredBody) -> Started:
@@ -245,15 +226,7 @@ def _load(
 def moving_markers(begun: Started, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
     """Every sample of the markers after the start, in the body's frame, each a quantity of its own;
     those that move the body are left out. Raises `ComparisonError` where none is left."""
-    whole = registered(begun.recording, p, at)
-    driving = p.moved.markers if drive_kind(begun.recording, p) == "follows" else ()
-    kept = [i for i, name in enumerate(whole.names) if name not in driving]
-    if not kept:
-        raise ComparisonError("every marker moves the body: none is left to be compared")
-    part = replace(
-        whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
-        rest=whole.rest[kept], tre=whole.tre[kept],
-    )  # fmt: skip
+    part = compared_markers(begun.recording, p, at)
     since = since_rest(part, at[0], begun.noise, begun.rest, p.seen.stands)
     return replace(
         since, t=since.t[1:], x=since.x[1:], sd_t=float(np.hypot(since.sd_t, begun.sd_t))
@@ -262,17 +235,8 @@ def moving_markers(begun: Started, p: MeasuredBody, at: BodyAt) -> MarkerObserva
 
 def _force(cut: Recording, p: MeasuredBody, kind: Kind) -> SignalObservation:
     """The force on the moved place, sample by sample."""
-    topic = str(p.seen.force)
-    if kind != "moves":
-        raise ComparisonError(
-            f"seen.force = {topic}: a force is predicted where a displacement moves a place; set "
-            "seen.force=none"
-        )
-    force = zeroed(cut, topic, "N", 0.0)
-    return SignalObservation(
-        topic, "validates", force.t[1:], force.y[1:], "N", force.sd, "force", "moved.force",
-        clock_sd(cut, topic), repeats_share(cut),
-    )  # fmt: skip
+    force = zeroed_force(cut, p, kind, 0.0)
+    return observed_force(cut, p, force, force.t, force.y)
 
 
 def _windows(

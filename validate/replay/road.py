@@ -35,7 +35,7 @@ from validate.replay.experiment import Experiment, Identified, Told, Variant
 from validate.replay.followed import MAIN, Cases, Followed
 from validate.replay.gated import gate_warnings
 from validate.replay.guest_exhibit import guest_exhibits
-from validate.replay.likely_causes import Motions, explained_by, motions_of
+from validate.replay.likely_causes import Difference, Failed, difference_of, explained_by
 from validate.replay.method import Method
 from validate.replay.options import Options, Report, all_methods, chosen_cases, configure
 from validate.replay.origins import Opened, marked, opened
@@ -146,7 +146,9 @@ def _compared(
     told = _told(road, {MAIN: main, **others})
     results = tuple(_method(road, main[name], others) for name in methods)
     effects = effects_of(road, results)
-    because, causes = explained_by(results, lambda name: _motions(main[name], methods[name]))
+    because, causes = explained_by(
+        results, lambda name, failed: _differences(main[name], methods[name], failed)
+    )
     published = _published(road, results, identified, told)
     first = main[next(iter(methods))]
     locking = locking_notes(
@@ -202,9 +204,15 @@ def _compared(
     )
 
 
-def _motions(followed: Followed, method: Method) -> Motions | None:
+def _differences(followed: Followed, method: Method, failed: Failed) -> list[Difference]:
+    """Histories of the observations that a failed quantity is of."""
     handles = getattr(method.settings, "handles", None)
-    return motions_of(followed, inertia=handles is None or handles.inertia)
+    inertia = handles is None or handles.inertia
+    units = {o.name: tuple(o.units) for o in followed.seen.observations}
+    return [
+        difference_of(followed, h, inertia) for h in followed.histories
+        if any(f == q or f.startswith(f"{q}.") for f in failed for q in units[h.name])
+    ]  # fmt: skip
 
 
 def _specimens(experiment: Experiment, recordings: tuple[Recording, ...]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 A recorded standard deviation of a stage, a force or of tracked points is taken as an error that is
 there at all times after rest (an offset): at every instant of a static problem it does what an
 independent error of that instant would do. A set of nodes that follows tracked points has one input
-for every motion that it can follow, from their covariance.
+for every rigid motion.
 """
 
 from collections.abc import Iterator, Mapping

@@ -8,9 +8,10 @@ from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.report.numbers import significant, spaced, with_unit
 from validate.report.observed import Held, holds, outline, shown_method
+from validate.scene.contact import Shape
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import AnyScene
-from validate.scene.scene import Weight
+from validate.scene.scene import Scene, Weight
 from validate.scene.select import nodes_of
 
 _MM = 1e3
@@ -23,6 +24,16 @@ class Plate:
     centre: Floats
     sizes: Floats
     shift: Floats
+
+
+@dataclass(frozen=True)
+class ShownIndenter:
+    """A rigid body where it stands at rest, m, moved by `shift` (3,) mm; `extent` (3,) mm is that
+    of what it may touch, by which endless shapes are cut."""
+
+    shape: Shape
+    shift: Floats
+    extent: Floats
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,7 @@ class ShownBody:
     mesh: Mesh
     u: Floats
     plates: tuple[Plate, ...]
+    indenters: tuple[ShownIndenter, ...]
     cavity: str | None
     pressure: float | None
     pressures: tuple[float, float]
@@ -74,6 +86,7 @@ def shown_body(result: Result) -> ShownBody | None:
         mesh=scene.mesh,
         u=_MM * run.u[frame],
         plates=_plates(method, frame),
+        indenters=_indenters(method, frame),
         cavity=cavity.facets if cavity else None,
         pressure=float(trace.y[run.at[frame]]) if trace else None,
         pressures=(0.0, max(float(trace.y.max()), 1.0)) if trace else (0.0, 1.0),
@@ -102,11 +115,13 @@ def _load(hold: Held) -> str:
 
 
 def _toward(scene: AnyScene) -> Floats:
-    """Where the body is driven to, else where its weight pulls; without either the last axis is
-    drawn upward."""
+    """Where the body is driven or pressed to, else where its weight pulls; without either the last
+    axis is drawn upward."""
+    tools = scene.contacts if isinstance(scene, Scene) else ()
+    pressed = [tool.direction for tool in tools if tool.direction is not None]
     weights = [load.direction for load in scene.loads if isinstance(load, Weight)]
     drives = [drive.direction for drive in scene.drives]
-    return np.array([*drives, *weights, (0.0, 0.0, -1.0)][0])
+    return np.array([*drives, *pressed, *weights, (0.0, 0.0, -1.0)][0])
 
 
 def _opened(result: Result, toward: Floats) -> tuple[Floats, str]:
@@ -117,6 +132,20 @@ def _opened(result: Result, toward: Floats) -> tuple[Floats, str]:
         return np.roll(np.abs(toward), 1), "a plane along the drive"
     normal = seen.pose[:3, 2]
     return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))])), "the image plane"
+
+
+def _indenters(method: MethodResult, frame: int) -> tuple[ShownIndenter, ...]:
+    scene, run = method.scene, method.run
+    if not isinstance(scene, Scene):
+        return ()
+    found = []
+    for tool in scene.contacts:
+        touched = _MM * scene.mesh.nodes[nodes_of(scene.mesh, tool.facets)]
+        shift, travel = np.zeros(3), run.traces.get(f"{tool.name}.displacement")
+        if tool.direction is not None and travel is not None:
+            shift = _MM * float(travel.y[run.at[frame]]) * np.array(tool.direction)
+        found.append(ShownIndenter(tool.shape, shift, np.ptp(touched, axis=0)))
+    return tuple(found)
 
 
 def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:

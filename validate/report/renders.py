@@ -9,7 +9,8 @@ import pyvista as pv
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Picture, Pixels
-from validate.report.body import ShownBody
+from validate.report.body import ShownBody, ShownIndenter
+from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere
 from validate.scene.shape_functions import EDGES, LATTICE
 
 _IN_FRONT = (
@@ -52,6 +53,7 @@ def renders(body: ShownBody) -> tuple[Picture, ...]:
     )  # fmt: skip
     whole = body.normal is None
     plates = "; plates grey" if body.plates else ""
+    plates += "; the rigid indenter in see-through grey" if body.indenters else ""
     opened = "whole" if whole else f"cut open through {body.cut}"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
@@ -71,7 +73,8 @@ def renders(body: ShownBody) -> tuple[Picture, ...]:
         "render_mesh", f"The mesh of {body.label} at {body.load}: {len(body.mesh.cells)} "
         f"elements, {len(body.mesh.nodes)} nodes; edges of the elements{cut}.", _View(edges=True),
     )  # fmt: skip
-    alone = whole and not body.plates  # then nothing shows how far it moved from rest
+    # Else nothing shows how far it moved from rest.
+    alone = whole and not (body.plates or body.indenters)
     return tuple(
         _picture(name, words, body, view)
         for name, words, view in ((deformed, mesh) if alone else (deformed, rest, across, mesh))
@@ -120,7 +123,34 @@ def _fill(plotter: Any, body: ShownBody, view: _View) -> None:
         if body.normal is not None:
             box = box.clip(normal=body.normal, origin=body.origin)
         plotter.add_mesh(box, color="#A9B0B7", ambient=0.3)
+    for indenter in body.indenters:
+        solid = drawn_indenter(indenter)
+        solid.points = np.asarray(solid.points) + view.scale * indenter.shift
+        plotter.add_mesh(solid, color="#A9B0B7", ambient=0.3, opacity=0.45)
     _aim(plotter, body, view.oblique)
+
+
+def drawn_indenter(part: ShownIndenter) -> Any:
+    """Return its surface in mm, at rest; a plane and a bar are as long as what they may touch, a
+    punch as its radius."""
+    shape, long = part.shape, 1.2 * float(np.linalg.norm(part.extent))
+    if isinstance(shape, RigidSphere):
+        return pv.Sphere(radius=1e3 * shape.radius, center=1e3 * np.array(shape.centre),
+                         theta_resolution=60, phi_resolution=60)  # fmt: skip
+    if isinstance(shape, RigidCylinder):
+        axis = np.array(shape.axis) / np.linalg.norm(shape.axis)
+        return pv.Cylinder(center=1e3 * np.array(shape.point), direction=axis,
+                           radius=1e3 * shape.radius,
+                           height=1.2 * float(np.abs(axis) @ part.extent))  # fmt: skip
+    if isinstance(shape, RigidPunch):
+        at, radius, thick = shape.centre, 1e3 * shape.radius, 1e3 * shape.radius
+    elif isinstance(shape, RigidPlane):
+        at, radius, thick = shape.point, long / 2, 0.05 * long
+    else:
+        raise TypeError(f"no drawing of a {type(shape).__name__}; expected a rigid shape of scenes")
+    normal = np.array(shape.normal) / np.linalg.norm(shape.normal)
+    return pv.Cylinder(center=1e3 * np.array(at) - 0.5 * thick * normal, direction=normal,
+                       radius=radius, height=thick)  # fmt: skip
 
 
 def vtk_order() -> list[int]:

@@ -26,10 +26,8 @@ from validate.fem.threads import Team, idle_cores, pilot
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.candidates import Asked, Rival, SwingingBody
-from validate.solve.central_contact import ExplicitContact, Struck, explicit_contact
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
 from validate.solve.stepping import TETS, Radii, Rates, Stepping
-from validate.solve.touching_traces import contact_units
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -56,7 +54,7 @@ class CentralDifference:
     With `precision` "single" forces are of 7 digits; the motion is the velocity form, in doubles.
     """
 
-    handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, contact=("foundations", "rigid"))
+    handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
@@ -118,18 +116,10 @@ class CentralDifference:
         body = ExplicitBody(system.scene, self.threads, self.precision)
         body.share(1)  # until a pilot has shown that more pay
         masses = system.masses[system.free]
-        if body.branches and system.scene.contacts:
-            raise SceneError(
-                "explicit contact knows no Prony series: drop one of them, or take NewtonDynamics "
-                "without contact"
-            )
         rule = self._rule(system, beta)
         stepper = CentralStepper(
-            self, system, body, rule, beta, system.held, plates, feels_loads, masses, past,
-            explicit_contact(system, body, rule),
-        )  # fmt: skip
-        if stepper.contact:
-            stepper = replace(stepper, start=replace(past, struck=stepper.contact.rest()))
+            self, system, body, rule, beta, system.held, plates, feels_loads, masses, past
+        )
         stepper.warm()
         stepper = replace(stepper, start=stepper.limited(stepper.start))
         return stepper if self.threads == 1 else stepper.teamed(idle_cores())
@@ -177,7 +167,6 @@ class Past:
     work: float = 0.0
     taken: float = 0.0
     most: float = 0.0
-    struck: Struck | None = None
 
 
 @dataclass(frozen=True)
@@ -194,7 +183,6 @@ class CentralStepper:
     feels_loads: bool
     masses: Floats
     start: Past
-    contact: ExplicitContact | None = None
     team: Team | None = None
 
     @property
@@ -205,7 +193,7 @@ class CentralStepper:
     def units(self) -> Mapping[str, str]:
         """Energies half a step before the last watch, det F and critical step then, forces."""
         forces = {f"{d.name}.force": "N" for d in self.scene.drives}
-        return _SEEN | forces | contact_units(self.scene)
+        return _SEEN | forces
 
     def warm(self) -> None:
         """Compiles: no step is charged with it."""
@@ -231,8 +219,7 @@ class CentralStepper:
     def rest(self) -> State:
         u = self.start.motion["u"]
         seen = self._seen(self.start, self.body.look(u))
-        numbers = seen | self._forces(u, self.start.inputs) | self._touched(self.start)
-        return State(0, self.start, numbers=numbers)
+        return State(0, self.start, numbers=seen | self._forces(u, self.start.inputs))
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
@@ -241,7 +228,7 @@ class CentralStepper:
             return replace(state, failure=("refused", self._too_large(past.limit)))
         k, substeps = state.k + 1, self.settings.substeps
         start = perf_counter()
-        motion, struck, work, taken, finite = self._advanced(past, inputs)
+        motion, work, taken, finite = self._advanced(past, inputs)
         if self.team:
             self.team.saw(perf_counter() - start)
             self.body.share(self.team.threads)
@@ -249,28 +236,18 @@ class CentralStepper:
             ratio = self.rule.dt / past.limit
             words = f"no finite displacements after it; dt is {ratio:.3g} of the critical step"
             return replace(state, failure=("diverged", words))
-        new = _worked(replace(past, struck=struck), motion, inputs, work, taken)
+        new = _worked(past, motion, inputs, work, taken)
         numbers, failure = dict(state.numbers), None
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
             numbers |= seen
-        numbers |= self._forces(motion["r"], inputs) | self._touched(new)
+        numbers |= self._forces(motion["r"], inputs)
         return State(k, new, failure, substeps, numbers)
 
-    def _advanced(
-        self, past: Past, inputs: Floats
-    ) -> tuple[ExplicitMotion, Struck | None, float, float, bool]:
-        """Motion, contact, work, what damping took, and whether all is finite."""
-        motion, begin, substeps = past.motion, past.inputs, self.settings.substeps
-        if self.contact and past.struck:
-            return self.contact.advance(motion, past.struck, begin, inputs, substeps)
-        new, work, taken, finite = self.body.advance(motion, self.rule, begin, inputs, substeps)
-        return new, None, work, taken, finite
-
-    def _touched(self, past: Past) -> dict[str, float]:
-        if not (self.contact and past.struck):
-            return {}
-        return self.contact.numbers(past.motion, past.struck, past.inputs)
+    def _advanced(self, past: Past, inputs: Floats) -> tuple[ExplicitMotion, float, float, bool]:
+        """Motion, work, what damping took, and whether all is finite."""
+        substeps = self.settings.substeps
+        return self.body.advance(past.motion, self.rule, past.inputs, inputs, substeps)
 
     def _forces(self, r: Floats, inputs: Floats) -> dict[str, float]:
         """Forces N of the plates on the whole body (eq 32), compression positive, no inertia."""

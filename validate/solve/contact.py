@@ -1,25 +1,21 @@
-"""Contact with rigid bodies by Newton's method: static or in time, linear or at large strain.
+"""Static contact with rigid bodies by Newton's method, linear or at large strain.
 
-R(u) + C v + M a - f = r at the end of a step, with the contact forces r of `solve.touching`: no
-penalty, and nothing penetrates in the end. In time the contact impulse acts wholly at the end of
-the step (Kane, Repetto, Ortiz & Marsden 1999) along the normals of its beginning, so that with a
-linear body contact never adds energy: an impact takes the normal motion of the nodes that hit,
-which vanishes with the mesh. Rates: the trapezoidal rule ("average") or backward Euler.
+R(u) - f = r at the end of a step, with the contact forces r of `solve.touching`: no penalty, and
+nothing penetrates in the end.
 
-Departures: stiffness damping is that of the body at rest. A node that comes to touch within a step
-of statics is anchored where it stood at the step's beginning: rub in steps.
+Departure: a node that comes to touch within a step is anchored where it stood at the step's
+beginning: rub in steps.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness_damping
 from validate.fem.elastic import Elastic, elastic
 from validate.fem.factor import elimination_order, factorise_general, factorise_indefinite
 from validate.fem.rigid import require_held
@@ -27,7 +23,6 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.contact import INSIDE
 from validate.scene.scene import Scene
-from validate.solve.central import lumped_damping
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.touching import (
     OPEN,
@@ -51,51 +46,36 @@ _ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing bu
 
 @dataclass(frozen=True)
 class ContactNewton:
-    """Settings. `dt` is for the rules with rates; masses are lumped.
-
-    `cuts`: times that a load step of statics is halved; a dynamic step fails at once.
-    """
+    """Settings."""
 
     handles: ClassVar[Handles] = Handles(
-        ("linear", *LARGE), inertia=True, cavities=False, contact=("foundations", "rigid")
+        ("linear", *LARGE), inertia=False, cavities=False, contact=("foundations", "rigid")
     )
 
-    rule: Literal["static", "average", "backward_euler"] = quantity(
-        "static", "1", "how v and a follow u; static: neither"
-    )
-    dt: float = quantity(0.001, "s", "time step")
     tolerance: float = quantity(1e-9, "1", "residual, of the forces that act; gaps, of the body")
     max_iterations: int = quantity(40, "1", "of Newton and the sets of touching nodes in a step")
     cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
 
     def __post_init__(self) -> None:
-        if not (self.dt > 0 and self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
+        if not (self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
             raise SceneError(
-                f"dt {self.dt:g} s, tolerance {self.tolerance:g}, {self.max_iterations} "
-                "iterations: all must be positive"
+                f"tolerance {self.tolerance:g}, {self.max_iterations} iterations, {self.cuts} "
+                "cuts: all must be positive"
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for what is not handled, a missing density, and in statics for a body
-        that nothing holds, counting what touches at rest."""
+        """Raises `SceneError` for what is not handled, and for a body that nothing holds, counting
+        what touches at rest."""
         scene = system.scene
         require_handled(scene, self)
         N, free = len(system.moves), system.free
         parts = candidates(system)
-        masses, C = np.zeros(N), sparse.csr_array((N, N))
-        if self.rule == "static":
-            require_held(
-                scene, system.held, _touched_rows(parts, scene), ", or let it touch at rest"
-            )
-        else:
-            masses = system.masses
-            C = sparse.csr_array(sparse.diags_array(lumped_damping(system)))
-            C = sparse.csr_array(C + stiffness_damping(scene))
+        require_held(scene, system.held, _touched_rows(parts, scene), ", or let it touch at rest")
         node, K = free // scene.mesh.dimension, system.K[free][:, free]
         order = elimination_order(K, node, scene.mesh.nodes)
         rank = np.empty(N, dtype=np.int64)
         rank[free[order]] = np.arange(len(free))
-        return ContactStepper(self, system, elastic(system), masses, C, rank, parts)
+        return ContactStepper(self, system, elastic(system), rank, parts)
 
 
 def _touched_rows(parts: Candidates, scene: Scene) -> Floats:
@@ -113,12 +93,10 @@ def _touched_rows(parts: Candidates, scene: Scene) -> Floats:
 
 @dataclass(frozen=True)
 class InTouch:
-    """Displacements, velocities, accelerations (N,) in balance under the inputs (k + l + m,); which
-    nodes touch, the contact forces (c, d) N on them, and the work (contacts,) J of the tools."""
+    """Displacements (N,) in balance under the inputs (k + l + m,); which nodes touch, the contact
+    forces (c, d) N on them, and the work (contacts,) J of the tools."""
 
     u: Floats
-    v: Floats
-    a: Floats
     inputs: Floats
     status: Ints
     forces: Floats
@@ -126,25 +104,12 @@ class InTouch:
 
 
 @dataclass(frozen=True)
-class _StepRates:
-    """v = p (u - u_n) + v_0, a = q (u - u_n) + a_0; contact forces are `share` of the residual."""
-
-    p: float
-    q: float
-    v: Floats
-    a: Floats
-    share: float
-
-
-@dataclass(frozen=True)
 class ContactStepper:
-    """`masses` (N,) kg and `C` (N, N) N s/m are zero in statics; `rank` (N,) orders elimination."""
+    """`rank` (N,) orders elimination."""
 
     settings: ContactNewton
     system: System
     body: Elastic
-    masses: Floats
-    C: sparse.csr_array
     rank: Ints
     parts: Candidates
 
@@ -154,10 +119,9 @@ class ContactStepper:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Forces of drives, numbers of contacts (`contact_units`), energies of the mesh."""
+        """Forces of drives, numbers of contacts (`contact_units`), energy of the mesh."""
         forces = {f"{d.name}.force": "N" for d in self.scene.drives}
-        energies = {"energy.strain": "J", "energy.kinetic": "J"}
-        return forces | contact_units(self.scene) | energies
+        return forces | contact_units(self.scene) | {"energy.strain": "J"}
 
     @property
     def _size(self) -> float:
@@ -170,7 +134,7 @@ class ContactStepper:
         able = np.abs(normals * self.parts.free).max(axis=1, initial=0.0) > INSIDE
         touches = (gaps < INSIDE * self._size) & able
         status = np.where(touches, np.where(self.parts.friction > 0, STICK, SLIP), OPEN)
-        inner = InTouch(u, u, u, inputs, status, np.zeros((c, x.shape[1])),
+        inner = InTouch(u, inputs, status, np.zeros((c, x.shape[1])),
                         np.zeros(len(self.scene.contacts)))  # fmt: skip
         return State(0, inner, numbers=self._numbers(inner))
 
@@ -178,13 +142,12 @@ class ContactStepper:
         """To the inputs (k + l + m,) at the end of the step: drives, loads, rigid bodies."""
         at, k = replace(state, updates=0), state.k + 1
         done, size, begin = 0.0, 1.0, state.inner.inputs
-        static = self.settings.rule == "static"
         while done < 1:
             share = min(done + size, 1.0)
             new = self._solved(at, begin + share * (inputs - begin))
             if new.failure is None:
                 at, done = replace(new, updates=at.updates + new.updates), share
-            elif static and size > 0.5**self.settings.cuts:
+            elif size > 0.5**self.settings.cuts:
                 size /= 2
             else:
                 return replace(state, failure=_stopped(new, k, done))
@@ -193,12 +156,11 @@ class ContactStepper:
     def _solved(self, state: State, inputs: Floats) -> State:
         """One step by Newton and changes of the sets, from the state's displacements."""
         last: InTouch = state.inner
-        rates, drives = self._rates(last), len(self.scene.drives)
+        drives = len(self.scene.drives)
         f, move = self._loads(inputs), self.system.moves @ (inputs - last.inputs)[:drives]
-        at = frame(self.parts, self._places(last.u), last.inputs, inputs,
-                   self.settings.rule != "static", self._stiff(rates))  # fmt: skip
+        at = frame(self.parts, self._places(last.u), last.inputs, inputs, self._stiff)
         u, status, changed, pressures = last.u, last.status, True, None
-        residual, acting = self._residual(u, last, rates, f)
+        residual, acting = self._residual(u, f)
         deep = self.settings.tolerance * self._size
         status = entered(at, status, self._places(u), deep)
         for iteration in range(self.settings.max_iterations + 1):
@@ -210,11 +172,11 @@ class ContactStepper:
                 and off <= self._small(acting)
                 and np.abs(held.du).max(initial=0.0) <= deep
             ):
-                return self._found(state, u, rates, inputs, at, status, residual, iteration)
+                return self._found(state, u, inputs, at, status, residual, iteration)
             if iteration == self.settings.max_iterations:
                 break
             try:
-                step = self._correction(u, pressures, rates, held)
+                step = self._correction(u, pressures, held)
             except SceneError as vanished:
                 return replace(state, failure=("not_converged", _singular(status, vanished)))
             pressures, u = self.body.extrapolated(u, step), u + step
@@ -223,7 +185,7 @@ class ContactStepper:
             if bad:
                 words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
                 return replace(state, failure=("invalid", words))
-            residual, acting = self._residual(u, last, rates, f)
+            residual, acting = self._residual(u, f)
             new = updated(at, status, self._places(u), residual, self._small(acting), deep)
             changed, status = bool((new != status).any()), new
         words = f"residual {off / acting if acting else np.inf:.1e} after {iteration} iterations"
@@ -234,10 +196,10 @@ class ContactStepper:
         """The residual N that counts as none beside the forces that act."""
         return self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
 
-    def _stiff(self, rates: _StepRates) -> Floats:
-        """Stiffness (c,) N/m of the candidates' own unknowns, inertia included."""
-        own = self.system.K.diagonal() + rates.q * self.masses
-        return np.asarray(own[self.parts.unknowns].mean(axis=1))
+    @property
+    def _stiff(self) -> Floats:
+        """Stiffness (c,) N/m of the candidates' own unknowns."""
+        return np.asarray(self.system.K.diagonal()[self.parts.unknowns].mean(axis=1))
 
     def _places(self, u: Floats) -> Floats:
         """Where the candidates are (c, d) m."""
@@ -247,32 +209,14 @@ class ContactStepper:
     def _loads(self, inputs: Floats) -> Floats:
         return np.asarray(self.system.loads @ inputs[len(self.scene.drives) :])
 
-    def _rates(self, last: InTouch) -> _StepRates:
-        dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
-        if self.settings.rule == "average":
-            return _StepRates(2 / dt, 4 / dt**2, -last.v, -4 / dt * last.v - last.a, 0.5)
-        if self.settings.rule == "backward_euler":
-            return _StepRates(1 / dt, 1 / dt**2, zero, -last.v / dt, 1.0)
-        return _StepRates(0.0, 0.0, zero, zero, 1.0)
+    def _residual(self, u: Floats, f: Floats) -> tuple[Floats, float]:
+        """R - f (N,) N, contact forces among it, and the size of what acts."""
+        R = self.body.force(u)
+        return R - f, max(float(np.linalg.norm(x)) for x in (R, f))
 
-    def _residual(
-        self, u: Floats, last: InTouch, rates: _StepRates, f: Floats
-    ) -> tuple[Floats, float]:
-        """R + C v + M a - f (N,) N, contact forces among it, and the size of what acts."""
-        d = u - last.u
-        R, inertia = self.body.force(u), self.masses * (rates.q * d + rates.a)
-        acting = max(float(np.linalg.norm(x)) for x in (R, inertia, f))
-        return R + inertia + self.C @ (rates.p * d + rates.v) - f, acting
-
-    def _correction(
-        self, u: Floats, pressures: Floats | None, rates: _StepRates, held: Constraints
-    ) -> Floats:
+    def _correction(self, u: Floats, pressures: Floats | None, held: Constraints) -> Floats:
         """The Newton correction (N,) that the constraints admit."""
-        J = (
-            self.body.tangent(u, pressures)
-            + rates.p * self.C
-            + sparse.diags_array(rates.q * self.masses)
-        )
+        J = self.body.tangent(u, pressures)
         A = sparse.csr_array(held.L.T @ (J @ held.T))
         order = np.argsort(self.rank[held.kept])
         if held.S is None:
@@ -285,35 +229,28 @@ class ContactStepper:
         return np.asarray(held.T @ factor.solve(-held.off - held.L.T @ (J @ held.du)) + held.du)
 
     def _found(
-        self, state: State, u: Floats, rates: _StepRates, inputs: Floats, at: Frame, status: Ints,
-        residual: Floats, iterations: int,
+        self, state: State, u: Floats, inputs: Floats, at: Frame, status: Ints, residual: Floats,
+        iterations: int,
     ) -> State:  # fmt: skip
         last: InTouch = state.inner
-        d = u - last.u
-        v, a = rates.p * d + rates.v, rates.q * d + rates.a
         _, normals = at.look(self._places(u))
         found = rub(at, self._places(u), residual)
         r = found.normal[:, None] * normals * self.parts.free + found.along
-        r = np.where((status != OPEN)[:, None], r, 0.0)
-        if self.settings.rule == "average":  # the contact impulse is no part of what a carries on
-            np.subtract.at(a, self.parts.unknowns, r / self.masses[self.parts.unknowns])
-        forces = rates.share * r
-        mean = forces if rates.q else (forces + last.forces) / 2
+        forces = np.where((status != OPEN)[:, None], r, 0.0)
+        mean = (forces + last.forces) / 2
         moved = at.offsets - self.parts.offsets(last.inputs)
         done = np.bincount(self.parts.owner, (mean * moved).sum(axis=1), len(last.work))
-        inner = InTouch(u, v, a, inputs, status, forces, last.work + done)
+        inner = InTouch(u, inputs, status, forces, last.work + done)
         return State(state.k, inner, None, iterations, self._numbers(inner))
 
     def _numbers(self, now: InTouch) -> Mapping[str, float]:
-        """Forces N on the whole body, compression positive, energies J of the mesh."""
+        """Forces N on the whole body, compression positive, energy J of the mesh."""
         scene, copies = self.scene, self.scene.copies
-        inertia = self.masses * now.a
-        acting = self.body.force(now.u) + self.C @ now.v + inertia - self._loads(now.inputs)
+        acting = self.body.force(now.u) - self._loads(now.inputs)
         forces = copies * (acting @ self.system.moves)
         numbers = {f"{d.name}.force": float(x) for d, x in zip(scene.drives, forces, strict=True)}
         numbers |= contact_numbers(self.parts, scene, self._now(now))
-        numbers["energy.strain"] = self.body.energy(now.u)
-        return numbers | {"energy.kinetic": float(now.v @ (self.masses * now.v)) / 2}
+        return numbers | {"energy.strain": self.body.energy(now.u)}
 
     def _now(self, now: InTouch) -> Touched:
         x = self.scene.mesh.nodes + now.u.reshape(self.scene.mesh.nodes.shape)
@@ -332,7 +269,7 @@ def _singular(status: Ints, why: SceneError) -> str:
         return str(why)
     return (
         f"it slides off: nothing holds the body but {touching} touching nodes, all of which slip; "
-        "add a support, more friction, or take a rule with rates"
+        "add a support, or more friction"
     )
 
 

@@ -64,7 +64,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
     "loads": ("QuasiStatic", "NewtonDynamics"),
     "drives": ("KfFem", "ModalKf"),
     "membranes": ("QuasiStatic", "Newmark"),
-    "rigid": ("ContactNewton", "CentralDifference"),
+    "rigid": ("ContactNewton",),
     "needle": ("NeedleLoop",),
 }
 

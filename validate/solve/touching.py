@@ -102,11 +102,7 @@ def _touching(scene: Scene, part: RigidContact) -> Ints:
 @dataclass(frozen=True)
 class Frame:
     """A step's view of the rigid bodies: candidates carried along with them from its beginning to
-    `start` (c, d) m, gaps (c,) and normals (c, d) there. `frozen`: gaps are linear about `start`;
-    `stiff` (c,) N/m scales slips to forces.
-
-    Frozen normals never let a node into a convex body, and their work n . (x - start) = -gap is
-    never above zero: contact then takes energy and gives none.
+    `start` (c, d) m, gaps (c,) and normals (c, d) there; `stiff` (c,) N/m scales slips to forces.
     """
 
     parts: Candidates
@@ -114,14 +110,11 @@ class Frame:
     offsets: Floats
     gaps: Floats
     normals: Floats
-    frozen: bool
     stiff: Floats
 
     def look(self, x: Floats) -> tuple[Floats, Floats]:
-        """Gaps (c,) m and normals (c, d) at x (c, d) m as this step's constraints have them."""
-        if not self.frozen:
-            return self.parts.look(x, self.offsets)
-        return self.gaps + ((x - self.start) * self.normals).sum(axis=1), self.normals
+        """Gaps (c,) m and normals (c, d) at x (c, d) m at the end of the step."""
+        return self.parts.look(x, self.offsets)
 
     def anchors(self) -> Floats:
         """Where sticking nodes belong (c, d) m."""
@@ -129,13 +122,11 @@ class Frame:
         return np.asarray(self.start - lift[:, None] * self.normals)
 
 
-def frame(
-    parts: Candidates, x: Floats, begin: Floats, end: Floats, frozen: bool, stiff: Floats
-) -> Frame:
+def frame(parts: Candidates, x: Floats, begin: Floats, end: Floats, stiff: Floats) -> Frame:
     """From places x (c, d) m at the inputs `begin` to the inputs `end` (k + l + m,)."""
     offsets = parts.offsets(end)
     start = x + offsets - parts.offsets(begin)
-    return Frame(parts, start, offsets, *parts.look(start, offsets), frozen, stiff)
+    return Frame(parts, start, offsets, *parts.look(start, offsets), stiff)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from validate.errors import RecordingError
 from validate.files import ANY_SIZE
 from validate.recording.alignment import moved
 from validate.recording.clocks import clock_of
+from validate.recording.formats.options import metres
 from validate.recording.mcap.foreign import ForeignStreams, found_streams, gatherers
 from validate.recording.mcap.foreign import fill as fill_foreign
 from validate.recording.mcap.integrity import verify
@@ -25,6 +26,7 @@ from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
 from validate.recording.reader import Options, Reader, head
+from validate.recording.scales import in_unit
 from validate.recording.types import Clock, Recording, by_kind
 
 
@@ -87,9 +89,16 @@ def read_all(path: Path, options: Options) -> Recording:
     something (`known_messages`), as one.
 
     Options: `m_per_px` of images without a scale, `/topic.field=UNIT` for a number in messages of
-    other types. Raises as `read_recording`, `UsageError` for a wrong option, and `RecordingError`
-    where nothing is a stream.
+    other types, `unit` of markers and outlines that were wrongly declared in m. Raises as
+    `read_recording`, `UsageError` for a wrong option, and `RecordingError` where nothing is a
+    stream.
     """
+    factor, _ = metres(options, "m", path.name)
+    found = _read_all(path, {key: value for key, value in options.items() if key != "unit"})
+    return found if factor == 1 else in_unit(found, options["unit"], factor)
+
+
+def _read_all(path: Path, options: Options) -> Recording:
     with opened(path) as stream:
         verified = verify(stream, path)
         gathered, never = gatherers(verified, options)

@@ -1,19 +1,23 @@
 """What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
-first principal axis of its displacements). From it and the first natural frequency of the body
-follows whether inertia matters: statics answers at once, and is off by (f / f_1)^2 of what moves at
-f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first mode.
+first principal axis of its displacements); of outlines that of places at every 10 degrees about the
+centroid, along their normals; of a signal that of its channels. From it and the body's first
+natural frequency follows whether inertia matters: statics answers at once, and is off by
+(f / f_1)^2 of what moves at f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first
+mode.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.ringing import Ringing, ringing, spectrum
+from validate.recording.types import Contours, Markers, Recording, Signal
+from validate.register.outline_geometry import EVERY_TEN, along_normals, outline_places
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
@@ -29,11 +33,13 @@ _AXES = "xyz"
 @dataclass(frozen=True)
 class RecordedMotion:
     """Displacements `y` (nt,) m at `t` (nt,) s of `marker` along `direction` (d,), since the first
-    sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz.
+    sample; `noise` m, `frequency` Hz of the largest peak of its spectrum, `resolution` Hz. Of a
+    signal, which is a "marker" of its own, y and noise are in its `unit`.
 
-    `rests_from` s is where it rests until the end (None: nowhere), `starts` s its last instant of
-    rest before it moves, `drift` m from the first to the last sample, `gap` s the longest interval
-    and `gaps` how many are longer than 1.5 usual ones, `missing` the share of samples without it.
+    It stands still from the first sample until `rests_until` s and from `rests_from` s to the last
+    one (None: not at all); `starts` s is the instant of rest that its first swing begins at. From
+    the first to the last sample it drifts by `drift` m. The longest interval is `gap` s, `gaps` are
+    longer than 1.5 usual ones, and in a share `missing` of the samples it was not seen.
     """
 
     marker: str
@@ -44,11 +50,13 @@ class RecordedMotion:
     frequency: float
     resolution: float
     starts: float
+    rests_until: float | None
     rests_from: float | None
     gap: float
     gaps: int
     missing: float
     ringing: Ringing | None
+    unit: str = "m"
 
     @property
     def axis(self) -> str:
@@ -57,7 +65,7 @@ class RecordedMotion:
 
     @property
     def size(self) -> float:
-        """Peak to peak, m."""
+        """Peak to peak of the whole recording, noise included, m."""
         return float(np.ptp(self.y))
 
     @property
@@ -90,21 +98,39 @@ class RecordedMotion:
             )  # fmt: skip
         return self.above(FRACTION * first) > _SHARE * self.size
 
-    def words(self) -> str:
-        """The facts in one sentence."""
-        along = ", ".join(f"{x:+.2f}" for x in self.direction)
-        f = f"{self.frequency:.3g} Hz (resolved to {self.resolution:.2g} Hz)"
-        rest = (
-            "nowhere at rest"
-            if self.rests_from is None
-            else f"at rest from {self.rests_from:.3g} s"
-        )
-        return (
-            f"'{self.marker}' moves most, {1e3 * self.size:.3g} mm peak to peak along ({along}), "
-            f"mostly at {f}; {rest}, {1e3 * self.drift:+.2g} mm from first to last, "
-            f"{self.rate:.4g} samples a second, {self.gaps} gaps (longest {self.gap:.3g} s), "
-            f"{100 * self.missing:.2g} % missing"
-        )
+
+def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
+    """The motion of a topic; none: of the first markers, else signal in m, else outlines.
+
+    Raises `ComparisonError` where there are none, or nothing moves.
+    """
+    if topic is None:
+        lengths = [t for t, s in recording.signals.items() if s.unit == "m"]
+        topics = (*recording.markers, *lengths, *recording.contours)
+        if not topics:
+            raise ComparisonError(
+                f"{recording.name}: no markers, no signal in m and no outlines; nothing moves"
+            )
+        topic = topics[0]
+    if topic not in recording.streams:
+        raise ComparisonError(f"no stream '{topic}'; it has {sorted(recording.streams)}")
+    return motion_in(topic, recording.streams[topic])
+
+
+def motion_in(topic: str, stream: object) -> RecordedMotion:
+    """The motion of one stream; raises `ComparisonError` for images, and where nothing moves."""
+    if isinstance(stream, Markers):
+        named = {name: stream.x[:, j] for j, name in enumerate(stream.names)}
+        return recorded_motion(stream.t, named, stream.sd)
+    if isinstance(stream, Signal):
+        names = (topic, *(f"{topic}, channel {c + 1}" for c in range(1, stream.y.shape[1])))
+        named = {name: stream.y[:, [c]] for c, name in enumerate(names)}
+        return replace(recorded_motion(stream.t, named, stream.sd), unit=stream.unit)
+    if isinstance(stream, Contours):
+        moved = along_normals(stream.outlines[0], stream.outlines, EVERY_TEN)
+        named = dict(zip(outline_places(EVERY_TEN), moved.transpose(1, 0, 2), strict=True))
+        return recorded_motion(stream.t, named, stream.sd)
+    raise ComparisonError(f"'{topic}': images show no motion by themselves; find outlines in them")
 
 
 def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) -> RecordedMotion:
@@ -128,8 +154,9 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     starts = _starts(t, y, found)
     return RecordedMotion(
         name, direction, t, y, found, frequency, resolution,
-        _released(t, y, starts, rings) if rings else starts, _rests(t, y, found),
-        float(steps.max()), int((steps > _GAP * usual).sum()), float(1 - seen.mean()), rings,
+        _released(t, y, starts, rings) if rings else starts, _still(t, y, found),
+        _rests(t, y, found), float(steps.max()), int((steps > _GAP * usual).sum()),
+        float(1 - seen.mean()), rings,
     )  # fmt: skip
 
 
@@ -201,6 +228,13 @@ def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
     at = np.arctan2(w * s - d * p, w * p + d * s) / w
     at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
     return float(max(starts + at, t[0]))
+
+
+def _still(t: Floats, y: Floats, noise: float) -> float | None:
+    """Until when it stays within a hundredth of the motion about its start, or within noise."""
+    away = np.abs(y - y[0]) > max(6 * noise, _STILL * np.ptp(y))
+    first = int(away.argmax())
+    return float(t[first - 1]) if first > 1 else None
 
 
 def _rests(t: Floats, y: Floats, noise: float) -> float | None:

@@ -1,12 +1,16 @@
 """What a recording's motion is: frequency, direction, start, rest, gaps, class of method."""
 
+import re
+
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.replay.recorded_motion import RecordedMotion, recorded_motion
+from validate.identify.recorded_motion import RecordedMotion, recorded_motion
+from validate.recording.types import Contours, Recording, Signal, Source
 from validate.replay.solved import between
+from validate.report.motion_words import motion_lines, motion_words
 
 T = np.arange(401) / 200.0
 ALONG = np.array([0.6, 0.0, 0.8])
@@ -37,7 +41,7 @@ def test_a_swing_is_found_with_its_start_and_its_mode() -> None:
     assert found.ringing.damping == pytest.approx(0.03, rel=0.05)
     assert found.rate == pytest.approx(200)
     assert found.rests_from is None
-    assert "2.8" in found.words()
+    assert "2.8" in motion_words(found)
 
 
 @pytest.mark.parametrize(("first", "matters"), [(2.8, True), (8.0, True), (30.0, False)])
@@ -52,6 +56,25 @@ def test_a_slow_ramp_that_stops_is_statics() -> None:
     assert not found.inertia_matters(None)
     assert found.rests_from == pytest.approx(1.3, abs=0.02)
     assert found.drift == pytest.approx(5e-3, abs=1e-4)
+
+
+def test_outlines_and_signals_move_too() -> None:
+    """A square that goes up by 2 mm, and a force that rises by 3 N; what stands still has no
+    line."""
+    y = np.clip((T - 0.5) / 1.0, 0, 1)
+    corners = np.array([[0.0, 0.0], [0.01, 0.0], [0.01, 0.01], [0.0, 0.01]])
+    outlines = tuple(corners + (0.0, 2e-3 * up) for up in y)
+    source = Source("x", "", 0, "x")
+    held = Signal(T, np.ones((len(T), 1)), "Pa", 0.0, "s")
+    found = Recording("r", source, 0, contours={"film": Contours(T, outlines, 0.0, np.eye(4), "b")},
+                      signals={"pull": Signal(T, 3 * y[:, None], "N", 0.0, "s"), "held": held},
+                      )  # fmt: skip
+    lines = motion_lines(found)
+    assert len(lines) == 2
+    assert "2.00 mm peak to peak along (" in lines[0]
+    assert "motion of pull: 'pull' changes most, 3.00 N peak to peak, mostly at" in lines[1]
+    for line in lines:
+        assert re.search(r"at rest until 0.5\d* s, at rest from 1.[45]\d* s to the end", line), line
 
 
 def test_gaps_and_missing_samples_are_counted() -> None:

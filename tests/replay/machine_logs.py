@@ -1,0 +1,34 @@
+"""Recordings of a testing machine, and experiments on the bodies that it presses."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from validate.arrays import Floats
+from validate.compare.verdict import Accept
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Recording, Signal, Source
+from validate.replay.experiment import Experiment
+from validate.replay.measured_body import measured_body
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.method import Method
+
+
+def machine_log(t: Floats, u: Floats, force: Floats, noise: float = 0.0) -> Recording:
+    """Displacement (nt,) m, exact, and force (nt,) N of a machine at t (nt,) s."""
+    signals = {
+        "displacement": Signal(t, u[:, None], "m", 0.0, "machine"),
+        "force": Signal(t, force[:, None], "N", noise, "machine"),
+    }
+    return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
+
+
+def on_a_body(
+    folder: Path, p: MeasuredBody, seen: Recording, methods: Mapping[str, Method],
+    limits: Mapping[str, float],
+) -> Experiment:  # fmt: skip
+    """An experiment of which all methods are judged; its recording is written to `folder`."""
+    write_recording(seen, folder / p.recording)
+    accept = tuple(Accept(name, limit, "of a test") for name, limit in limits.items())
+    made = measured_body("body", "body", "x", p, methods, tuple(methods), accept, folder)
+    return replace(made, path=folder / "body.py")
