@@ -1,4 +1,4 @@
-"""Every shipped experiment ends with the exit code that its row in README's table states.
+"""Every shipped experiment ends with the exit code that its row in docs/experiments.md states.
 
     .venv/bin/python benchmarks/exit_codes.py [NAME ...]
 
@@ -19,15 +19,15 @@ ABSENT = "validate data get"
 LONG = 180.0  # s: longer ones are listed with their time
 
 
-def stated(readme: str) -> dict[str, int]:
+def stated(page: str) -> dict[str, int]:
     """Exit code by experiment, of the table below "## Experiments"."""
-    table = readme.partition("\n## Experiments\n")[2].partition("\n## ")[0]
+    table = page.partition("\n## Experiments\n")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| `(\w+)` \|.*\| (\d) \|$", table, re.M)
     return {name: int(code) for name, code in rows}
 
 
 def main(names: list[str]) -> int:
-    wanted = stated((ROOT / "README.md").read_text("utf-8"))
+    wanted = stated((ROOT / "docs" / "experiments.md").read_text("utf-8"))
     wrong = 0
     for name in names or list(wanted):
         start = time.monotonic()

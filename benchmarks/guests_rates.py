@@ -1,7 +1,7 @@
 """Time of a step at equal error, ours and guests': the silicone beam and the hanging bar.
 
 OMP_NUM_THREADS=1 python benchmarks/guests_rates.py            prints the tables (some ten minutes)
-OMP_NUM_THREADS=1 python benchmarks/guests_rates.py --write    puts them into README.md, too
+OMP_NUM_THREADS=1 python benchmarks/guests_rates.py --write    puts them into docs/results.md, too
 
 Every simulator solves the same scene on several meshes of each kind of cell that it is given; at an
 error level stands the least time of a step on the line through neighbouring meshes of one kind
@@ -288,9 +288,9 @@ def main() -> None:
     table += rows("beam let go", swing_points(true_swing()), SWING_LEVELS)
     print(text := markdown(table))
     if write:
-        readme = ROOT / "README.md"
-        before, rest = readme.read_text("utf-8").split(BEGIN)
-        readme.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", "utf-8")
+        page = ROOT / "docs" / "results.md"
+        before, rest = page.read_text("utf-8").split(BEGIN)
+        page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", "utf-8")
 
 
 if __name__ == "__main__":

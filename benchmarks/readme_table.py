@@ -1,10 +1,11 @@
-"""The README's tables, from today's runs: models of the fluid phantom, and filters.
+"""Tables of README.md and docs/results.md, from today's runs: models of the phantom, filters.
 
 python benchmarks/readme_table.py            prints them (about three minutes)
-python benchmarks/readme_table.py --write    puts them into README.md
+python benchmarks/readme_table.py --write    puts them into the pages
 """
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from validate.compare.result import MethodResult, Result
@@ -113,19 +114,25 @@ def _result(name: str) -> Result:
 
 def main() -> None:
     phantom, printed = _result("fluid_phantom"), {name: _result(name) for name in PRINTED}
-    parts = {
-        (BEGIN, END): markdown(HEAD, [*rows(phantom), list(PAPER)]),
-        (FILTERS_BEGIN, FILTERS_END): markdown(FILTERS_HEAD, filter_rows(printed["kf_cube"])),
-        (PRINTED_BEGIN, PRINTED_END): markdown(PRINTED_HEAD, printed_rows(printed)),
+    tables = {
+        BEGIN: markdown(HEAD, [*rows(phantom), list(PAPER)]),
+        FILTERS_BEGIN: markdown(FILTERS_HEAD, filter_rows(printed["kf_cube"])),
+        PRINTED_BEGIN: markdown(PRINTED_HEAD, printed_rows(printed)),
     }
-    print("\n\n".join(parts.values()))
+    print("\n\n".join(tables.values()))
     if "--write" in sys.argv[1:]:
-        readme = ROOT / "README.md"
-        text = readme.read_text("utf-8")
-        for (begin, end), part in parts.items():
+        for page in (ROOT / "README.md", ROOT / "docs" / "results.md"):
+            page.write_text(replaced(page.read_text("utf-8"), tables), "utf-8")
+
+
+def replaced(text: str, tables: Mapping[str, str]) -> str:
+    """The text of a page with those tables that it has between their marks."""
+    for begin, table in tables.items():
+        if begin in text:
+            end = begin.replace("begin", "end")
             before, rest = text.split(begin)
-            text = f"{before}{begin}\n{part}\n{end}{rest.split(end)[1]}"
-        readme.write_text(text, "utf-8")
+            text = f"{before}{begin}\n{table}\n{end}{rest.split(end)[1]}"
+    return text
 
 
 if __name__ == "__main__":

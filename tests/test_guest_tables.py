@@ -1,4 +1,4 @@
-"""The README's tables of guests: what they are made by, and that they are today's."""
+"""The tables of external simulators: what they are made by, and that they are today's."""
 
 import json
 import re
@@ -31,7 +31,8 @@ def table(project_root: Path) -> ModuleType:
 
 
 def cells(root: Path, module: ModuleType) -> list[list[str]]:
-    text = (root / "README.md").read_text("utf-8").split(module.BEGIN)[1].split(module.END)[0]
+    page = (root / "docs" / "results.md").read_text("utf-8")
+    text = page.split(module.BEGIN)[1].split(module.END)[0]
     return [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
 
 

@@ -1,4 +1,4 @@
-"""The README is tested from its own text."""
+"""README.md and the pages that it points to are tested from their text."""
 
 import re
 from collections.abc import Callable
@@ -16,6 +16,11 @@ from validate.compare.result import Result
 @pytest.fixture(scope="module")
 def readme(project_root: Path) -> str:
     return (project_root / "README.md").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def commands(project_root: Path) -> str:
+    return (project_root / "docs" / "commands.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -45,33 +50,40 @@ def test_its_table_is_todays_run_but_for_the_rates(
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_its_tables_of_filters_are_todays_runs(
-    readme: str, script: ModuleType, whole: Callable[[str], Result]
+    project_root: Path, script: ModuleType, whole: Callable[[str], Result]
 ) -> None:
     """All but the last column of the filters' table, which is a timing."""
+    page = (project_root / "docs" / "results.md").read_text("utf-8")
     results = {name: whole(name) for name in script.PRINTED}
     ours = [row[:-1] for row in script.filter_rows(results["kf_cube"])]
-    assert [row[:-1] for row in _cells(readme, "filters")] == ours
-    assert _cells(readme, "printed") == script.printed_rows(results)
+    assert [row[:-1] for row in _cells(page, "filters")] == ours
+    assert _cells(page, "printed") == script.printed_rows(results)
 
 
-def _cells(readme: str, name: str) -> list[list[str]]:
-    text = readme.split(f"<!-- {name}: begin -->")[1].split(f"<!-- {name}: end -->")[0]
+def _cells(page: str, name: str) -> list[list[str]]:
+    text = page.split(f"<!-- {name}: begin -->")[1].split(f"<!-- {name}: end -->")[0]
     lines = text.strip().splitlines()[2:]
     return [[c.strip() for c in line.strip("|").split("|")] for line in lines]
 
 
-def test_every_command_is_documented_and_every_documented_one_exists(readme: str) -> None:
-    documented = set(re.findall(r"^\| `validate (\w+)", readme, flags=re.MULTILINE))
+def test_the_readme_is_short_and_has_one_small_table_before_the_tour(readme: str) -> None:
+    assert len(readme.splitlines()) <= 150
+    before = readme.split("## Five minutes")[0]
+    assert sum(line.startswith("|") for line in before.splitlines()) - 2 <= 10
+
+
+def test_every_command_is_documented_and_every_documented_one_exists(commands: str) -> None:
+    documented = set(re.findall(r"^\| `validate (\w+)", commands, flags=re.MULTILINE))
     assert documented == set(cli.commands)
 
 
-def test_its_parameters_exist(readme: str) -> None:
+def test_its_parameters_exist(commands: str) -> None:
     listed = "".join(
         CliRunner().invoke(cli, ["list", name, "--json"]).output
         for name in ("fluid_phantom", "ecoflex_cylinder", "kf_cube")
     )
-    for path in re.findall(r"`--set ([\w.]+)=", readme):
-        if path != "path":
+    for path in re.findall(r"`--set ([\w.]+)=", commands):
+        if path != "PATH":
             assert f'"path": "{path}"' in listed, path
 
 
@@ -83,7 +95,7 @@ def test_its_pictures_are_there_and_small(readme: str, project_root: Path) -> No
 
 def test_every_shipped_experiment_has_a_row_with_its_exit_code(project_root: Path) -> None:
     """`benchmarks/exit_codes.py` runs them and holds each to its row."""
-    table = (project_root / "README.md").read_text("utf-8").partition("\n## Experiments\n")[2]
-    rows = re.findall(r"^\| `(\w+)` \|.*\| ([01]) \|$", table.partition("\n## ")[0], re.M)
+    table = (project_root / "docs" / "experiments.md").read_text("utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|.*\| ([01]) \|$", table, re.M)
     names = {path.stem for path in (project_root / "experiments").glob("*.py")}
     assert sorted(name for name, _ in rows) == sorted(names)

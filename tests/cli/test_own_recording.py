@@ -1,10 +1,11 @@
-"""The README's road from a user's own files to a report, as it is printed there."""
+"""From a user's files to a report, as README.md and docs/log-and-images.md print it."""
 
 import contextlib
 import io
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from validate.recording.types import Recording, Signal, Source
 
 
 def commands(project_root: Path) -> list[list[str]]:
-    section = (project_root / "README.md").read_text("utf-8").split("## Your own recording")[1]
+    section = (project_root / "docs" / "log-and-images.md").read_text("utf-8")
     return [shlex.split(line) for line in printed(section, "console").strip().splitlines()]
 
 
@@ -61,7 +62,7 @@ def pressed_in_images(folder: Path, project_root: Path) -> None:
         envelope = np.hypot(*parts)
         grey = np.clip(200 + 100 * np.log10(envelope / envelope.mean() + 1e-3), 0, 255)
         (folder / "images" / f"frame_{i:03}.png").write_bytes(encode_png(grey.astype(np.uint8)))
-    section = (project_root / "README.md").read_text("utf-8").split("## Your own recording")[1]
+    section = (project_root / "docs" / "log-and-images.md").read_text("utf-8")
     (folder / "answers.toml").write_text(printed(section, "toml"), "utf-8")
 
 
@@ -77,7 +78,26 @@ def told(report: Path) -> Any:
 
 
 @pytest.mark.slow
-def test_the_readmes_own_recording_runs_as_printed(own_files: Path, project_root: Path) -> None:
+def test_the_tour_of_the_readme_runs_word_by_word(
+    tmp_path: Path, project_root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Commands and what the last one prints; times and rates are this machine's."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    shutil.copy(project_root / "docs" / "example_log.csv", tmp_path / "log.csv")
+    tour = (project_root / "README.md").read_text("utf-8").split("## Five minutes")[1]
+    for line in printed(tour, "console").strip().splitlines():
+        program, *arguments = shlex.split(line)
+        code, out, err = called(arguments)
+        assert (program, code) == ("validate", 0), (arguments, out, err)
+    timing = re.compile(r"[\d.]+ (s wall time|[µm]?s$|k?Hz) *", flags=re.MULTILINE)
+    assert [timing.sub("", line) for line in out.splitlines()] == [
+        timing.sub("", line) for line in printed(tour, "text").splitlines()
+    ]
+
+
+@pytest.mark.slow
+def test_a_log_with_images_runs_as_printed(own_files: Path, project_root: Path) -> None:
     pressed_in_images(own_files, project_root)
     outputs = {}
     for program, *arguments in commands(project_root):

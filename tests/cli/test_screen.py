@@ -39,19 +39,19 @@ def test_blocks_share_a_screen_and_count_what_is_left_out(sizes: list[tuple[int,
 @pytest.mark.parametrize(
     ("error", "doubt", "drawn"),
     [
-        (0.0, 0.0, "              │      "),
-        (7.0, 0.0, "███████       │      "),
-        (-7.0, 3.0, "███████░░░    │      "),
-        (14.0, 6.0, "██████████████│░░░░░░"),
-        (14.0, 7.0, "██████████████│░░░░░>"),
-        (float("nan"), 1.0, "██████████████│█████>"),
-        (3.0, float("inf"), "███░░░░░░░░░░░│░░░░░>"),
+        (0.0, 0.0, "          │    "),
+        (5.0, 0.0, "█████     │    "),
+        (-5.0, 3.0, "█████░░░  │    "),
+        (10.0, 4.0, "██████████│░░░░"),
+        (10.0, 5.0, "██████████│░░░>"),
+        (float("nan"), 1.0, "██████████│███>"),
+        (3.0, float("inf"), "███░░░░░░░│░░░>"),
     ],
 )
 def test_a_bar_has_its_limit_always_at_the_same_place(
     error: float, doubt: float, drawn: str
 ) -> None:
-    assert bar(error, doubt, 14.0) == drawn
+    assert bar(error, doubt, 10.0) == drawn
 
 
 @pytest.mark.parametrize("columns", [60, 80, 120])

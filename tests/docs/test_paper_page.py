@@ -74,10 +74,10 @@ def test_every_picture_of_the_paper_is_named(script: ModuleType, page: str) -> N
     assert named >= set(range(1, PICTURES[page] + 1))
 
 
-def test_the_readme_gives_the_same_verdicts(script: ModuleType, project_root: Path) -> None:
+def test_the_results_page_gives_the_same_verdicts(script: ModuleType, project_root: Path) -> None:
     """Rows of its table of printed figures that a page has, too."""
-    readme = (project_root / "README.md").read_text("utf-8")
-    text = readme.split("<!-- printed: begin -->")[1].split("<!-- printed: end -->")[0]
+    page = (project_root / "docs" / "results.md").read_text("utf-8")
+    text = page.split("<!-- printed: begin -->")[1].split("<!-- printed: end -->")[0]
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
     paged = {f"{r[6]}: {r[1]}": r[4] for page in PICTURES for r in page_rows(script, page)[2:]}
     shared = [(row[0], row[3].split(" (within")[0]) for row in rows[2:] if row[0] in paged]

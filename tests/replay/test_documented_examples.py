@@ -1,4 +1,4 @@
-"""The Python that the README and the package's docstring show runs as it is printed."""
+"""The Python that the documentation and the package's docstring show runs as it is printed."""
 
 import re
 from dataclasses import replace
@@ -12,9 +12,8 @@ from validate.replay.experiment import Experiment
 
 
 def readme(project_root: Path) -> str:
-    (code,) = re.findall(
-        r"```python\n(.*?)```", (project_root / "README.md").read_text("utf-8"), flags=re.DOTALL
-    )
+    page = (project_root / "docs" / "python.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     return str(code)
 
 

@@ -14,8 +14,8 @@ from validate.cli.layout import wrapped
 
 LINES = 25
 Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
-_BAR = 20  # characters of a bar
-_LIMIT = 14  # of them up to the limit
+_BAR = 14  # characters of a bar
+_LIMIT = 10  # of them up to the limit
 _NAME = 12  # characters of a name that is cut
 
 
@@ -129,5 +129,5 @@ def legend(limit: str) -> str:
 
 
 def _characters() -> tuple[str, str, str]:
-    unicode = (getattr(sys.stdout, "encoding", None) or "").lower().startswith("utf")
+    unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().startswith("utf")
     return ("█", "░", "│") if unicode else ("#", "-", "|")
