@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from unittest import mock
 
+from click.testing import CliRunner
+
 from validate.cli import main as cli
 
 
@@ -20,6 +22,14 @@ def here(*arguments: str, cwd: Path | None = None, **environment: str) -> tuple[
     ):
         code = cli.run(list(arguments))
     return code, out.getvalue(), err.getvalue()
+
+
+def called(*arguments: str) -> tuple[int, str]:
+    """Exit code and output of a command, or 2 and its error."""
+    done = CliRunner().invoke(cli.cli, list(arguments), standalone_mode=False)
+    if done.exception is not None:
+        return 2, str(done.exception)
+    return int(done.return_value or 0), done.output
 
 
 def refused(*arguments: str, cwd: Path | None = None, **environment: str) -> str:

@@ -7,10 +7,9 @@ import click
 import meshio
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from commands import called
 
 from validate.cli.asking import Question, answered, listed, read_answers
-from validate.cli.main import cli
 from validate.errors import RegistrationError, UsageError
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
@@ -54,13 +53,6 @@ accept = {force = "50mN", marker = "0.1mm"}
 why = {force = "felt", marker = "seen"}
 ranges = {E = "2%", nu = 0.01, load = 0.01}
 """
-
-
-def called(*arguments: str) -> tuple[int, str]:
-    done = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
-    if done.exception is not None:
-        return 2, str(done.exception)
-    return int(done.return_value or 0), done.output
 
 
 @pytest.fixture

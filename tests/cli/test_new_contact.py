@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import skfem
+from commands import called
+from machine_logs import machine_log
 from scipy.optimize import nnls
 from scipy.sparse.linalg import spsolve
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from tests.cli.test_new_body import called
-from tests.replay.machine_logs import machine_log
 from validate.arrays import Floats
 from validate.cli.new_contact import _first_touch
 from validate.recording.mcap.write import write_recording

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import called
 from scipy.integrate import cumulative_simpson, solve_bvp
 from scipy.optimize import brentq
 
-from tests.cli.test_new_body import called
 from validate.arrays import Floats
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Signal, Source

@@ -10,9 +10,9 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from machine_logs import machine_log, on_a_body
 from scipy.optimize import brentq
 
-from tests.replay.machine_logs import machine_log, on_a_body
 from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.compare.verdict import Accept

@@ -5,9 +5,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from commands import called
 from script_modules import module_of
 
-from tests.cli.test_new_body import called
 from validate.replay import compare
 from validate.replay.find import load_file
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from machine_logs import machine_log, on_a_body
 
-from tests.replay.machine_logs import machine_log, on_a_body
 from validate.compare.result import Result
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from tests.replay.test_measured_body import (
+from test_measured_body import (
     BASE,
     PLACES,
     SIZE,
@@ -17,6 +16,7 @@ from tests.replay.test_measured_body import (
     recording,
     stretched,
 )
+
 from validate.compare.verdict import Accept
 from validate.recording.types import Markers, Signal
 from validate.register.observation import Selection

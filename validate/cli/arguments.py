@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -18,6 +18,7 @@ EXPERIMENTS = click.option(
     help="A folder of experiment files to look at too.",
 )  # fmt: skip
 FORCE = click.option("--force", is_flag=True, help="Replace an output that exists.")
+Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
 OK, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 

@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from validate.cli.arguments import Detail
 from validate.cli.check_bars import check_passages
 from validate.cli.chosen import each
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
 from validate.cli.progress import progress
 from validate.cli.run_screen import figures_line
-from validate.cli.screen import Detail, Passage, rows, sentence_lines, show
+from validate.cli.screen import Passage, rows, sentence_lines, show
 from validate.compare.result import KINDS, Result
 from validate.replay.described_motion import described
 from validate.replay.experiment import Experiment

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from validate.cli.arguments import FAILED, OK, pairs
+from validate.cli.arguments import FAILED, OK, Detail, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import shown
-from validate.cli.screen import Detail, Passage, rows, sentence_lines
+from validate.cli.screen import Passage, rows, sentence_lines
 from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from validate.cli.arguments import FAILED, OK, pairs
-from validate.cli.screen import Detail, Passage, rows, sentence_lines, show
+from validate.cli.arguments import FAILED, OK, Detail, pairs
+from validate.cli.screen import Passage, rows, sentence_lines, show
 from validate.errors import ValidateError
 from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file

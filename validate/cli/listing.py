@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from validate.cli.arguments import Detail
 from validate.cli.display import say, table
-from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines
+from validate.cli.screen import Passage, cut, rows, sentence_lines
 from validate.cli.screen import show as show_screen
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment

@@ -5,8 +5,16 @@ from typing import Any
 
 import click
 
-from validate.cli.arguments import EXPERIMENTS, FILE, FORCE, OK, detailed, output, require_new
-from validate.cli.screen import Detail
+from validate.cli.arguments import (
+    EXPERIMENTS,
+    FILE,
+    FORCE,
+    OK,
+    Detail,
+    detailed,
+    output,
+    require_new,
+)
 
 
 @click.command()

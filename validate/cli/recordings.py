@@ -23,6 +23,8 @@ from validate.recording.readers import READERS, named, read_recording, recognise
 from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 
+_NAMED = 6  # streams or fields that are named one by one
+
 
 def import_files(
     files: tuple[Path, ...],
@@ -106,6 +108,8 @@ def _besides(recording: Recording) -> list[str]:
     """What of the file did not become a stream."""
     left = [r[LEFT_OUT] for r in recording.metadata.values() if r.get(LEFT_OUT)]
     unread = [f"{topic}: {why}" for topic, why in recording.unread.items()]
+    if len(unread) > _NAMED:
+        unread = [f"{len(unread)} fields; the first: {unread[0]}; `validate inspect` lists them"]
     return [f"not read: {text}" for text in (*left, *unread)]
 
 
@@ -143,4 +147,6 @@ def _seconds(topic: str, text: str) -> tuple[float, float]:
 def written(recording: Recording, out: Path) -> None:
     """Says which streams a file got and how large it is."""
     size = out.stat().st_size / 1e3
-    say(f"{out}: {', '.join(recording.streams)}; {size:.0f} kB", indent="  ")
+    names = list(recording.streams)
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    say(f"{out}: {', '.join(names[:_NAMED])}{more}; {size:.0f} kB", indent="  ")

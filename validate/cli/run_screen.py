@@ -8,9 +8,10 @@ from statistics import median
 from typing import Any
 
 from validate.catalogue import experiment_files
+from validate.cli.arguments import Detail
 from validate.cli.check_bars import check_passages, worst_first
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
-from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines, show, width
+from validate.cli.screen import Passage, cut, rows, sentence_lines, show, width
 from validate.compare.result import KINDS, Result
 from validate.compare.verdict import Check
 from validate.replay.experiment import Experiment

@@ -5,12 +5,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
-from validate.cli.arguments import BAD_INPUT, command_line, complain, pairs
+from validate.cli.arguments import BAD_INPUT, Detail, command_line, complain, pairs
 from validate.cli.chosen import ask_about, each
 from validate.cli.display import relative
 from validate.cli.progress import progress
 from validate.cli.run_screen import called, show_run
-from validate.cli.screen import Detail
 from validate.compare.result import Result
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment

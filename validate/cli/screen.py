@@ -7,13 +7,12 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
+from validate.cli.arguments import Detail
 from validate.cli.display import console, say
 from validate.cli.layout import wrapped
 
 LINES = 25
-Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
 _BAR = 14  # characters of a bar
 _LIMIT = 10  # of them up to the limit
 _NAME = 12  # characters of a name that is cut

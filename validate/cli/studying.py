@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from validate.cli.arguments import FAILED, OK, command_line, pairs
+from validate.cli.arguments import FAILED, OK, Detail, command_line, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import relative, say, table
 from validate.cli.progress import progress
-from validate.cli.screen import Detail, Passage, cut, rows, sentence_lines, show
+from validate.cli.screen import Passage, cut, rows, sentence_lines, show
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, sources_of

@@ -63,7 +63,7 @@ def summary(reports: Path) -> Summary:
     measured = [r for r in runs if not r.why and r.content["kind"] == "measured"]
     twins = [r for r in runs if not r.why and r.content["kind"] == "twin"]
     if not measured and not twins:
-        seen = "; ".join(f"{r.folder}: {r.why}" for r in runs[:3])
+        seen = "; ".join(f"{r.folder}: {r.why or r.content['kind']}" for r in runs[:3])
         raise UsageError(
             f"no run below {reports} counts ({seen or '0 runs'}); `validate run silicone_beam` "
             "makes one of a measured recording"
