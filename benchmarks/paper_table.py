@@ -1,4 +1,4 @@
-"""The tables of docs/paper-00x.md: every number and picture of a paper, of stored runs.
+"""The tables of docs/paper-00x.md, from stored runs: printed results, then settings by reason.
 
 validate run fluid_block fluid_phantom needle_pocket --out DIR
 python benchmarks/paper_table.py DIR paper-000            prints it
@@ -11,7 +11,7 @@ claims to what the experiments declare today.
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,8 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 _NUMERALS = ("", "I", "II", "III", "IV", "V", "VI", "VII")
 HEAD = ("paper", "what", "theirs", "ours", "verdict", "why", "experiment")
+SETTINGS_BEGIN, SETTINGS_END = "<!-- settings: begin -->", "<!-- settings: end -->"
+SETTINGS_HEAD = ("why there is no comparison", "printed value", "experiment")
 
 
 def path(page: str) -> Path:
@@ -55,24 +57,53 @@ def row(figure: Mapping[str, Any], experiment: str) -> list[str]:
     return [figure["source"], figure["name"], theirs, ours, verdict, why, f"`{experiment}`"]
 
 
-def table(folder: Path, page: str) -> str:
-    """Markdown of all figures of the runs below `folder`, in the order of the paper."""
-    rows = []
-    for name in PAGES[page]:
-        found = json.loads((folder / name / "results.json").read_text("utf-8"))
-        rows += [row(p, name) for p in found["published"]]
-    rows.sort(key=lambda r: place(r[0]))
-    return "\n".join("| " + " | ".join(r) + " |" for r in (HEAD, ["---"] * len(HEAD), *rows))
+def entry(row: Sequence[str]) -> str:
+    """A setting in one line: place, name, printed value, and ours where it is another one."""
+    source, name, theirs, ours = row[:4]
+    if name.startswith("Fig. "):
+        source = source.split(", Fig")[0]
+    value = "" if theirs == "-" else f": {theirs}"
+    other = "" if ours in ("-", theirs) else f" (ours {ours})"
+    return f"{source}: {name}{value}{other}"
+
+
+def published(folder: Path, page: str) -> tuple[list[list[str]], list[list[str]]]:
+    """Rows of printed results, and of settings, sketches and citations, in the paper's order."""
+    found = [
+        (figure["result"], row(figure, name))
+        for name in PAGES[page]
+        for figure in json.loads((folder / name / "results.json").read_text("utf-8"))["published"]
+    ]
+    found.sort(key=lambda pair: place(pair[1][0]))
+    return [r for result, r in found if result], [r for result, r in found if not result]
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    return "\n".join("| " + " | ".join(r) + " |" for r in (head, ["---"] * len(head), *rows))
+
+
+def by_reason(rows: Iterable[Sequence[str]]) -> list[list[str]]:
+    """Settings of one reason and experiment in one row."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for r in rows:
+        groups.setdefault((r[5], r[6]), []).append(entry(r))
+    return [[why, "<br>".join(lines), name] for (why, name), lines in groups.items()]
+
+
+def replaced(text: str, begin: str, end: str, made: str) -> str:
+    """A page with the block between two marks replaced."""
+    return f"{text.split(begin)[0]}{begin}\n{made}\n{end}{text.split(end)[1]}"
 
 
 def main() -> None:
     folder, page = Path(sys.argv[1]), sys.argv[2]
-    made = table(folder, page)
-    print(made)
+    results, settings = published(folder, page)
+    tables = markdown(HEAD, results), markdown(SETTINGS_HEAD, by_reason(settings))
+    print("\n\n".join(tables))
     if "--write" in sys.argv[3:]:
-        text = path(page).read_text("utf-8")
-        before, after = text.split(BEGIN)[0], text.split(END)[1]
-        path(page).write_text(f"{before}{BEGIN}\n{made}\n{END}{after}", "utf-8")
+        text = replaced(path(page).read_text("utf-8"), BEGIN, END, tables[0])
+        path(page).write_text(replaced(text, SETTINGS_BEGIN, SETTINGS_END, tables[1]), "utf-8")
 
 
 if __name__ == "__main__":

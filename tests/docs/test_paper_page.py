@@ -1,4 +1,4 @@
-"""The table of a paper's page holds every figure that the experiments of that paper declare."""
+"""The tables of a paper's page hold every figure that the experiments of that paper declare."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,7 @@ from types import ModuleType
 import pytest
 from script_modules import module_of
 
+from validate.compare.published import Figure
 from validate.replay import load
 
 
@@ -26,10 +27,29 @@ SECTIONS = {
 }
 
 
-def page_rows(script: ModuleType, page: str) -> list[list[str]]:
+def rows_between(script: ModuleType, page: str, begin: str, end: str) -> list[list[str]]:
     text = script.path(page).read_text("utf-8")
-    between = text.split(script.BEGIN)[1].split(script.END)[0].strip().splitlines()
+    between = text.split(begin)[1].split(end)[0].strip().splitlines()
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in between]
+
+
+def page_rows(script: ModuleType, page: str) -> list[list[str]]:
+    """Of printed results."""
+    return rows_between(script, page, script.BEGIN, script.END)
+
+
+def settings(script: ModuleType, page: str) -> list[tuple[str, str]]:
+    """Settings, sketches and citations, each with its experiment."""
+    rows = rows_between(script, page, script.SETTINGS_BEGIN, script.SETTINGS_END)
+    return [(line, name) for _, lines, name in rows[2:] for line in lines.split("<br>")]
+
+
+def declared(script: ModuleType, page: str) -> list[tuple[str, Figure]]:
+    return [(f"`{name}`", f) for name in script.PAGES[page] for f in load(name).published]
+
+
+def is_result(f: Figure) -> bool:
+    return not f.setting and (f.theirs is not None or f.claim != "not comparable")
 
 
 def test_every_page_is_tested(script: ModuleType) -> None:
@@ -37,15 +57,28 @@ def test_every_page_is_tested(script: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("page", PICTURES)
-def test_the_page_has_every_declared_figure_and_no_other(script: ModuleType, page: str) -> None:
+def test_the_page_has_every_printed_result_and_no_other(script: ModuleType, page: str) -> None:
     """What they print and what we claim; ours are of the run that wrote the page."""
-    declared = sorted(
-        (f.source, f.name, script.shown(f.theirs, f.unit), f.claim, f"`{name}`")
-        for name in script.PAGES[page]
-        for f in load(name).published
+    results = sorted(
+        (f.source, f.name, script.shown(f.theirs, f.unit), f.claim, name)
+        for name, f in declared(script, page)
+        if is_result(f)
     )
     written = sorted((r[0], r[1], r[2], r[4], r[6]) for r in page_rows(script, page)[2:])
-    assert written == declared, f"run benchmarks/paper_table.py DIR {page} --write anew"
+    assert written == results, f"run benchmarks/paper_table.py DIR {page} --write anew"
+
+
+@pytest.mark.parametrize("page", PICTURES)
+def test_the_page_has_every_setting_and_no_other(script: ModuleType, page: str) -> None:
+    expected = sorted(
+        (script.entry((f.source, f.name, script.shown(f.theirs, f.unit), "-")), name)
+        for name, f in declared(script, page)
+        if not is_result(f)
+    )
+    written = sorted(
+        (re.sub(r" \(ours [^)]*\)$", "", line), name) for line, name in settings(script, page)
+    )
+    assert written == expected, f"run benchmarks/paper_table.py DIR {page} --write anew"
 
 
 @pytest.mark.parametrize("page", PICTURES)
@@ -54,7 +87,8 @@ def test_it_is_read_as_the_paper_is(script: ModuleType, page: str) -> None:
     assert tuple(head) == script.HEAD
     places = [script.place(r[0]) for r in rows]
     assert places == sorted(places)
-    assert {int(section) for section, _ in places} == SECTIONS[page]
+    sources = [*(r[0] for r in rows), *(line for line, _ in settings(script, page))]
+    assert {int(script.place(source)[0]) for source in sources} == SECTIONS[page]
 
 
 @pytest.mark.parametrize("page", PICTURES)
@@ -68,8 +102,9 @@ def test_what_is_computed_has_a_number_and_what_is_not_says_why(
 
 @pytest.mark.parametrize("page", PICTURES)
 def test_every_picture_of_the_paper_is_named(script: ModuleType, page: str) -> None:
-    said = " ".join(f"{r[0]} {r[1]}" for r in page_rows(script, page))
-    named = {int(n) for first in re.findall(r"Figs?\. ([\d, and]+)", said)
+    lines = [f"{r[0]} {r[1]}" for r in page_rows(script, page)]
+    text = " ".join([*lines, *(line for line, _ in settings(script, page))])
+    named = {int(n) for first in re.findall(r"Figs?\. ([\d, and]+)", text)
              for n in re.findall(r"\d+", first)}  # fmt: skip
     assert named >= set(range(1, PICTURES[page] + 1))
 
