@@ -59,7 +59,10 @@ def test_the_example_of_a_help_page_runs(
     if name == "guest check":
         guest = project_root / "benchmarks" / "guests" / "felupe_guest.py"
         shutil.copy(guest, lab / "my_guest.py")
-    if name in ("compare", "export", "history", "summary"):
+    if name == "summary":  # of measured recordings, and of whole runs only
+        assert here("new", "pressed", "--from", "log.mcap", cwd=lab)[0] == 0
+        assert here("run", "pressed", cwd=lab)[0] in (0, 1)
+    if name in ("compare", "export", "history"):
         for experiment in ("kf_cube", "kf_cube_inertia"):
             stored(experiment, lab)
     for _, *words in examples(name):

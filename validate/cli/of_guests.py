@@ -14,7 +14,7 @@ def guest() -> None:
 
     \b
     Example:
-      validate guest job hanging_bar -o job
+      validate guest job hanging_bar --method felupe -o job
     """
 
 
@@ -52,7 +52,7 @@ def job(name: str, named: tuple[Path, ...], **given: Any) -> None:
 
     \b
     Example:
-      validate guest job hanging_bar -o job
+      validate guest job hanging_bar --method felupe -o job
     """
     from validate.cli import guesting
 
