@@ -3,7 +3,7 @@
 Nested dissection of a mesh in space leaves O(N^(4/3)) entries, in the plane O(N log N): George
 (1973), "Nested dissection of a regular finite element mesh". The numbers before them were measured
 as peaks of blocks of 2 000 to 64 000 unknowns in space (P1 and P2: 252 to 317 and 296 to 635 bytes,
-thin plates 140) and 2 000 to 116 000 in the plane (84 to 107): docs/first-contact.md.
+thin plates 140) and 2 000 to 116 000 in the plane (84 to 107): docs/conventions.md.
 """
 
 import math
