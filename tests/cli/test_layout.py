@@ -110,4 +110,5 @@ def test_a_check_that_nothing_bounds_is_a_row_all_the_same() -> None:
                   "undecided", "why")  # fmt: skip
     members = {"method": "fem", **check_members(check)}
     (block,) = check_passages([members])
-    assert block.lines == ("  force  █████░░░░░│░░░>  1.00 ± no bound of 2.00 N  undecided",)
+    assert block.lines == ("  force  █████░░░░░│░░░>  1.00 ± no bound of 2.00 N",)
+    assert block.title.startswith("Checks: undecided (")

@@ -85,7 +85,7 @@ def test_a_run_ends_in_a_screen_with_the_worst_check_first(
     show_run(result, "cube", PAGE, 1.0)
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= LINES
-    first = lines.index(next(x for x in lines if x.startswith("Checks, worst first"))) + 1
+    first = lines.index(next(x for x in lines if x.startswith("Checks: not good enough"))) + 1
     assert "worst@2mm" in lines[first]
     assert lines[0].startswith("cube: not good enough; ")
     assert lines[-1].endswith("report: report.html")

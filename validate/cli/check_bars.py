@@ -30,35 +30,42 @@ def _fraction(check: Json) -> float:
 
 
 def check_passages(checks: Sequence[Json]) -> list[Passage]:
-    """Requirements; and, where nothing is required, errors against their uncertainty."""
+    """One passage a verdict, the failed ones first; the bars of all stand below each other."""
+    ordered = worst_first(checks)
     several = len({c["method"] for c in checks}) > 1
-    blocks = []
-    for limited, against in ((True, "limit"), (False, "2 u_val")):
-        some = [c for c in worst_first(checks) if (c["limit"] is not None) == limited]
-        if not some:
-            continue
-        cells = [_row(c, several=several) for c in some]
-        common = ""
-        if len(cells) > 1 and len({c["verdict"] for c in some}) == 1:
-            common = f", all {some[0]['verdict']}"
-            cells = [row[:-1] for row in cells]
-        title = f"Checks{common}, worst first ({legend(against)})"
-        lines = rows([""] * len(cells[0]), cells)
-        blocks.append(Passage(title, lines, 3, 8, "more, none of them worse: --verbose"))
-    return blocks
+    lines = rows([""] * 3, [_row(c, several=several) for c in ordered])
+    groups: dict[str, list[str]] = {}
+    for check, line in zip(ordered, lines, strict=True):
+        groups.setdefault(check["verdict"], []).append(line)
+    passages = []
+    for i, (verdict, members) in enumerate(groups.items()):
+        title = f"Checks: {verdict}{', worst first' if len(members) > 1 else ''}"
+        if i == 0:
+            title += f" ({_legend(ordered)})"
+        keep = 3 if i == 0 else 1
+        more = "more, none of them worse: --verbose"
+        passages.append(Passage(title, tuple(members), keep, 8, more))
+    return passages
+
+
+def _legend(checks: Sequence[Json]) -> str:
+    limits = {c["limit"] is not None for c in checks}
+    if len(limits) > 1:
+        return legend("limit, or 2 u_val without one")
+    return legend("limit" if True in limits else "2 u_val")
 
 
 def _row(check: Json, *, several: bool) -> list[str]:
     name = f"{check['method']}: {check['name']}" if several else check["name"]
     if not check["count"]:
-        return [name, "", "compared nothing", check["verdict"]]
+        return [name, "", "compared nothing"]
     limit, u_val = check["limit"], check["u_val"]
     doubt = float("inf") if u_val is None else 2 * u_val
     if limit is not None:
         drawn = bar(check["value"], doubt, limit)
     else:
         drawn = bar(check["value"], 0.0, doubt) if 0 < doubt < float("inf") else ""
-    return [name, drawn, _numbers(check), check["verdict"]]
+    return [name, drawn, _numbers(check)]
 
 
 def _numbers(check: Json) -> str:

@@ -46,7 +46,7 @@ def show_run(
             Passage("", _warnings(result, lines), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
             Passage("", _unfinished(result, lines), keep=2, most=4),
-            Passage("", _identified(result, lines), keep=2, most=4),
+            Passage("Identified, with 95 % intervals", _identified(result), 1, 4),
             *([ranking] if ranking else []),
             Passage("", figures_line([figure_members(p) for p in result.published], name)),
             Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
@@ -120,15 +120,14 @@ def _unfinished(result: Result, most: int | None) -> tuple[str, ...]:
     return tuple(line for text in texts for line in sentence_lines(text, most))
 
 
-def _identified(result: Result, most: int | None) -> tuple[str, ...]:
-    found: list[str] = []
+def _identified(result: Result) -> tuple[str, ...]:
+    """Name, value with half of its 95 % interval, and the method, a line each."""
+    cells = []
     for v in result.identified_values:
         low, high = v.interval
-        half = with_unit((high - low) / 2, v.unit, 2)
-        value = with_unit(v.value, v.unit, 4)
-        text = f"{v.name} = {value} ± {half} (95 %), identified by {v.by} on {v.on}"
-        found += sentence_lines(text, most)
-    return tuple(found)
+        value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
+        cells.append([v.name, f"{value} ± {half}", f"by {v.by}"])
+    return rows([""] * 3, cells)
 
 
 def _ranking(result: Result) -> Passage | None:
