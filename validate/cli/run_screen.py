@@ -212,7 +212,8 @@ def _next(result: Result, name: str) -> Iterator[str]:
         steps.append(
             (f"validate study choose {name} --error {limit} --rate 100Hz", "the cheapest method")
         )
-    if meshed and any(len(m.run.t) > 10 for m in result.methods):
+    moving = any(material.rho for m in result.methods for material in m.scene.materials)
+    if meshed and moving and any(len(m.run.t) > 10 for m in result.methods):
         steps.append((f"validate study stability {name}", "the largest stable step"))
     width = max((len(command) for command, _ in steps[:3]), default=0)
     for command, why in steps:
