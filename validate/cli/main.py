@@ -236,7 +236,9 @@ def summary_(out: Path | None, as_json: bool) -> None:
     "--sort", type=click.Choice(["change", "difference", "score", "method", "stored"]),
     default="change", show_default=True, help="Order of the scores, the largest change first.",
 )  # fmt: skip
-@click.option("--all", "everything", is_flag=True, help="Everything, not 40 lines of it.")
+@click.option(
+    "--all", "-v", "--verbose", "everything", is_flag=True, help="Everything, not one screen of it."
+)
 @click.option("--out", type=FOLDER, help="Where the page goes (default: beside the first run).")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
