@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from commands import here
 from study_samples import experiment_file
 
 from validate.cli.arguments import BAD_INPUT
@@ -116,3 +117,22 @@ def test_bad_input_is_one_line(
         error = capsys.readouterr().err
         assert said in error
         assert error.count("\n") == 1
+
+
+def test_a_ranking_is_one_screen_with_nis_times_and_front(tmp_path: Path) -> None:
+    file = str(experiment_file(tmp_path))
+    command = ("study", "filters", file, *SWEEPS, "--seeds", "3", "--workers", "0")
+    code, out, _ = here(*command, "--out", str(tmp_path), COLUMNS="80")
+    lines = out.splitlines()
+    assert code == 0
+    assert len(lines) <= 25
+    title = next(i for i, line in enumerate(lines) if line.startswith("Ranking by "))
+    assert "!: NIS outside its 95 % band; *: on the Pareto front" in lines
+    assert lines[title + 1].split()[-1] == "front"
+    first = lines[title + 2]
+    assert first.strip().startswith("1. ")
+    assert any(line.endswith("*") for line in lines[title + 2 :])
+    whole = here(*command, "--out", str(tmp_path), "--verbose", COLUMNS="200")[1]
+    assert "all columns" in whole
+    answer = here(*command, "--out", str(tmp_path), "-q")[1]
+    assert answer.count("\n") == 1

@@ -53,7 +53,7 @@ def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
         name = e.name if e.name.startswith(method) else f"{e.name} ({method})"
         numbers = [shown(v, units(one)[e.name]) for v in (e.value, e.low, e.high)]
         cells.append([name, *numbers, "yes" if e.identified else "no"])
-    blocks = [
+    passages = [
         Passage("", sentence_lines(first)),
         Passage("", tuple(missing), keep=3),
         Passage("Fitted values", rows(_HEAD, cells) if cells else (), 6),
@@ -66,5 +66,5 @@ def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
         ]  # fmt: skip
         on = f"{one.problem.calibration.method} on {one.on}"
         words = f"{on}; correlations: {'; '.join(pairs_)}" if pairs_ else on
-        blocks.append(Passage("", sentence_lines(words, 2), keep=1))
-    return blocks
+        passages.append(Passage("", sentence_lines(words, 2), keep=1))
+    return passages

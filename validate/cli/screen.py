@@ -1,4 +1,4 @@
-"""One screen of text: blocks of lines that share a number of lines, and bars in characters.
+"""One screen of text: passages of lines that share a number of lines, and bars in characters.
 
 show([Passage("Checks", rows, keep=2, most=8)])  # on at most 25 lines
 """
@@ -38,9 +38,9 @@ class Passage:
         return bool(self.title) + shown + (shown < len(self.lines) + self.hidden)
 
 
-def fitted(blocks: Sequence[Passage], most: float = LINES) -> list[Passage]:
-    """The blocks that have lines, the longest shortened until all have room."""
-    found = [b for b in blocks if b.lines]
+def fitted(passages: Sequence[Passage], most: float = LINES) -> list[Passage]:
+    """The passages that have lines, the longest shortened until all have room."""
+    found = [b for b in passages if b.lines]
     counts = [min(len(b.lines), b.most or len(b.lines)) for b in found]
     least = [n if b.keep is None else min(n, b.keep) for b, n in zip(found, counts, strict=True)]
     while sum(b.height(n) for b, n in zip(found, counts, strict=True)) > most:
@@ -55,10 +55,10 @@ def fitted(blocks: Sequence[Passage], most: float = LINES) -> list[Passage]:
     ]  # fmt: skip
 
 
-def show(blocks: Sequence[Passage], detail: Detail = "screen") -> None:
-    """Print the blocks with their titles in bold: on one screen, whole, or the first one alone."""
+def show(passages: Sequence[Passage], detail: Detail = "screen") -> None:
+    """Print passages with their titles in bold: on one screen, whole, or the first one alone."""
     screen = console()
-    found = [b for b in blocks if b.lines]
+    found = [b for b in passages if b.lines]
     if detail == "screen":
         found = fitted(found)
     if detail == "short":
@@ -66,10 +66,10 @@ def show(blocks: Sequence[Passage], detail: Detail = "screen") -> None:
             " ".join(line.strip() for line in found[0].lines), markup=False, soft_wrap=True
         )
         return
-    for block in found:
-        if block.title:
-            say(block.title, "bold")
-        for line in block.lines:
+    for passage in found:
+        if passage.title:
+            say(cut(passage.title, width()), "bold")
+        for line in passage.lines:
             screen.print(line, markup=False, soft_wrap=True)
 
 

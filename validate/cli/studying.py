@@ -89,6 +89,8 @@ def filters(
         )  # fmt: skip
     page = written(experiment, filter_page.findings(found), place, common)
     if not common.as_json:
+        if common.detail == "full":
+            _filters_in_full(found)
         answer(_filter_passages(found, common.detail), found.done, page, common.detail)
     return OK
 
@@ -218,14 +220,14 @@ def written(experiment: Experiment, told: Findings, place: str, common: StudyOpt
     return page
 
 
-def answer(blocks: Sequence[Passage], done: Finished[Any], page: Path, detail: Detail) -> None:
+def answer(passages: Sequence[Passage], done: Finished[Any], page: Path, detail: Detail) -> None:
     """Print a study on one screen, with the count of its cells and the place of its report."""
     where = f" on {done.workers}" if done.workers else ""
     ends = (
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
         f"{where}; report: {relative(page)}"
     )
-    show([*blocks, Passage("", sentence_lines(ends))], detail)
+    show([*passages, Passage("", sentence_lines(ends))], detail)
 
 
 # --- terminals ------------------------------------------------------------------------------------
@@ -234,47 +236,62 @@ def answer(blocks: Sequence[Passage], done: Finished[Any], page: Path, detail: D
 def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
     """The best settings first, then the places of each condition."""
     best = [line for b in found.best for line in sentence_lines(b.line)]
-    blocks = [
+    passages = [
         Passage("", sentence_lines(filter_page.sentence(found))),
         Passage("", tuple(best), keep=1, most=4),
     ]
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
         title = f"Ranking by {found.by}{under}"
-        blocks.append(Passage(title, _places(ranking, found), 2, 11))
+        passages.append(Passage(title, _places(ranking, found), 2, 11))
         notes: list[str] = []
         if len(found.plan.seeds) == 1:
             notes += [] if ranking.blocks is None else [ranking.blocks.words]
             notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
         lines = tuple(k for note in notes for k in sentence_lines(note))
-        blocks.append(Passage("", lines, keep=1))
+        passages.append(Passage("", lines, keep=1))
     if detail == "screen" and len(found.rankings) > _RANKINGS:
         left = len(found.rankings) - _RANKINGS
-        blocks = [
-            *blocks[: 2 + 2 * _RANKINGS],
+        passages = [
+            *passages[: 2 + 2 * _RANKINGS],
             Passage("", (f"{left} more conditions: --verbose",)),
         ]
     if found.plan.single_words:
-        blocks.append(Passage("", sentence_lines(found.plan.single_words)))
+        passages.append(Passage("", sentence_lines(found.plan.single_words)))
+    passages.append(Passage("", ("!: NIS outside its 95 % band; *: on the Pareto front",)))
     failed = (
         f"failed: {cell.name} ({named(cell.values)}): {why}"
         for r in found.rankings for cell, why in r.failed
     )  # fmt: skip
     lines = tuple(k for text in failed for k in sentence_lines(text, 2))
-    return [*blocks, Passage("", lines, keep=1, most=4)]
+    return [*passages, Passage("", lines, keep=1, most=4)]
 
 
 def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
-    """Place, settings where any were swept, error with its interval, and times of a step."""
+    """Place, settings where any were swept, error with its interval, NIS ("!" outside of its 95 %
+    band), times of a step, and "*" on the Pareto front."""
     swept = any(r.cell.settings for r in ranking.rows)
     error = ranking_head(found.unit)[3]
-    head = ["", *(["settings"] if swept else []), error, "± 95 %", "p50 / ms", "p99 / ms"]
+    head = ["", *(["settings"] if swept else []), error, "± 95 %", "NIS", "p50 / ms", "p99 / ms",
+            "front"]  # fmt: skip
     cells = []
     for row in ranking.rows:
-        place, method, settings, *numbers = (_text(v) for v in ranking_row(row, found.by))
+        entries = ranking_row(row, found.by)
+        place, method, settings, mean, half = (_text(v) for v in entries[:5])
+        nis, consistent, p50, p99, front = (_text(entries[i]) for i in (9, 10, 12, 13, 15))
+        mark = "" if consistent in (MISSING, "consistent") else " !"
         own = [cut(settings, _SETTINGS)] if swept else []
-        cells.append([f"{place}. {method}", *own, numbers[0], numbers[1], numbers[9], numbers[10]])
-    return rows(head, cells) if cells else ()
+        cells.append([f"{place}. {method}", *own, mean, half, nis + mark, p50, p99,
+                      "*" if front == "front" else ""])  # fmt: skip
+    return rows(head, cells)
+
+
+def _filters_in_full(found: FilterStudy) -> None:
+    """Every column of every ranking, as the report has them."""
+    for ranking in found.rankings:
+        cells = [[_text(v) for v in ranking_row(r, found.by)] for r in ranking.rows]
+        under = f" with {named(ranking.condition)}" if ranking.condition else ""
+        table(f"Ranking by {found.by}{under}, all columns", ranking_head(found.unit), cells)
 
 
 def _text(value: float | int | str | None) -> str:
@@ -299,7 +316,7 @@ def _stability_passages(found: Stability, endings: str) -> list[Passage]:
 
 
 def _trade_passages(found: Trade) -> list[Passage]:
-    blocks = [
+    passages = [
         Passage("", sentence_lines(trade_page.sentence(found))),
         Passage("", _warned(found.locking), keep=2, most=4),
     ]
@@ -313,8 +330,8 @@ def _trade_passages(found: Trade) -> list[Passage]:
         ]  # fmt: skip
         dominated = found.front(by).dominated
         lines = sentence_lines(f"dominated ({by}): {'; '.join(dominated)}", 2) if dominated else ()
-        blocks += [Passage(title, rows(head, cells) if cells else (), 3), Passage("", lines)]
-    return blocks
+        passages += [Passage(title, rows(head, cells) if cells else (), 3), Passage("", lines)]
+    return passages
 
 
 def _choice_passages(choice: Choice) -> list[Passage]:
