@@ -13,8 +13,12 @@ from hypothesis import strategies as st
 from report_samples import CHECK, small_result
 
 from validate.cli.display import say
+from validate.cli.inspecting import _passages
+from validate.cli.recordings import _besides
 from validate.cli.run_screen import show_run
 from validate.cli.screen import LINES, Passage, bar, fitted, rows, show
+from validate.recording.preflight import Inspection, Topic
+from validate.recording.types import Recording, Source
 
 PAGE = Path("report.html")
 
@@ -180,3 +184,22 @@ def test_parameters_that_matter_come_first() -> None:
     assert all(p.startswith("material.") for p in paths)
     assert "more: --all" in lines[start + 10]
     assert "methods.mixed" in here("list", "silicone_beam", "--all")[1]
+
+
+def test_many_unread_fields_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    source = Source("x.mat", "", 0, "text")
+    unread = {f"field{i}": "a table of text" for i in range(150)}
+    (line,) = _besides(Recording("x", source, 0, unread=unread))
+    assert line.startswith("not read: 150 fields; the first: field0: a table of text")
+    topics = [Topic(n, f"not read: {w}", "", "", "", 0, None, None, "", "", None)
+              for n, w in unread.items()]  # fmt: skip
+    found = Inspection(
+        source=source, profile="", library="", compressions=(), chunks=0, messages=0, attachments=0,
+        metadata=(), topics=tuple(topics), defects=(), facts=(), read_as="matlab",
+    )  # fmt: skip
+    show(_passages(found, (), "screen"))
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 5
+    assert "150 fields are not read; the first: field0: not read: a table of text" in lines
+    show(_passages(found, (), "full"), "full")
+    assert capsys.readouterr().out.count("not read: a table of text") == 150
