@@ -17,6 +17,7 @@ from validate.cli.inspecting import _passages
 from validate.cli.recordings import _besides
 from validate.cli.run_screen import show_run
 from validate.cli.screen import LINES, Passage, bar, fitted, rows, show
+from validate.compare.exhibit import Exhibit, NumberTable
 from validate.recording.preflight import Inspection, Topic
 from validate.recording.types import Recording, Source
 
@@ -97,6 +98,14 @@ def test_a_run_ends_in_a_screen_with_the_worst_check_first(
     whole = " ".join(capsys.readouterr().out.split())
     assert all(c.name in whole for c in checks)
     assert all(" ".join(w.split()) in whole for w in warnings[:1])
+
+
+def test_likely_causes_stand_on_the_screen(capsys: pytest.CaptureFixture[str]) -> None:
+    row = ("slip", "tip", 1, "modulus or density", 61.7, "the motion is too fast", "weigh the body")
+    table = NumberTable("likely_causes", "", ("",) * 7, (row,))
+    exhibit = Exhibit("likely-causes", "Likely causes", (), tables=(table,))
+    show_run(replace(small_result(), exhibits=(exhibit,)), "cube", PAGE, 1.0)
+    assert "  1. modulus or density  62 %  weigh the body\n" in capsys.readouterr().out
 
 
 def test_quiet_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,6 +38,7 @@ def show_run(
     verbose = detail == "full"
     lines = None if verbose else 2  # of a sentence
     ranking = _ranking(result)
+    causes = "Likely causes: share of the squared error, what would decide"
     end = f"{seconds:.1f} s wall time; report: {relative(page)}"
     show(
         (
@@ -47,6 +48,7 @@ def show_run(
             *([] if verbose else check_passages(_checks(result))),
             Passage("", _unfinished(result, lines), keep=2, most=4),
             Passage("Identified, with 95 % intervals", _identified(result), 1, 4),
+            Passage(causes, () if verbose else _causes(result), 2, 4),
             *([ranking] if ranking else []),
             Passage("", figures_line([figure_members(p) for p in result.published], name)),
             Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
@@ -118,6 +120,17 @@ def _unfinished(result: Result, most: int | None) -> tuple[str, ...]:
             )
     texts = (f"{', '.join(names)}: {why}" for why, names in ends.items())
     return tuple(line for text in texts for line in sentence_lines(text, most))
+
+
+def _causes(result: Result) -> tuple[str, ...]:
+    """The likely causes of the first difference, with what would decide each."""
+    found = next((e for e in result.exhibits if e.anchor == "likely-causes"), None)
+    if found is None:
+        return ()
+    every = found.tables[0].rows
+    first = [r for r in every if r[:2] == every[0][:2]]
+    cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
+    return rows([""] * 3, cells, soft=2)
 
 
 def _identified(result: Result) -> tuple[str, ...]:
@@ -197,8 +210,6 @@ def _next(result: Result, name: str) -> Iterator[str]:
     steps: list[tuple[str, str]] = []
     if result.quick:
         steps.append((f"validate run {name}", "the full run"))
-    if any(e.anchor == "likely-causes" for e in result.exhibits):
-        steps.append(("", "likely causes are in the report"))
     if result.identified_values and not found.passed:
         steps.append((f"validate identify {name}", "identify what is uncertain"))
     meshed = any(len(m.scene.mesh.nodes) for m in result.methods)
@@ -217,7 +228,7 @@ def _next(result: Result, name: str) -> Iterator[str]:
         steps.append((f"validate study stability {name}", "the largest stable step"))
     width = max((len(command) for command, _ in steps[:3]), default=0)
     for command, why in steps:
-        yield f"  {command:<{width}}  {why}" if command else f"  {why}"
+        yield f"  {command:<{width}}  {why}"
 
 
 def _filters(result: Result) -> bool:
