@@ -112,7 +112,11 @@ def test_a_filter_that_no_measurement_reaches_is_invalid(settings: Filter, pulle
     closed = replace(settings, gate=1e-300)  # type: ignore[type-var]
     why = "measurements reached the filter"
     for filter_, given, says in (
-        (settings, without(seen), rf"0 of 60 {why} \(60 have all components missing\), so the model ran"),
+        (
+            settings,
+            without(seen),
+            rf"0 of 60 {why} \(60 have all components missing\), so the model ran",
+        ),
         (settings, replace(seen, t=seen.t + 60 * DT), rf"0 of 60 {why} \(60 come after the last"),
         (settings, replace(seen, t=seen.t - 60 * DT), rf"0 of 60 {why} \(60 lie at the start"),
         (closed, seen, rf"0 of 60 {why} \(60 were met, and the gate rejected 60 marker samples"),
