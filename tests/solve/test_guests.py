@@ -215,7 +215,7 @@ def test_one_that_hangs_is_ended_with_all_that_it_started(tmp_path: Path) -> Non
     note = tmp_path / "child"
     script = f"trap '' TERM; sleep 600 & echo $! > {shlex.quote(str(note))}; wait"
     run = solved(shell(script, seconds=2.0))
-    assert (run.outcome.state, run.outcome.why) == ("invalid", "over the limit of 2 s, ended")
+    assert (run.outcome.state, run.outcome.why) == ("invalid", "over the limit of 2 s, stopped")
     assert _gone(int(note.read_text()))
 
 
