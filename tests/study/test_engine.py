@@ -204,7 +204,7 @@ def test_a_scheduler_that_dies_is_one_line_and_the_cells_are_kept(tmp_path: Path
             own.all[0].kill()
 
     try:
-        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ was lost .* to continue"):
+        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ was lost .* continue"):
             finish(waiting(tmp_path, cells), tmp_path / "cells", Where(scheduler=own.address), kill)
     finally:
         own.stop()
