@@ -35,7 +35,7 @@ PRINTED = {
     "kf_cube": (
         "NRMSE at the observation point",
         "share of the measurement noise that is left",
-        "share of the error left 2 mm below the measured node, model 20 % too stiff",
+        "share of the error that remains 2 mm below the measured node, model 20 % too stiff",
     ),
     "ekf_cube": ("time step", "ekf_held: node_A.rmse", "ekf_held: node_B.rmse"),
     "ekf_cone": ("ekf_held: node_A.rmse", "ekf_held: node_B.rmse"),

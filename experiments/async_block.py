@@ -47,6 +47,6 @@ EXPERIMENT = Experiment(
         remake=("twin.", "probe.", "body.", "dt"),
         kind="same model",
         seed=PARAMETERS.twin.seed,
-        notice="The recording is a twin: the whole solve on the models' own mesh, plus noise.",
+        notice="The recording is a twin: the full solve on the mesh of the models, plus noise.",
     ),
 )

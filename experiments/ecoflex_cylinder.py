@@ -83,8 +83,8 @@ def _scaled(p: LoggedCylinder, z: float) -> LoggedCylinder:
 UNCERTAINTY = Uncertainty(
     quarter_meshes(lambda p: float(p.specimen.height or 0.03)),
     (
-        Input("modulus", _scaled, "E as surely as the calibrating specimens give it",
-              "identified: scatter of their mean; how far specimens differ is in u_D"),
+        Input("modulus", _scaled, "E within the uncertainty of the calibrating specimens",
+              "identified: scatter of their mean; the scatter between specimens is in u_D"),
         Input("Poisson ratio",
               moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu),
               "nu within its declared uncertainty", "assumed; the data set gives none"),
@@ -105,7 +105,7 @@ PUBLISHED = (
     Figure(
         "neo-Hooke shear modulus over the whole log",
         lambda v: v["identified"]["modulus.neo_slip"] / 3, 36.7e3, None, "Pa", "not comparable",
-        "theirs is to 66 % strain; ours to 50 %, with slipping plates", _TEN, 30.391e3, 10.0,
+        "theirs is fitted to 66 % strain, ours to 50 % with slipping plates", _TEN, 30.391e3, 10.0,
     ),
 )  # fmt: skip
 

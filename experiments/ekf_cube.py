@@ -36,7 +36,7 @@ METHODS = {
     "nfem": Method("NFEM, central difference", CentralDifference()),
     "nfem_printed": Method("NFEM at the printed 1 ms", CentralDifference(), stride=5),
     "nfem_printed_run": Method(
-        "NFEM at the printed 1 ms, run all the same",
+        "NFEM at the printed 1 ms, run despite its instability",
         CentralDifference(beyond_limit="run"),
         stride=5,
     ),
@@ -77,7 +77,7 @@ CASES = (
     ),
     Case(
         "stiff_model_200Hz",
-        "the models are 25 % stiffer than the truth, and A is seen at 200 Hz only",
+        "the models are 25 % stiffer than the truth, and A is measured at 200 Hz only",
         changed("twin", stiffness=0.8, every=25),
         methods=SOUND,
     ),

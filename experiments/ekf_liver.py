@@ -39,7 +39,7 @@ METHODS = {
     "nfem": Method("NFEM, central difference", CentralDifference()),
     "nfem_double": Method("NFEM at twice the printed step", CentralDifference(), stride=2),
     "nfem_double_run": Method(
-        "NFEM at twice the printed step, run all the same",
+        "NFEM at twice the printed step, run despite its instability",
         CentralDifference(beyond_limit="run"),
         stride=2,
     ),
@@ -72,13 +72,13 @@ CASES = (
     ),
     Case(
         "stiff_model_200Hz",
-        "the models are 25 % stiffer than the truth, and A is seen at 200 Hz only",
+        "the models are 25 % stiffer than the truth, and A is measured at 200 Hz only",
         changed("twin", stiffness=0.8, every=50),
         methods=SOUND,
     ),
     Case(
         "finer",
-        "the truth has every cell cut in eight and six times as many steps",
+        "the truth has eight times as many cells and six times as many steps",
         changed("twin", halved=1, finer=6),
         methods=SOUND,
     ),

@@ -47,7 +47,7 @@ INPUTS = (
 
 EXPERIMENT = Experiment(
     name="fluid_block",
-    title="Fluid in the cavities of a planar block, and the updates that keep its volume",
+    title="Fluid in the cavities of a planar block, and pressure updates that keep its volume",
     source="Gosline, Salcudean, Yan (2004), section 3.3",
     parameters=PARAMETERS,
     methods=METHODS,

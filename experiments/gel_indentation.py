@@ -50,7 +50,7 @@ UNCERTAINTY = Uncertainty(
         Input("smoothing", moved("faces", smoothing=smoothed),
               "neighbours of the fits at the faces, half to twice", "assumed"),
         Input("box", moved("material", nu=of_other_boxes),
-              "the Poisson ratio of another lower box, or of other faces",
+              "Poisson ratio of another lower box, or of other faces",
               "scatter of ratios fitted in several boxes"),
     ),
     surrogate="linear",
@@ -67,8 +67,8 @@ EXPERIMENT = Experiment(
         Accept(axis, 0.4e-6, "a voxel, rms over the particles", ("upper",), "rms") for axis in AXES
     ),
     expected=(
-        Expected("undecided", "the faces of the box place its inside to 0.3 and 0.4 "
-                 "micrometres, of 0.4 required", check="inside.[xy]*"),
+        Expected("undecided", "the faces of the box determine its interior to 0.3 and 0.4 "
+                              "micrometres, of 0.4 required", check="inside.[xy]*"),
     ),
     load=load,
     build=build,
@@ -77,7 +77,8 @@ EXPERIMENT = Experiment(
     calibrations=(
         Calibration(
             "linear",
-            (Free("material.nu", 0.0, 0.4995, "no volume grows when pressed; displacement elements",
+            (Free("material.nu", 0.0, 0.4995, "the volume cannot grow under compression; "
+                                              "displacement elements",
                   "a wider box, or particles with less noise along z"),),
             (Calibrates(tuple(f"{axis}@lower" for axis in AXES), IN_LOWER, "this one lower box"),),
         ),

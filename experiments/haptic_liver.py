@@ -42,7 +42,7 @@ METHODS = {
 
 EXPERIMENT = Experiment(
     name="haptic_liver",
-    title="A tool at haptic rate on a slower liver",
+    title="Tool at haptic rate on a liver that is simulated at a lower rate",
     source="paper 003 (EKF-NFEM), section 3.5",
     parameters=PARAMETERS,
     methods=METHODS,

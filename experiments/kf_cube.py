@@ -36,12 +36,10 @@ A = ("node_A",)
 METHODS = {
     "fem": Method("FEM, factorised once", Newmark()),
     "fem_gauss": Method(
-        "FEM, Gaussian elimination anew every step", Newmark(solver="gaussian_elimination"), steps=5
+        "FEM, Gaussian elimination every step", Newmark(solver="gaussian_elimination"), steps=5
     ),
-    "fem_dense": Method(
-        "FEM, dense solve anew every step", Newmark(solver="dense_solve"), steps=50
-    ),
-    "fem_sparse": Method("FEM, sparse LU anew every step", Newmark(solver="sparse_lu"), steps=50),
+    "fem_dense": Method("FEM, dense solve every step", Newmark(solver="dense_solve"), steps=50),
+    "fem_sparse": Method("FEM, sparse LU every step", Newmark(solver="sparse_lu"), steps=50),
     "fem_inverse": Method("FEM, dense inverse", Newmark(solver="dense_inverse"), steps=200),
     "fem_modal": Method("FEM, all 525 modes", Modal(propagate="average")),
     "kf_dense": Method(
@@ -87,7 +85,7 @@ METHODS = {
         "20 modes and load bias, gate", ReducedKf(gate=0.999), markers=A, chosen=WALK_UNRECORDED
     ),
     "kf_unclocked": Method(
-        "20 modes and load bias, looks taken as on time",
+        "20 modes and load bias, time stamps taken as exact",
         ReducedKf(clock=0.0),
         markers=A,
         chosen=WALK_UNRECORDED,
@@ -97,7 +95,7 @@ METHODS = {
     ),
     "roukf": Method("unscented filter of the stiffness, 2 runs", Roukf(), markers=A),
     "roukf_layer": Method(
-        "unscented filter of the layer's stiffness and the rest's, 3 runs",
+        "unscented filter of the stiffness of layer and rest, 3 runs",
         Roukf(parameters=("stiffness.layer", "stiffness.body"), sd=(1.0, 0.25)),
         BlockModel(layer=True),
         markers=A,
@@ -138,11 +136,11 @@ CASES = (
           inside="layer"),
     _case("inclusion", "the truth has a stiff inclusion (five times)", inside="inclusion"),
     _case("nu", "the truth has a Poisson ratio of 0.30", nu=0.30),
-    _case("sparse", "models are 20 % stiffer, seen every 10th step, a fifth missing",
+    _case("sparse", "models are 20 % stiffer, measured every 10th step, a fifth missing",
           stiffness=1 / 1.2, every=10, missing=0.2),
-    _case("outliers", "a fiftieth of the looks is 1 mm off", CAREFUL, outliers=0.02),
-    _case("late", "looks are off their time by 20 ms (sd), which their clock tells", CAREFUL,
-          late=20e-3),
+    _case("outliers", "2 % of the samples have an error of 1 mm", CAREFUL, outliers=0.02),
+    _case("late", "time stamps of samples have an error of 20 ms (sd), as their clock declares",
+          CAREFUL, late=20e-3),
 )  # fmt: skip
 
 
@@ -178,8 +176,9 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=FIGURES,
     captions={
-        "displacement_node_A": "As Figs. 3 and 4 of paper 001: what was measured, FEM and KF-FEM.",
-        "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, given to no filter.",
+        "displacement_node_A": "As Figs. 3 and 4 of paper 001: measurement, FEM and KF-FEM.",
+        "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, which no filter "
+        "receives.",
     },
     twin=Twin(
         record,

@@ -62,7 +62,7 @@ RIVALS = ("average", "kf_printed", "kf_load", "kf_reduced")
 
 SOFT_BASE = Case(
     "soft_base",
-    "the truth stands on springs of 450 kN/m3, those of the joint filter's model have 300",
+    "the truth has supporting springs of 450 kN/m3, the model of the joint filter 300",
     changed("twin", springs=4.5e5),
     methods=(*RIVALS, "roukf_support"),
 )
@@ -77,7 +77,7 @@ EXPERIMENT = replace(
     CREEPING,
     name="kf_cube_inertia",
     title="Kalman filter finite elements where inertia matters",
-    source="beside paper 001 (KF-FEM), whose scene is trivial in time",
+    source="in addition to paper 001 (KF-FEM), whose scene is nearly static",
     parameters=PARAMETERS,
     methods=METHODS,
     accepted=("kf_reduced",),

@@ -27,7 +27,7 @@ LESS = Input(
     "Poisson ratio",
     moved(nu=lambda p, z: p.nu - abs(z) * p.ranges.nu),
     "nu",
-    "assumed; the curves say nothing of the volume",
+    "assumed; the curves contain no volume",
 )
 
 EXPERIMENT = Experiment(
@@ -42,7 +42,7 @@ EXPERIMENT = Experiment(
     expected=(
         Expected("not good enough", "a law that is identified in uniaxial tension alone does not "
                  "predict the other modes"),
-        Expected("undecided", "reading a digitised curve is as uncertain as the limit",
+        Expected("undecided", "the uncertainty of a digitised curve is as large as the limit",
                  check="stress.pure_shear*"),
         Expected("not good enough", "one term has too few constants", check="stress.pure_shear*",
                  method="ogden"),

@@ -42,7 +42,7 @@ INPUTS = (
 
 EXPERIMENT = Experiment(
     name="needle_pocket",
-    title="A needle at haptic rate against a body with a fluid pocket",
+    title="Needle at haptic rate in a body with a fluid pocket",
     source="Gosline, Salcudean, Yan (2004), section 5.2",
     parameters=NeedlePocket(),
     methods=METHODS,
@@ -55,7 +55,8 @@ EXPERIMENT = Experiment(
     ),
     expected=(
         Expected(
-            "undecided", "the modulus is declared to 5 %, and a force at a point follows the mesh"
+            "undecided", "the modulus is declared to 5 %, and a force at a point depends on "
+                         "the mesh"
         ),
     ),
     load=load,

@@ -42,29 +42,31 @@ LINEAR = Model("linear", damping=BETA)
 CUT = Model("svk", order=1, mixed=False, along=10, across=3, damping=BETA)
 METHODS = {
     "mixed": Method("quadratic hexahedra with a pressure, neo-Hooke", LetGo(), Model()),
-    "ring_down": Method("small vibrations about the rest of the same", ViscousModes(), Model()),
-    "still": Method("rest alone, of the same", STATIC, Model()),
-    "mixed_svk": Method("rest alone, St. Venant-Kirchhoff", STATIC, Model("svk")),
+    "ring_down": Method("small vibrations about its rest position", ViscousModes(), Model()),
+    "still": Method("its rest position only", STATIC, Model()),
+    "mixed_svk": Method("rest position only, St. Venant-Kirchhoff", STATIC, Model("svk")),
     "mixed_coarse": Method(
-        "rest alone, linear hexahedra with a pressure", STATIC, Model(order=1, along=12, across=3)
+        "rest position only, linear hexahedra with a pressure",
+        STATIC,
+        Model(order=1, along=12, across=3),
     ),
     "locking": Method(
-        "rest alone, linear hexahedra (lock)",
+        "rest position only, linear hexahedra (lock)",
         STATIC,
         Model(order=1, mixed=False, along=12, across=3),
     ),
     "filter_noise": Method(
-        "linear modes, load unsure, given Tip - 1 with the noise of the capture",
+        "linear modes with uncertain load, given Tip - 1 with the noise of the capture",
         ReducedKf(load_start=3.0, load_walk=10.0, load_jitter=3.0),
         LINEAR,
         markers=("Tip - 1",),
     ),
     "filter_doubt": Method(
-        "linear modes, given Tip - 1 to .2 mm, which is what they cannot follow",
+        "linear modes, given Tip - 1 to .2 mm (their model error)",
         ReducedKf(load_start=3.0, load_walk=1.0, load_jitter=0.3, R=4e-8),
         LINEAR,
         markers=("Tip - 1",),
-        chosen="R and the load's walk, on the recording under gravity",
+        chosen="R and the random walk of the load, chosen on the recording under gravity",
     ),
     "roukf": Method(
         "unscented filter of the modulus, linear, given Tip - 1 to .2 mm",
@@ -74,7 +76,7 @@ METHODS = {
         chosen="R, as for the filter of the load",
     ),
     "felupe": Method(
-        "FElupe, rest alone, linear hexahedra of three fields",
+        "FElupe, rest position only, linear hexahedra of three fields",
         Guest(FELUPE),
         Model(order=1, along=12, across=3),
     ),
@@ -153,9 +155,10 @@ UNCERTAINTY = Uncertainty(
               moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu), "nu", NONE),
         Input("height", moved("size", height=lambda p, z: p.size.height + z * p.ranges.size),
               "height of the section", NONE),
-        Input("mass", moved("load", mass=_hung), "what hangs at the end", NONE),
+        Input("mass", moved("load", mass=_hung), "mass at the end", NONE),
         Input("creep", _creeping, "modulus of the slow branch", NONE),
-        Input("relaxation time", _sooner, "time of the fast branch, at the same loss", NONE),
+        Input("relaxation time", _sooner, "relaxation time of the fast branch, at the same "
+                                          "loss", NONE),
     ),
     surrogate="ring_down",
     # "mixed" takes minutes on the finer meshes; its time step is then no part of u_num.
@@ -193,7 +196,7 @@ PART = "a tenth of its measured peak to peak"
 EXPERIMENT = Experiment(
     name="silicone_beam",
     needs="silicone-beam",
-    title="Silicone beam let go under its weight: its swing and its rest",
+    title="Silicone beam released under its weight: swing and rest position",
     source="srl-ethz/diffPD_sim2real 825e7b7 (MIT)",
     parameters=ReleasedBeam(),
     methods=METHODS,
@@ -207,7 +210,7 @@ EXPERIMENT = Experiment(
     expected=(
         Expected(
             "undecided",
-            "markers and the beam's height place a tip to 0.8 mm, of 1 mm required",
+            "markers and the beam's height determine the tip to 0.8 mm, of 1 mm required",
             check="tip.vertical*",
         ),
     ),

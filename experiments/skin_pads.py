@@ -29,7 +29,7 @@ METHODS = {
     "held": Method("neo-Hooke, far boundary held", LARGE, Model(stiffness="held", far="held")),
 }
 WHERE = "assumed: five decades"
-HELPS = "a force whose unit is stated, and the skin's thickness by ultrasound,"
+HELPS = "a force with a known unit, and the skin's thickness by ultrasound,"
 CALIBRATIONS = tuple(
     Calibration(
         method,
@@ -57,7 +57,7 @@ UNCERTAINTY = Uncertainty(
                             width=lambda p, z: p.pads.width + z * p.ranges.pads),
               "length and width of the pads", "assumed; drawn 8 mm, the window is 24 mm"),
         Input("distance", moved("pads", gap=lambda p, z: p.pads.gap + z * p.ranges.gap),
-              "between the pads at rest", "assumed; the authors' scripts call it unknown"),
+              "between the pads at rest", "assumed; unknown in the authors' scripts"),
     ),
     surrogate="neo_hooke",
 )  # fmt: skip
@@ -72,14 +72,14 @@ EXPERIMENT = Experiment(
     accepted=("neo_hooke", "linear"),
     accept=(
         Accept("force", 0.03, "a tenth of the largest force", ("predicted", "end")),
-        Accept("field.axial", 0.2e-3, "a twentieth of what the pads move"),
+        Accept("field.axial", 0.2e-3, "a twentieth of the displacement of the pads"),
         Accept("field.lateral", 0.1e-3, "half of that"),
     ),
     expected=(
         Expected(
             "not good enough",
-            "neither law predicts skin in vivo: it stiffens beyond the fit, and "
-            "its field is not that of an isotropic sheet",
+            "neither law predicts skin in vivo: it stiffens above the fitted range, and its "
+            "field is not that of an isotropic sheet",
         ),
         Expected("undecided", "the Poisson ratio is assumed", check="field.lateral.max@2.0mm"),
     ),

@@ -25,9 +25,9 @@ def _tip(axis: str) -> Input:
     )  # fmt: skip
 
 
-DETECTED = "PLUS's own detection takes four samples of every dwell"
+DETECTED = "PLUS detects with four samples of every dwell"
 BASELINE = (
-    "PLUS's error for this recording as the data set's description has it; its file is not there"
+    "PLUS's error for this recording, from the description of the data set; its file is missing"
 )
 PUBLISHED = (
     Figure(
@@ -36,13 +36,14 @@ PUBLISHED = (
     ),
     Figure(
         "registration error, ours", "identified:touch.error", 0.198e-3, None, "m", "not comparable",
-        "ours takes other samples of every dwell", BASELINE, 0.1727e-3, 2e-6,
+        "ours uses other samples of every dwell", BASELINE, 0.1727e-3, 2e-6,
     ),
     Figure(
-        "error beside the transform in PhantomRegistration.results.xml", "identified:touch.error",
+        "error given with the transform in PhantomRegistration.results.xml",
+            "identified:touch.error",
         0.2299e-6, None, "m", "not comparable",
-        "that transform is of another recording, a simulated tracker's: it stands at right angles "
-        "to this one, 0.2 m away", "PlusLibData, PhantomRegistration.results.xml",
+        "that transform belongs to another recording with a simulated tracker: it is rotated "
+        "by 90 degrees and 0.2 m away", "PlusLibData, PhantomRegistration.results.xml",
     ),
 )  # fmt: skip
 

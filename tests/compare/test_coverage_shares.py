@@ -65,5 +65,5 @@ def test_no_term_is_blamed_where_none_is_off() -> None:
 
 
 def test_a_share_that_chance_explains_says_so() -> None:
-    assert "by chance?" in find_fault(Share(15, 200), [NARROW]).words
-    assert "by chance?" not in find_fault(Share(60, 200), [NARROW]).words
+    assert "may be chance" in find_fault(Share(15, 200), [NARROW]).words
+    assert "may be chance" not in find_fault(Share(60, 200), [NARROW]).words

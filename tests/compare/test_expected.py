@@ -46,7 +46,7 @@ def test_the_last_declaration_that_fits_counts() -> None:
 
 
 def test_a_declaration_is_a_verdict_with_a_reason() -> None:
-    with pytest.raises(ComparisonError, match="'agrees': it is one of good enough"):
+    with pytest.raises(ComparisonError, match="'agrees': expected one of good enough"):
         Expected("agrees", "because")
-    with pytest.raises(ComparisonError, match="say why"):
+    with pytest.raises(ComparisonError, match="give the reason"):
         Expected("undecided", " ")

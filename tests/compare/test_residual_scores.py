@@ -249,7 +249,7 @@ def test_a_signal_without_its_trace_is_told_and_not_compared(
     }  # fmt: skip
     assert unanswered(registered, run) == ()
     (told,) = unanswered(registered, dry)
-    assert told.startswith("pressure: pressure compared with nothing, for no probe or trace")
+    assert told.startswith("pressure: pressure compared with nothing, because no probe or trace")
 
 
 def test_a_signal_in_another_unit_than_its_trace_is_refused(

@@ -139,7 +139,7 @@ def test_a_run_turned_inside_out_is_no_perfect_match(mesh: Mesh) -> None:
     assert scores["inverted"].value == scores["inverted"].count == len(mesh.cells)
     assert scores["inverted.reference"].value == 0
     assert scores["E_i.mean"].value > 0
-    assert "run is inside out" in dict(found.refused)["E_s"]
+    assert "run is turned inside out" in dict(found.refused)["E_s"]
 
 
 def test_an_inverted_cell_is_named(mesh: Mesh) -> None:
@@ -255,15 +255,15 @@ def test_a_curve_that_crosses_itself_encloses_no_plane_body() -> None:
 def test_a_boundary_that_touches_itself_is_no_outline() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
     pieces = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]])
-    with pytest.raises(ComparisonError, match="touches itself in 1 nodes; it is no outline"):
+    with pytest.raises(ComparisonError, match="touches itself in 1 nodes, so it is not an outline"):
         polygon(Boundary(points, pieces))
 
 
 @pytest.mark.parametrize(
     ("volume", "crossings", "says"),
     [
-        (-0.5, 0, r"run is inside out \(signed volume -0.5; 2 of 9 cells are inverted\)"),
-        (0.0, 3, r"run is inside out \(signed volume 0;"),
+        (-0.5, 0, r"run is turned inside out \(signed volume -0.5; 2 of 9 cells are inverted\)"),
+        (0.0, 3, r"run is turned inside out \(signed volume 0;"),
         (0.5, 3, r"boundary of run crosses itself in 3 places \(2 of 9 cells are inverted\)"),
     ],
 )

@@ -55,10 +55,10 @@ def test_a_recording_with_more_than_an_experiment_uses(experiment: Experiment) -
     assert used == {
         "pull": "drives the simulation", "markers": "compared with what is simulated",
     }  # fmt: skip
-    named = "the experiment names no observation of it"
+    named = "no observation of the experiment uses it"
     assert {s.topic: s.why for s in result.streams if not s.used} == {
         "thermometer": named, "spare": named, "wall": named,
-        "b_mode": "no outline is looked for in them",
+        "b_mode": "no outline is extracted from them",
         "/lidar": "its messages are not read (foxglove.PointCloud)",
     }  # fmt: skip
     content = document(result, "2026-11-21T04:00:00Z")
@@ -69,7 +69,7 @@ def test_a_recording_with_more_than_an_experiment_uses(experiment: Experiment) -
     shown = section(result)
     assert shown is not None
     assert len(shown.words) == 5
-    assert "Not used: images 'b_mode' of kf_cube: no outline is looked for in them." in shown.words
+    assert "Not used: images 'b_mode' of kf_cube: no outline is extracted from them." in shown.words
 
 
 class Seen:
@@ -94,8 +94,8 @@ def both(images: str) -> Recording:
 
 def test_images_are_used_where_outlines_are_found_in_them() -> None:
     outline, images = stream_uses([both("b_mode")], [[Seen(outline="validates")]])
-    assert outline.why.endswith("; found in the images 'b_mode', not as recorded")
-    assert (images.used, images.why) == (True, "the outlines 'outline' are found in them")
+    assert outline.why.endswith("; extracted from the images 'b_mode', not as recorded")
+    assert (images.used, images.why) == (True, "source of the outlines 'outline'")
 
 
 def test_images_beside_recorded_outlines_are_not_used() -> None:

@@ -116,13 +116,13 @@ def test_undecided_names_what_would_decide() -> None:
         ("pose", {"friction": 2.0, "pose": 2.5}),
     ):
         why = judged(scalar(0.1), 0.5, **parts).why
-        assert f"better measurement of '{name}' makes it smaller" in why
+        assert f"better measurement of '{name}' reduces it" in why
         assert "straddles the limit 0.5 Pa: a u_val below 0.2 Pa would decide" in why
     for name, better in (("mesh", "a finer mesh"), ("time step", "a shorter time step")):
         check = judge(scalar(0.0), required(0.5), Numerical({name: 10.0}), [])
-        assert f"{better} makes it smaller" in check.why
+        assert f"{better} reduces it" in check.why
     known = Numerical({"mesh": 10.0}, "", {"mesh": "cells of 2 mm"})
-    assert "cells of 2 mm makes it smaller" in judge(scalar(0.0), required(0.5), known, []).why
+    assert "cells of 2 mm reduces it" in judge(scalar(0.0), required(0.5), known, []).why
 
 
 @pytest.mark.parametrize("error", [0.0, 1e6])
@@ -292,12 +292,12 @@ def test_what_is_not_a_number_is_never_good_enough(hole: float) -> None:
 
 @pytest.mark.parametrize("limit", [np.nan, np.inf, 0.0, -1.0])
 def test_a_limit_is_a_positive_number(limit: float) -> None:
-    with pytest.raises(ComparisonError, match="is not a positive number"):
+    with pytest.raises(ComparisonError, match="expected a positive number"):
         Accept("force", limit, "ours")
 
 
 def test_an_unknown_statistic_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="'median'; it is one of every, rms, mean"):
+    with pytest.raises(ComparisonError, match="'median'; expected one of every, rms, mean"):
         Accept("force", 1.0, "ours", statistic="median")  # type: ignore[arg-type]
 
 
@@ -350,7 +350,7 @@ def test_a_limit_as_wide_as_what_was_measured_decides_nothing(limit: float, answ
     near = replace(scalar(0.5), scale=10.0)
     check = judge(near, required(limit), Numerical(), [])
     assert check.acceptance == answer
-    assert ("as wide as the largest that was measured, 10" in check.why) == (limit == 10.0)
+    assert ("as large as the largest measured value, 10" in check.why) == (limit == 10.0)
     assert judge(replace(near, scale=None), required(1e9), Numerical(), []).evidence
 
 

@@ -134,7 +134,7 @@ def test_an_explicit_filters_gate_takes_an_outlier_for_missing(
     assert jumped.traces["gate.rejected"].y[21] == 1
     follows = run(settings.prepare(system, replace(measured, z=z)), H, inputs)
     if isinstance(settings, MemberModel):  # a constant does not come back
-        assert "a gate keeps outliers away" in follows.outcome.why
+        assert "set a gate against outliers" in follows.outcome.why
     else:
         seen, gone = follows.u[: len(missing.u)], missing.u[: len(follows.u)]
         assert not np.allclose(seen, gone, atol=1e-3)

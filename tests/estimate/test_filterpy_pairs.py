@@ -107,7 +107,7 @@ def test_a_guest_of_wrong_shape_is_refused(name: str, value: Any, says: str) -> 
 
 def test_unknown_guests_and_what_is_no_filter() -> None:
     pulled = case()
-    with pytest.raises(ComparisonError, match=f"by name: {', '.join(GUESTS)}"):
+    with pytest.raises(ComparisonError, match=f"expected one of {', '.join(GUESTS)}"):
         FilterpyGuest("Kalman").prepare(pulled.system, pulled.measured(1))
     with pytest.raises(ComparisonError, match=r"dict.x: shape None"):
         FilterpyGuest(lambda _: {}).prepare(pulled.system, pulled.measured(1))
@@ -144,5 +144,7 @@ def test_a_simulator_filter_without_a_method_of_a_filter_is_refused(name: str) -
     model = SimpleNamespace(size=1, H=one)
     methods = {m: (lambda *_: None) for m in ("predict", "update") if m != name}
     guest = SimpleNamespace(x=np.zeros(1), P=one, Q=one, R=one, F=one, H=one, **methods)
-    with pytest.raises(ComparisonError, match=f"guest SimpleNamespace has no `{name}`: not a fil"):
+    with pytest.raises(
+        ComparisonError, match=f"external filter SimpleNamespace has no `{name}`: not a fil"
+    ):
         require_shapes(guest, model)  # type: ignore[arg-type]

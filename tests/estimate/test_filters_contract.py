@@ -112,10 +112,14 @@ def test_a_filter_that_no_measurement_reaches_is_invalid(settings: Filter, pulle
     closed = replace(settings, gate=1e-300)  # type: ignore[type-var]
     why = "measurements reached the filter"
     for filter_, given, says in (
-        (settings, without(seen), rf"0 of 60 {why} \(60 have all components missing\): "),
+        (
+            settings,
+            without(seen),
+            rf"0 of 60 {why} \(60 have all components missing\), so the model ran",
+        ),
         (settings, replace(seen, t=seen.t + 60 * DT), rf"0 of 60 {why} \(60 come after the last"),
         (settings, replace(seen, t=seen.t - 60 * DT), rf"0 of 60 {why} \(60 lie at the start"),
-        (closed, seen, rf"0 of 60 {why} \(60 were met, and the gate rejected 60 looks"),
+        (closed, seen, rf"0 of 60 {why} \(60 were met, and the gate rejected 60 marker samples"),
     ):
         if "start" in says and getattr(settings, "gains", "") == "steady":
             continue  # without any look there is nothing that it could settle on
@@ -150,7 +154,7 @@ def test_a_gated_outlier_changes_as_much_as_a_missing_look(settings: Filter, pul
     assert jumped.traces["gate.tested"].y.sum() == 120
     free = pulled.march(settings.prepare(pulled.system, replace(seen, z=z)), at=(20,))
     if isinstance(settings, MemberModel) and not free.finished:  # a constant does not come back
-        assert "a gate keeps outliers away" in free.outcome.why
+        assert "set a gate against outliers" in free.outcome.why
         return
     if not free.finished:
         assert free.outcome.state == "diverged"
@@ -191,8 +195,8 @@ def test_an_open_gate_leaves_the_estimate(settings: Filter, pulled: Case) -> Non
 def test_a_gate_and_a_clock_that_are_none_are_refused(pulled: Case) -> None:
     seen = pulled.measured(1)
     for wrong, says in (
-        ({"gate": 1.0}, "gate = 1: a share of good looks between 0 and 1"),
-        ({"clock": -1.0}, "clock = -1 s: a standard deviation"),
+        ({"gate": 1.0}, "gate = 1: expected a share of good samples between 0 and 1"),
+        ({"clock": -1.0}, "clock = -1 s: expected a standard deviation"),
     ):
         with pytest.raises(UsageError, match=says):
             ReducedKf(**wrong).prepare(pulled.system, seen)  # type: ignore[arg-type]

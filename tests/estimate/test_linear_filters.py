@@ -380,7 +380,7 @@ def test_what_a_filter_cannot_do_is_refused(pulled: Case) -> None:
     with pytest.raises(SceneError, match="needs a load"):
         KfFem(structure="load").prepare(bare, seen)
     swinging = build(replace(scene, material=replace(scene.material, stiffness_damping=1e-6)))
-    with pytest.raises(SceneError, match="it swings"):
+    with pytest.raises(SceneError, match="it oscillates"):
         LoadScale().prepare(swinging, seen)
     for name, value in (("Q", -1.0), ("P0", np.nan), ("R", 0.0)):
         with pytest.raises(SceneError, match=f"variance {name}"):
@@ -420,7 +420,7 @@ def test_a_load_scales_shape_creeps_to_statics_and_swings_below_twice_critical(
         build(replace(scene, material=replace(scene.material, stiffness_damping=2 * r / omega)))
         for r in (1.99, 2.01)
     ]
-    with pytest.raises(SceneError, match=r"damping ratio 2, it swings.* needs 2;"):
+    with pytest.raises(SceneError, match=r"damping ratio 2, so it oscillates.* needs 2;"):
         LoadScale().prepare(damped[0], seen)
     LoadScale().prepare(damped[1], seen)
 
@@ -517,14 +517,16 @@ def test_riccati_by_doubling_is_that_by_schurs_form() -> None:
     B, Q = rng.standard_normal((6, 2)), np.diag(rng.random(6) + 0.1)
     X = _doubled(A, B @ B.T, Q)
     assert np.abs(X - solve_discrete_are(A, B, Q, np.eye(2))).max() < 1e-9 * np.abs(X).max()
-    with pytest.raises(ValueError, match="does not settle"):
+    with pytest.raises(ValueError, match="does not converge"):
         _doubled(1.5 * np.eye(2), np.zeros((2, 2)), np.eye(2))
 
 
 @pytest.mark.parametrize("name", ["start", "walk", "jitter"])
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
 def test_the_uncertainty_of_a_load_is_a_number_of_at_least_zero(name: str, value: float) -> None:
-    with pytest.raises(SceneError, match=rf"doubt of the load, {name} = {value:g}: a number >= 0"):
+    with pytest.raises(
+        SceneError, match=rf"uncertainty of the load, {name} = {value:g}: expected a number >= 0"
+    ):
         LoadDoubt(**{"start": 0.0, "walk": 0.0, name: value})
 
 

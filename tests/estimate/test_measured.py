@@ -48,7 +48,7 @@ def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> 
         timetable(seen, 0.003)
     assert len(timetable(seen, 0.0025).z) == 12
     irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))
-    with pytest.raises(ComparisonError, match="no step lands on all of them"):
+    with pytest.raises(ComparisonError, match="no step matches all of them"):
         timetable(irregular, DT)
 
 
@@ -56,7 +56,7 @@ def test_two_measurements_in_a_step_are_refused() -> None:
     seen = case().measured(1)
     with pytest.raises(
         ComparisonError,
-        match=r"60 measurements land on 1 steps of 0.01 s; take a step of at most 1e-06 s",
+        match=r"60 measurements lie on 1 steps of 0.01 s; choose a step of at most 1e-06 s",
     ):
         timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
 
@@ -138,7 +138,7 @@ def test_markers_become_measurements_of_displacements() -> None:
     [
         ({"sd": np.zeros(3)}, "sd 0 m: it must be positive"),
         ({"names": ("a",)}, "1 names for 3 measured"),
-        ({"t": np.ones(60)}, "times must rise"),
+        ({"t": np.ones(60)}, "times do not increase"),
         ({"z": np.zeros((3, 60))}, r"z \[m\]: shape \(3, 60\), expected \(60, 3\)"),
         ({"z": np.full((60, 3), np.inf)}, "not finite"),
     ],
@@ -164,10 +164,16 @@ def test_an_innovation_by_hand() -> None:
     [
         (lambda m: replace(m, t=m.t[:0], z=m.z[:0]), "0 times of 3 components: nothing measured"),
         (lambda m: replace(m, names=m.names[:2]), "2 names for 3 measured components"),
-        (lambda m: replace(m, t=m.t[::-1].copy()), "measurement times must rise; sort the rec"),
+        (
+            lambda m: replace(m, t=m.t[::-1].copy()),
+            "measurement times do not increase; sort the rec",
+        ),
         (lambda m: replace(m, sd=0 * m.sd), "measurement sd 0 m: it must be positive"),
         (lambda m: m.of("top", "knee"), "marker 'knee' was not measured; there are top"),
-        (lambda m: m.moving(np.zeros(0, int)), "every measured component is held or driven: noth"),
+        (
+            lambda m: m.moving(np.zeros(0, int)),
+            "every measured component is held or driven, so there is noth",
+        ),
     ],
 )
 def test_measurements_that_teach_a_filter_nothing_are_refused(call: Any, says: str) -> None:
@@ -178,7 +184,7 @@ def test_measurements_that_teach_a_filter_nothing_are_refused(call: Any, says: s
 def test_a_shape_of_a_load_that_moves_nothing_measured_cannot_be_estimated() -> None:
     system = cube()
     H = np.zeros((1, len(system.free)))
-    with pytest.raises(SceneError, match="a load moves no measured component: its shape cannot"):
+    with pytest.raises(SceneError, match="a load moves no measured component, so its shape cannot"):
         load_shapes(system, H)
     H[0, -1] = 2.0
     assert (H @ load_shapes(system, H)).tolist() == [[pytest.approx(1.0)]]
@@ -187,5 +193,5 @@ def test_a_shape_of_a_load_that_moves_nothing_measured_cannot_be_estimated() -> 
 def test_one_shape_is_for_one_load() -> None:
     scene = cube().scene
     two = build(replace(scene, loads=(*scene.loads, replace(scene.loads[0], name="side"))))
-    with pytest.raises(SceneError, match="2 loads: one shape is for one load"):
+    with pytest.raises(SceneError, match="2 loads: one shape needs exactly one load"):
         LoadScale().prepare(two, case().measured(1, every=5))

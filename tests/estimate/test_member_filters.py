@@ -288,9 +288,12 @@ def test_a_member_is_newmarks_run_of_its_own_stiffness() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"parameters": ("stiffness.core",)}, "this scene has stiffness, load.pull, bias.pull"),
+        (
+            {"parameters": ("stiffness.core",)},
+            "not in this scene, which has stiffness, load.pull, bias.pull",
+        ),
         ({"parameters": ("stiffness", "stiffness")}, "named twice"),
-        ({"sd": (0.1, 0.2)}, "one sd for all or one each"),
+        ({"sd": (0.1, 0.2)}, "one sd for all or one for each"),
         ({"parameters": ()}, "of 0 parameters"),
         ({"R": 0.0}, "a variance above 0"),
     ],

@@ -306,14 +306,14 @@ def test_a_step_above_the_critical_one_is_refused_with_its_ratio(system: System)
 def test_what_it_cannot_filter_is_refused_in_words(system: System) -> None:
     measured = unmeasured(system)
     mixed = replace(measured, H=0.5 * measured.H)
-    with pytest.raises(ComparisonError, match="is no component of a node"):
+    with pytest.raises(ComparisonError, match="is not a component of a node"):
         NodeEKF(H).prepare(system, mixed)
     damped = replace(system.scene.material, stiffness_damping=1e-3)
     with pytest.raises(SceneError, match="couples the nodes"):
         NodeEKF(H).prepare(build(replace(system.scene, material=damped)), measured)
     with pytest.raises(UsageError, match="both must be positive"):
         NodeEKF(0.0)
-    with pytest.raises(UsageError, match="variances"):
+    with pytest.raises(UsageError, match="P0 and Qp must be >= 0"):
         NodeEKF(H, Qm=0.0)
 
 

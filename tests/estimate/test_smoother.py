@@ -324,7 +324,9 @@ def test_a_guest_is_smoothed_as_our_own_filter_and_another_is_refused(pulled: Ca
     assert guest.u == pytest.approx(ours.u, rel=1e-6, abs=1e-11)
     assert guest.sd == pytest.approx(ours.sd, rel=1e-4, abs=1e-12)
     for name in ("EnsembleKalmanFilter", "UnscentedKalmanFilter"):
-        with pytest.raises(UsageError, match=f"gains, which _?{name[:8]}.* has not: take make="):
+        with pytest.raises(
+            UsageError, match=f"gains of the model, which _?{name[:8]}.* does not have: take make="
+        ):
             FilterpyGuest(name, smooth=True).prepare(pulled.system, seen)
 
 

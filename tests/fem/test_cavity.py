@@ -145,7 +145,9 @@ def test_volume_form_is_symmetric() -> None:
 def test_open_surface_is_refused(kind: Kind) -> None:
     mesh = grid_mesh((5, 4, 6), holes=HOLE, kind=kind)
     facets = {"hole0": mesh.facets["hole0"][1:]}
-    with pytest.raises(SceneError, match="cavity 'box' is open: 3 edges without partner"):
+    with pytest.raises(
+        SceneError, match="cavity 'box' is open: 3 edges that belong to one facet only"
+    ):
         cavity_surface(Mesh(mesh.nodes, mesh.cells, kind, facets), "box", "hole0")
 
 

@@ -196,6 +196,6 @@ def test_what_has_no_critical_step_is_reported() -> None:
         membranes=(None,), dilatation="pointwise",
     )  # fmt: skip
     with pytest.raises(
-        SceneError, match="membranes are linear only: drop them, or take the linear"
+        SceneError, match="membranes are linear only: remove them, or use the linear"
     ):
         explicit._require(scene)  # type: ignore[arg-type]

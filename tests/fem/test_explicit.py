@@ -95,7 +95,7 @@ def test_single_precision_has_seven_digits(law: str, size: float) -> None:
 
 
 def test_single_precision_is_for_two_laws() -> None:
-    with pytest.raises(SceneError, match="single precision is for tet4"):
+    with pytest.raises(SceneError, match="single precision supports tet4"):
         ExplicitBody(scene("ogden"), precision="single")
 
 
@@ -250,11 +250,11 @@ def test_terms_of_regions_may_differ_in_number() -> None:
 
 def test_what_has_no_explicit_form_is_refused() -> None:
     body = scene("svk")
-    with pytest.raises(SceneError, match="0 threads: take 1"):
+    with pytest.raises(SceneError, match="0 threads: use 1"):
         ExplicitBody(body, threads=0)
     with pytest.raises(SceneError, match="tet10 have no explicit form"):
         ExplicitBody(replace(body, mesh=quadratic(body.mesh)))
-    with pytest.raises(SceneError, match="law 'linear' has no form"):
+    with pytest.raises(SceneError, match="law 'linear' has no large-strain form"):
         ExplicitBody(replace(body, material=Material(30e3, 0.3)))
     with pytest.raises(SceneError, match="use 'pointwise'"):
         ExplicitBody(replace(body, dilatation="nodal_mean"))

@@ -268,7 +268,7 @@ def test_few_linear_cells_across_a_slender_body_are_warned_of(
 ) -> None:
     rod = box((0.1, 0.02, 0.02), (5 * across, across, across))
     scene = Scene(quadratic(rod) if order == 2 else rod, Material(1e4, 0.3))
-    assert ("lock in bending" in " ".join(locking_notes([("fem", scene)]))) == warned
+    assert ("locks in bending" in " ".join(locking_notes([("fem", scene)]))) == warned
 
 
 @pytest.mark.parametrize(("direction", "warned"), [((1.0, 0.0, 0.0), False), ((0, 0, -1.0), True)])

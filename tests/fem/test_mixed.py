@@ -124,10 +124,10 @@ def test_what_it_cannot_do_is_refused() -> None:
 @pytest.mark.parametrize(
     ("changed", "says"),
     [
-        ({"masses": (Mass("m", "x1", 1.0),)}, "know faces alone, no edges, points, mas"),
+        ({"masses": (Mass("m", "x1", 1.0),)}, "support faces only, no edges, points, mas"),
         (
             {"membranes": (Membrane("x1", 1e-3, Material(1.0, 0.3)),)},
-            "know supports, pins, drives and loads",
+            "support supports, pins, drives and loads",
         ),
         ({"loads": ()}, "mixed elements need consistent loads or weights, got none"),
     ],

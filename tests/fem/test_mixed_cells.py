@@ -270,5 +270,5 @@ def test_what_cannot_be_mixed_is_refused() -> None:
     with pytest.raises(SceneError, match="not quad4 in plane stress"):
         Scene(grid((1.0, 1.0), (1, 1)), SOFT, plane="stress", dilatation="mixed")
     region = Region("a", np.arange(2), replace(SOFT, law="svk"))
-    with pytest.raises(SceneError, match="take linear laws alone, or none"):
+    with pytest.raises(SceneError, match="use linear laws only, or no linear law"):
         Scene(skewed("hex8"), SOFT, regions=(region,))

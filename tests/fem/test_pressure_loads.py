@@ -71,5 +71,5 @@ def test_edges_and_faces_within_the_body_are_refused() -> None:
     inside = next(c[:3] for c in mesh.cells.tolist() if frozenset(c[:3]) not in outside)
     cut = replace(mesh, facets={"cut": np.array([inside])})
     scene = Scene(cut, SOFT, loads=(Pressure("p", "cut"),))
-    with pytest.raises(SceneError, match="1 of 1 faces lie within the body"):
+    with pytest.raises(SceneError, match="1 of 1 faces lie inside the body"):
         load_columns(scene)

@@ -28,7 +28,7 @@ def test_one_lucky_step_convinces_nobody() -> None:
 def test_the_choice_says_what_was_measured() -> None:
     found = chosen(2, {1: [820 * US] * 3, 2: [430 * US] * 3})
     assert found.words == "threads: 2 of 2, pilot 1: 820 us, 2: 430 us"
-    assert chosen(2, {}).words == "threads: 1 of 2, no other core is idle"
+    assert chosen(2, {}).words == "threads: 1 of 2; no other core is idle"
 
 
 def test_other_processes_leave_fewer_cores() -> None:
@@ -72,7 +72,7 @@ def test_a_team_falls_back_on_one_where_its_steps_take_longer_than_one_did() -> 
     for _ in range(6):
         team.saw(400 * US)
     assert team.threads == 1
-    assert team.said.endswith("; then 1, as 2 took 400 us: the machine got busy")
+    assert team.said.endswith("; then 1, as 2 took 400 us, because the machine became busy")
     team.saw(10 * US)
     assert team.threads == 1
 

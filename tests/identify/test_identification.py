@@ -142,7 +142,7 @@ def test_starts_that_end_elsewhere_and_fit_as_well_are_a_finding() -> None:
     space = Space((Range("a", -1.5, 1.5),))
     found = identify(space, InTurn(lambda x: (np.array([space.value(0, x[0])]) ** 2 - 1) / 0.01))
     (e,) = found.estimates
-    assert any("end elsewhere and fit as well" in f for f in e.findings)
+    assert any("end at other values with an equally good fit" in f for f in e.findings)
 
 
 def test_an_interval_wider_than_a_factor_two_is_a_finding() -> None:
@@ -196,7 +196,7 @@ def test_residuals_that_come_and_go_are_refused() -> None:
     def odd(x: Floats) -> Floats:
         return np.ones(3 if x[0] == 0.5 else 4)
 
-    with pytest.raises(ComparisonError, match="3 residuals at first, 4 elsewhere"):
+    with pytest.raises(ComparisonError, match="3 residuals at the start, 4 later"):
         identify(TWO, InTurn(odd), starts=1)
 
 
@@ -296,7 +296,7 @@ def test_a_simulation_that_breaks_first_later_or_compares_nothing() -> None:
     assert (once.failure, once.calls) == ("cells turned over", 2)
     with pytest.raises(ComparisonError, match=r"cells turned\s+over"):
         CalledOnce(residual)(np.array([0.9]))
-    with pytest.raises(ComparisonError, match="0 matched samples to identify from"):
+    with pytest.raises(ComparisonError, match="0 matched samples, so nothing can be identified"):
         CalledOnce(lambda x: np.zeros(0))(np.array([0.1]))
 
 

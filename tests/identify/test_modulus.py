@@ -244,7 +244,7 @@ def test_refusals_hold_the_numbers() -> None:
         fit_modulus(log(d, force), window=(0.005, 0.0099))
     with pytest.raises(UsageError, match="expected 0 <= low < high"):
         fit_modulus(log(d, force), window=(0.05, 0.005))
-    with pytest.raises(RecordingError, match="not a size above 0"):
+    with pytest.raises(RecordingError, match="expected a size above 0"):
         Cylinder(0.05, -0.03)
     unknown = Recording("bare", Source("none", "", 0, ""), 0, metadata={"specimen": {}})
     with pytest.raises(RecordingError, match="no number 'diameter_m'"):

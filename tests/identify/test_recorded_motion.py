@@ -88,7 +88,7 @@ def test_gaps_and_missing_samples_are_counted() -> None:
 
 def test_noise_alone_is_no_inertia_and_stillness_no_motion() -> None:
     assert not shown(np.zeros_like(T)).inertia_matters(1.0)
-    with pytest.raises(ComparisonError, match="nothing moves"):
+    with pytest.raises(ComparisonError, match="the recording has no motion"):
         recorded_motion(T, {"a": np.zeros((len(T), 3))})
 
 

@@ -95,7 +95,10 @@ def test_the_last_specimen_is_left_out_unless_another_is_named() -> None:
     assert split(LOGS, "EF30_0T_A").judged == "EF30_0T_A"
     alone = split(LOGS[:3], None)
     assert (alone.judged, alone.calibrating, alone.apart) == ("EF30_0T_A", ("EF30_0T_A",), False)
-    with pytest.raises(UsageError, match="judged = D: no such specimen; EF30_0T_A, EF30_0T_B"):
+    with pytest.raises(
+        UsageError,
+        match="judged = D: no specimen has that name; expected one of EF30_0T_A, EF30_0T_B",
+    ):
         split(LOGS, "D")
     with pytest.raises(RecordingError, match="logs of 2 materials"):
         split([*LOGS, log("EF50_0T_A1", 2e5)], None)
@@ -129,7 +132,7 @@ def test_scatter_that_the_logs_do_not_show_is_the_declared_one(
     for name in ("two", "one"):
         assert found[name].parameters.ranges.specimen == SMALL.ranges.specimen
         assert "is unknown" in found[name].notes[1]
-    assert "extrapolation in strain of the very logs" in found["one"].notes[0]
+    assert "extrapolates in strain the same logs" in found["one"].notes[0]
     assert found["one"].calibrated == ("force@5pct",)
     assert found["two"].calibrated == ()
 

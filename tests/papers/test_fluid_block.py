@@ -189,8 +189,8 @@ def test_other_laws_are_those_that_are_set() -> None:
 @pytest.mark.parametrize(
     ("laws", "words"),
     [
-        ({"stiffness": 0.0}, "stiffness 0 Pa: both finite"),
-        ({"bulk_modulus": -1.0}, "a fluid's is positive"),
+        ({"stiffness": 0.0}, "stiffness 0 Pa: expected finite"),
+        ({"bulk_modulus": -1.0}, "expected a positive value; that of water"),
         ({"pulse_rate": -1.0}, "a rate of 0 or more"),
         ({"pulse_high": float("nan")}, "finite numbers"),
     ],

@@ -135,7 +135,7 @@ def test_a_path_of_ones_own_sets_the_tick_and_says_what_was_left_out(small: dict
     assert len(seen.t) == 39
     assert experiment().sets(p, seen)["dt"] == 0.002
     first, second = seen.findings
-    assert "1 of 40 samples is not seen" in first
+    assert "1 of 40 samples is not visible" in first
     assert "every sample is taken as one tick" in second
     assert follows(experiment(), (recording,), p).accept == ()
     with pytest.raises(RecordingError, match="0 of 40 samples"):

@@ -104,9 +104,9 @@ def test_what_of_a_path_cannot_be_walked_is_counted() -> None:
     assert path.x[:, 1].tolist() == [0.001, -0.002, -0.003, -0.07, 0.001]
     said = "; ".join(path.findings)
     for words in (
-        "1 of 8 samples is not seen", "1 of 8 samples lies over 50 mm outside",
+        "1 of 8 samples is not visible", "1 of 8 samples lies over 50 mm outside",
         "1 of 8 samples lies inside the body before", "1 gaps", "it left the mesh",
-        "1 of 5 samples lies deeper than 15 %",
+        "1 of 5 samples is deeper than 15 %",
     ):  # fmt: skip
         assert words in said, words
 

@@ -160,6 +160,6 @@ def test_landmarks_that_are_not_declared_or_not_found_are_refused(
     mine = SimpleNamespace(t=t, x=moving, known=known)
     said = shown._by_plus(None, None, mine)  # type: ignore[arg-type]
     assert said == (
-        "The detection of PLUS itself is not held beside ours: 0 of 3 landmarks by the detection "
+        "The detection of PLUS is not compared with ours: 0 of 3 landmarks by the detection "
         "of PLUS."
     )

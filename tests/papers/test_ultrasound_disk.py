@@ -114,8 +114,8 @@ def test_images_in_which_few_disks_are_found_report_what_was_searched(
         monkeypatch.setattr(disk_module, name, found)
     with pytest.raises(
         RecordingError,
-        match=r"found in 1 of 5 images; first refusal: no wall in call 0; it was taken to be "
-        "bright: --set image.bright=False",
+        match=r"found in 1 of 5 images; first refusal: no wall in call 0; the disk was "
+        "assumed to be bright: --set image.bright=False",
     ):
         disk_module.load(disk_module.ImagedDisk(), tmp_path)
 
@@ -134,5 +134,7 @@ def test_images_without_a_scale_name_the_setting_of_a_run(
 
 @pytest.mark.parametrize("diameter", [0.0, -1.0, 1.0, float("nan")])
 def test_a_disk_has_a_diameter_of_a_disk(diameter: float) -> None:
-    with pytest.raises(UsageError, match=f"disk.diameter = {diameter:g} m: above 0, below 1 m"):
+    with pytest.raises(
+        UsageError, match=f"disk.diameter = {diameter:g} m: expected a size above 0 and below 1 m"
+    ):
         disk_module.Disk(diameter)

@@ -178,8 +178,8 @@ def test_the_terminals_first_line_says_what_was_judged(
     printed = " ".join(capsys.readouterr().out.split())
     assert code == 0
     assert printed.startswith(
-        "tiny: no evidence (quick run); no check is evidence. Recording: same model, the recording "
-        "and the judged model are one"
+        "tiny: no evidence (quick run); no check is evidence. Recording: same model, made by "
+        "the checked model itself"
     )
 
 

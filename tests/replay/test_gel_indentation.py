@@ -158,7 +158,7 @@ def test_a_ratio_that_is_open_and_clouds_that_are_none_are_refused(
 ) -> None:
     p = SimpleNamespace(material=SimpleNamespace(nu=None))
     with pytest.raises(
-        UsageError, match=r"material.nu is open: identify it, or --set material.nu="
+        UsageError, match=r"material.nu is not set: identify it, or --set material.nu="
     ):
         box_module.build(None, p, None)  # type: ignore[arg-type]
     points = SimpleNamespace(x=np.zeros((1, 4, 2)))
@@ -179,14 +179,12 @@ def test_a_folder_of_one_file_and_pixels_of_no_size_are_refused(
     monkeypatch.setattr(pair_module, "found", lambda *_: tmp_path)
     (tmp_path / "a.mat").write_bytes(b"1")
     with pytest.raises(
-        RecordingError, match="1 MATLAB files, a pair is needed: say which, --set be"
+        RecordingError, match="1 MATLAB files; a pair is needed: choose it, --set be"
     ):
         pair_module.files(None, (None, None), tmp_path)
     (tmp_path / "b.mat").write_bytes(b"2")
     both = (tmp_path / "a.mat", tmp_path / "b.mat")
     assert pair_module.files(None, (None, None), tmp_path) == both
     assert pair_module.side_of(4e-7, both[0]) == 4e-7
-    with pytest.raises(
-        UsageError, match=r"a.mat is in pixels and nobody says their size; measure it"
-    ):
+    with pytest.raises(UsageError, match=r"a.mat is in pixels of unknown size; measure it"):
         pair_module.side_of(None, both[0])

@@ -136,7 +136,7 @@ def test_contact_is_set_like_any_parameter(result: Result) -> None:
 def test_what_is_wrong_with_contact_is_one_line() -> None:
     with pytest.raises(SceneError, match=r"contact 'ball' starts inside the body: 1 of 25 nodes"):
         compare(EXPERIMENT, {"contact.gap": "-1e-4"}, quick=True)
-    with pytest.raises(SceneError, match="friction -1, needs 0 or above"):
+    with pytest.raises(SceneError, match="friction -1, expected 0 or more"):
         compare(EXPERIMENT, {"contact.friction": "-1"}, quick=True)
     with pytest.raises(
         UsageError, match=r"unknown parameter 'contact.frictoin'; nearest: contact."

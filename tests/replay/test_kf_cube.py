@@ -109,7 +109,7 @@ def test_white_noise_corrects_the_measured_node_and_no_other(some: Result) -> No
     assert plain == pytest.approx([0.1568] * 3, abs=2e-4)
     assert white[0] == pytest.approx(0.0118 / 1.2, abs=1e-3)
     assert white[1:] == pytest.approx([0.1568] * 2, abs=2e-4)
-    name = "share of the error left 2 mm below the measured node, model 20 % too stiff"
+    name = "share of the error that remains 2 mm below the measured node, model 20 % too stiff"
     assert figures(some)[name].ours == pytest.approx(1.0, abs=1e-3)
 
 

@@ -314,13 +314,13 @@ def test_places_in_words() -> None:
     assert axis_of("0,3,4") == (0.0, 0.6, 0.8)
     assert point_of("10mm,0,0.02m") == (0.01, 0.0, 0.02)
     for words, why in (("top", "none of a facet set"), ("z=1", "none of .* faces is chosen"),
-                       ("z=5 apples", "no length"),
+                       ("z=5 apples", "expected a length"),
                        ("near 20,15,25", "in metres, write 10mm"),
-                       ("box 0,0,49 to 40,30,51", "off a body of 70.7 mm; .* write 10mm"),
+                       ("box 0,0,49 to 40,30,51", "away from a body of 70.7 mm; .* write 10mm"),
                        ("near 1,2", "three lengths")):  # fmt: skip
         with pytest.raises(SceneError, match=why):
             place_of(words, mesh)
-    with pytest.raises(SceneError, match="each with its unit"):
+    with pytest.raises(SceneError, match="with their units"):
         point_of("10mm,20,0")
     with pytest.raises(SceneError, match="or three numbers"):
         axis_of("up")
@@ -334,7 +334,7 @@ def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path)
         assert np.isclose(x[:, :2], (0.02, 0.015)).all(axis=1).any()
     write_mesh(box(SIZE, (1, 1, 2)), tmp_path / "b.npz")
     p = replace(BASE, body=Solid("b.npz"), held=HeldAt(slides="zmin"))
-    with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm off.*halvings=1"):
+    with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm away.*halvings=1"):
         compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     p = replace(p, body=Solid("b.npz", halvings=1))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))

@@ -277,8 +277,8 @@ def test_a_quick_run_draws_nothing(road: Experiment) -> None:
 def test_a_marker_that_no_probe_answers_is_a_note(road: Experiment) -> None:
     (note,) = compare(declared(road, uncertainty=FINER), Options({})).notes
     assert note == (
-        "markers: f1, f2, f3 compared with nothing, for no probe or trace of the scene has that "
-        "name"
+        "markers: f1, f2, f3 compared with nothing, because no probe or trace of the scene "
+        "has that name"
     )
 
 

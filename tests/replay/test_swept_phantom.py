@@ -104,7 +104,7 @@ SPOILED = (
     (lambda r: with_sweep(r, beside), "beyond or touches the face z = max of the block"),
     (lambda r: with_sweep(r, lost), r"no slice between -3\.00 and 1\.00 mm"),
     (lambda r: replace(r, signals={**r.signals, "stage": replace(
-        r.signals["stage"], t=r.signals["stage"].t - 6.0)}), "off its rest during the sweep"),
+        r.signals["stage"], t=r.signals["stage"].t - 6.0)}), "away from rest during the sweep"),
 )  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def test_sweeps_that_mean_nothing_are_refused_in_one_line(
 
 
 def test_what_is_set_of_a_capsule_is_no_setting_of_a_sweep() -> None:
-    with pytest.raises(UsageError, match=r"inclusion\.radius is of a capsule"):
+    with pytest.raises(UsageError, match=r"inclusion\.radius applies to a capsule"):
         InclusionCard(shape="sweep", radius=0.008)
 
 

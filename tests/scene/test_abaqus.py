@@ -69,19 +69,22 @@ def test_the_liver(shared_data: Path) -> None:
     ("text", "said"),
     [
         ("", "0 bytes"),
-        ("no mesh at all\n", "no elements: no Abaqus input file"),
+        ("no mesh at all\n", "no elements: the file is not an Abaqus input file"),
         (inp(body("tet4"), extra="*Include, input=/etc/passwd"), "outside its folder .*line 36"),
         (inp(body("tet4"), extra="*Include, input=../x.inp"), "outside its folder .* copy it"),
         (inp(body("tet4"), extra="*Include, input=body.inp"), "'body.inp' in line 36 includes its"),
-        (inp(body("tet4"), extra="*Include, input=a.inp, password=b"), "locked; export it open"),
+        (inp(body("tet4"), extra="*Include, input=a.inp, password=b"),
+            "encrypted; export it without encryption"),
         (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is no name of a file"),
         (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "cannot be followed"),
         (inp(body("tet4")).replace("*Part", "*Ngen\n1, 5\n*Part"), r"\*Ngen in line 3: is not"),
         (inp(body("tet4")).replace("*Node", "*System\n1., 0\n*Node"), r"\*System in line 4: exp"),
-        (inp(body("tet4")).replace("*Node", "*System\n1,0,0,1,0,0\n*Node"), "one, or on a line"),
-        (inp(body("tet4")).replace("*Node", "*Node, system=C"), "that are not rectangular"),
+        (inp(body("tet4")).replace("*Node", "*System\n1,0,0,1,0,0\n*Node"),
+            "coincide or lie on a line"),
+        (inp(body("tet4")).replace("*Node", "*Node, system=C"), "that are not Cartesian"),
         (inp(body("tet4")).replace("*Node", "*Node, input=n.txt"), "'n.txt' in line 4 is no file"),
-        (inp(body("tet4")).replace("*End Part", "*Node\n10, 0., 0., 9."), "node 10 has two places"),
+        (inp(body("tet4")).replace("*End Part", "*Node\n10, 0., 0., 9."),
+            "node 10 has two positions"),
         (inp(body("tet4"), "C3D6"), r"60 numbers, not 7 for each C3D6"),
         (inp(body("tet4"), "S4"), "12 S4; one of tetra"),
         (inp(body("tet4"), "XYZ9"), "12 XYZ9; one of tetra"),
@@ -90,7 +93,7 @@ def test_the_liver(shared_data: Path) -> None:
         (inp(body("tet4")).replace("*Nset", "*Nset, elset=none"), "no element set 'none'"),
         (inp(body("tet4")).replace("*Nset, nset=lost\n7", "*Nset, nset=x\ny"), "no set 'y' before"),
         (inp(body("tet4")).replace("\n12, 0", "\n1200, 0"), "there is no node 12"),
-        (inp(body("tet4")).replace("\n2, ", "\n1, "), r"line \d+: element 1 stands twice"),
+        (inp(body("tet4")).replace("\n2, ", "\n1, "), r"line \d+: element 1 is defined twice"),
     ],
     ids=["empty", "text", "passwd", "above", "itself", "locked", "zero", "long", "ngen", "system",
          "one point", "cylindrical", "input", "twice", "wedge",
@@ -131,7 +134,9 @@ def test_what_a_deck_includes_stands_in_its_place(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"\*Nset in line 1 of 'low.inp': there is no set 'x'"):
         read_foreign(path, "m")
     (tmp_path / "low.txt").write_text("*Nset\n")
-    with pytest.raises(SceneError, match=r"'\*Nset' in line 1 of 'low.txt'; rows alone are taken"):
+    with pytest.raises(
+        SceneError, match=r"'\*Nset' in line 1 of 'low.txt'; only rows are supported"
+    ):
         read_foreign(path, "m")
     (tmp_path / "low.txt").unlink()
     (tmp_path / "low.txt").symlink_to("/etc/passwd")
@@ -199,7 +204,7 @@ def test_elements_inside_out_and_curved_ones_are_refused(tmp_path: Path) -> None
     turned = Mesh(whole.nodes, whole.cells[:, [1, 0, 2, 3]], "tet4")
     path.write_text(inp(turned))
     with pytest.raises(
-        SceneError, match=r"body\.inp: 12 of 12 .*; write their nodes the other way"
+        SceneError, match=r"body\.inp: 12 of 12 .*; reverse the order of their nodes"
     ):
         read_foreign(path, "m")
     round_ = body("tet10")
@@ -213,7 +218,7 @@ def test_elements_inside_out_and_curved_ones_are_refused(tmp_path: Path) -> None
 def test_a_file_that_is_not_there_and_a_unit_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="no such file"):
         read_foreign(tmp_path / "none.inp", "m")
-    with pytest.raises(SceneError, match="no unit of length"):
+    with pytest.raises(SceneError, match="is not a unit of length"):
         read_foreign(tmp_path / "none.inp", "kPa")
 
 
@@ -252,7 +257,7 @@ def test_a_part_stands_where_its_instance_stands(meshed_on: str, tmp_path: Path)
     x, y, z = (whole.nodes + [5e-3, 0, 0]).T
     expected = np.stack([5e-3 - y, x - 5e-3, z], axis=1)
     np.testing.assert_allclose(got.mesh.nodes, expected, atol=1e-12)
-    assert got.told["moved"] == "to where its instance 'Gel-1' stands"
+    assert got.told["moved"] == "to the position of its instance 'Gel-1'"
     assert np.abs(got.mesh.nodes[got.mesh.facet_nodes("bottom"), 2]).max() < 1e-12
     assert "RP" not in got.mesh.facets  # the reference point has the number of a node
 
@@ -302,7 +307,7 @@ def test_a_rigid_punch_beside_the_body_is_left_out_and_told(tmp_path: Path) -> N
     path.write_text(cae(body("tet4"), "").replace("*Assembly", punch, 1))
     got = read_foreign(path, "mm")
     assert cell_volumes(got.mesh).sum() == pytest.approx(6e-6)
-    assert got.told["left out"].startswith("'Punch' beside the solid")
+    assert got.told["left out"].startswith("'Punch' in addition to the solid")
 
 
 def test_of_two_bodies_and_of_one_that_stands_twice_one_is_chosen(tmp_path: Path) -> None:
@@ -311,7 +316,9 @@ def test_of_two_bodies_and_of_one_that_stands_twice_one_is_chosen(tmp_path: Path
                                  "50., 0., 0.\n*End Instance"))  # fmt: skip
     with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): .* --part Gel-1 -o"):
         read_foreign(path, "mm")
-    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): one is read; choose it"):
+    with pytest.raises(
+        SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): only one can be read; choose it"
+    ):
         read_foreign(path, "mm", "Gel")
     for name, at in (("Gel-1", 0.0), ("gel-2", 0.05)):
         got = read_foreign(path, "mm", name)
@@ -320,7 +327,7 @@ def test_of_two_bodies_and_of_one_that_stands_twice_one_is_chosen(tmp_path: Path
         assert ("bottom" in got.mesh.facets) == (name == "Gel-1")
     part = text[text.index("*Part") : text.index("*Assembly")]
     path.write_text(text.replace("*Assembly", part.replace("Gel", "Plate") + "*Assembly", 1))
-    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Plate'\): one is read"):
+    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Plate'\): only one can be read"):
         read_foreign(path, "mm")
     assert "'Gel'" in read_foreign(path, "mm", "PLATE").told["left out"]
     assert "'Plate'" in read_foreign(path, "mm", "Gel").told["left out"]
@@ -368,10 +375,13 @@ def block(*rows: str) -> KeywordBlock:
         (lambda: placed(np.zeros((1, 3)), block("1, 2")), "a shift x, y, z, and a turn about two"),
         (
             lambda: placed(np.zeros((1, 3)), block("0, 0, 0", "1, 0, 0, 1, 0, 0, 90")),
-            "turned about two points that are one",
+            "the rotation axis has two equal points",
         ),
-        (lambda: abaqus_arrays._range(block(), "1, 2.5"), "'1, 2.5' is no first, last and step"),
-        (lambda: abaqus_arrays._range(block(), "4"), "'4' is no first, last and step"),
+        (
+            lambda: abaqus_arrays._range(block(), "1, 2.5"),
+            "'1, 2.5': expected first, last and step",
+        ),
+        (lambda: abaqus_arrays._range(block(), "4"), "'4': expected first, last and step"),
     ],
 )
 def test_rows_of_a_deck_that_are_none_name_their_line(

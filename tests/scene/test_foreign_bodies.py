@@ -269,7 +269,7 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
     assert "only a surface (.stl, .obj, .ply) is filled" in str(odd.exception)
     assert run.invoke(cli, ["body", str(tmp_path / "b.npz"), "--unit", "m"]).exit_code == 0
     again = run.invoke(cli, ["body", str(tmp_path / "b.npz"), "--unit", "mm"])
-    assert "b.npz: npz is in metres, not in mm; leave the unit away" in str(again.exception)
+    assert "b.npz: npz is in metres, not in mm; omit the unit" in str(again.exception)
     with pytest.raises(
         SceneError, match=r"a surface; fill it first: validate body s.stl --unit mm"
     ):
@@ -326,12 +326,15 @@ def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("<VTKFile>", r"no list of files \("),
-        ("<VTKFile><DataSet file='a.vtu'/></VTKFile>", r"no list of files \('timestep'\)"),
-        ("<VTKFile><DataSet timestep='x' file='a'/></VTKFile>", r"no list of files \(could not"),
+        ("<VTKFile>", r"not a list of files \("),
+        ("<VTKFile><DataSet file='a.vtu'/></VTKFile>", r"not a list of files \('timestep'\)"),
+        ("<VTKFile><DataSet timestep='x' file='a'/></VTKFile>", r"not a list of files \(could not"),
         ("<VTKFile></VTKFile>", "lists no file"),
         ("<VTKFile><DataSet timestep='0' file='../a.vtu'/></VTKFile>", "'../a.vtu' lies outside"),
-        ("<!DOCTYPE x><VTKFile></VTKFile>", "declares entities: no list of files needs that"),
+        (
+            "<!DOCTYPE x><VTKFile></VTKFile>",
+            "declares XML entities, which a list of files does not need",
+        ),
     ],
 )
 def test_a_series_that_is_none_is_refused(text: str, says: str, tmp_path: Path) -> None:
@@ -361,7 +364,10 @@ def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("head", "says"),
     [
-        (b"<VTKFile compressor='vtkLZ4DataCompressor'>", "packed by LZ4, which is not unpacked; "),
+        (
+            b"<VTKFile compressor='vtkLZ4DataCompressor'>",
+            "compressed by LZ4, which is not supported; ",
+        ),
         (b"# vtk DataFile\nDATASET POLYDATA", "surface"),
     ],
 )

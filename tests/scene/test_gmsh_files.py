@@ -30,7 +30,7 @@ def test_groups_become_facet_sets(name: str) -> None:
 
 def test_what_stands_beside_a_solid_is_told_and_names_facets() -> None:
     body = read_foreign(FILES / "order2.inp", "mm")
-    assert body.told["left out"].startswith("24 T3D3, 60 CPS6 beside the solid")
+    assert body.told["left out"].startswith("24 T3D3, 60 CPS6 in addition to the solid")
     assert body.mesh.kind == "tet10"
     assert len(body.mesh.facets["Surface3"]) == 12
     assert "left out" not in read_foreign(FILES / "groups_41.msh", "mm").told
@@ -79,7 +79,9 @@ def test_formats_that_are_not_read_are_named(tmp_path: Path, text: str) -> None:
     old = tmp_path / "old.msh"
     old.write_text(text, "utf-8")
     for file in (old, FILES / "groups_40.msh"):
-        with pytest.raises(SceneError, match=r"Gmsh's format [134]; 2\.2 and 4\.1 are read"):
+        with pytest.raises(
+            SceneError, match=r"Gmsh's format [134] is not supported; save it as 2\.2 or 4\.1"
+        ):
             read_foreign(file, "mm")
 
 

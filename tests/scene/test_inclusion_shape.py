@@ -54,10 +54,10 @@ def test_an_axis_with_a_bend_follows_each_pair_of_slices() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"positions": np.array([0.0, 0.0])}, "growing positions between the ends"),
-        ({"ends": np.array([0.0, 5e-3])}, "growing positions between the ends"),
-        ({"radii": np.zeros((2, 8))}, "positive ones at 8 or more angles"),
-        ({"radii": np.ones((2, 7))}, "positive ones at 8 or more angles"),
+        ({"positions": np.array([0.0, 0.0])}, "increasing positions between the ends"),
+        ({"ends": np.array([0.0, 5e-3])}, "increasing positions between the ends"),
+        ({"radii": np.zeros((2, 8))}, "expected positive radii at 8 or more angles"),
+        ({"radii": np.ones((2, 7))}, "expected positive radii at 8 or more angles"),
         ({"radii": np.ones((3, 8))}, r"slices: radii: shape \(3, 8\)"),
         ({"centres": np.full((2, 2), np.nan)}, "not finite"),
     ],

@@ -127,8 +127,8 @@ def test_facets_by_name_and_by_rule() -> None:
 @pytest.mark.parametrize(
     ("rule", "words"),
     [
-        (OnPlane((0.033, 0.0, 0.0), X), r"none of 64 faces .* nearest, at \(30, .* is 3 mm off"),
-        (InBox((0.0, 0.0, 0.012), (0.03, 0.02, 0.02)), r"none of 64 faces .* is 2 mm off"),
+        (OnPlane((0.033, 0.0, 0.0), X), r"none of 64 faces .* nearest, at \(30, .* is 3 mm away"),
+        (InBox((0.0, 0.0, 0.012), (0.03, 0.02, 0.02)), r"none of 64 faces .* is 2 mm away"),
         (FRONT - FRONT, "none of 64 faces"),
         (OnPlane((0.0, 0.0), X), r"point of a plane: \(0.0, 0.0\), needs 3 finite numbers"),
         (OnPlane((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "length 0; give a direction"),
@@ -142,7 +142,7 @@ def test_an_empty_choice_says_what_is_nearest(rule: Site, words: str) -> None:
 
 
 def test_what_covers_an_area_needs_faces() -> None:
-    with pytest.raises(SceneError, match="on edges: it covers an area; choose faces"):
+    with pytest.raises(SceneError, match="on edges; it needs an area: choose faces"):
         Scene(
             MESHES["tet4"],
             Material(1e4, 0.3),
@@ -168,5 +168,5 @@ def test_a_load_or_mass_that_is_wholly_held_is_refused() -> None:
 
 @pytest.mark.parametrize("mass", [0.0, -1.0, float("nan")])
 def test_a_mass_is_above_zero(mass: float) -> None:
-    with pytest.raises(SceneError, match=r"mass 'weight': .* kg; give one above 0"):
+    with pytest.raises(SceneError, match=r"mass 'weight': .* kg; expected a mass above 0"):
         Mass("weight", "x1", mass)

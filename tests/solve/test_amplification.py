@@ -117,5 +117,5 @@ def test_what_it_cannot_do_is_refused() -> None:
     with pytest.raises(SceneError, match="damping couples the modes; use Rayleigh"):
         amplification(mixed, Newmark())
     large = build(needle_block(34))
-    with pytest.raises(SceneError, match="unknowns: all modes of at most 2000"):
+    with pytest.raises(SceneError, match="unknowns: all modes need at most 2000"):
         amplification(large, Newmark())

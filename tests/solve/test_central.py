@@ -79,7 +79,7 @@ def test_no_threads_run_where_no_core_is_idle(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 1)
     system, dt = pressed(), 3e-4
     run = ran(CentralDifference(dt, threads=2), system, rise(20, 0.02), dt)
-    assert run.said == ("threads: 1 of 2, no other core is idle",)
+    assert run.said == ("threads: 1 of 2; no other core is idle",)
     alone = ran(CentralDifference(dt), system, rise(20, 0.02), dt)
     assert np.array_equal(run.u, alone.u)
     assert alone.said == ()
@@ -285,5 +285,7 @@ def test_lagged_damping_is_for_one_stiffness_damping() -> None:
         scene = SimpleNamespace(per_cell=lambda of, betas=betas: np.array(betas))
         assert scheme._beta(scene) == expected  # type: ignore[arg-type]
     scene = SimpleNamespace(per_cell=lambda of: np.array([0.2, 0.1]))
-    with pytest.raises(SceneError, match=r"for one stiffness damping, got \[.*0\.1.*0\.2.*\] s"):
+    with pytest.raises(
+        SceneError, match=r"needs one value of stiffness damping, got \[.*0\.1.*0\.2.*\] s"
+    ):
         scheme._beta(scene)  # type: ignore[arg-type]

@@ -46,7 +46,7 @@ def test_between_levels_a_cubic_is_exact(sign: float) -> None:
     assert asked.inputs[:, 0] == pytest.approx(sign * np.array([0.4, 0.8, 1.2, 1.6, 2.0]))
     run = told(asked, asked.inputs[:, 0] ** 3 + asked.inputs[:, 0])
     assert run.traces["top.x"].y == pytest.approx(y**3 + y, abs=1e-12)
-    assert "asked at 5 levels" in run.said[-1]
+    assert "solved at 5 levels" in run.said[-1]
 
 
 def test_levels_that_were_not_reached_end_the_run() -> None:

@@ -194,7 +194,7 @@ class Runs(Breaks):
         return replace(new, numbers={**new.numbers, "far": float(drives[0] > self.at)})
 
 
-@pytest.mark.parametrize(("far", "words"), [(6e5, "6e+05 m"), (np.nan, "no finite number")])
+@pytest.mark.parametrize(("far", "words"), [(6e5, "6e+05 m"), (np.nan, "not a finite number")])
 def test_a_state_that_runs_away_has_diverged(coarse: Responses, far: float, words: str) -> None:
     """Six hundred kilometres are no result: the run was called finished."""
     run = march("far", Runs(NoFluid().on(coarse), 0.003, far), T, DRIVES, AT, 0.0)

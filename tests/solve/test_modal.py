@@ -173,7 +173,9 @@ def test_damping_that_couples_modes_is_refused() -> None:
     Modal().prepare(build(replace(scene, regions=(Region("stiff", cells, stiff),), loads=())))
 
 
-@pytest.mark.parametrize(("count", "words"), [(0, "0 modes: at least 1"), (13, "13 modes of 12")])
+@pytest.mark.parametrize(
+    ("count", "words"), [(0, "0 modes: expected at least 1"), (13, "13 modes of 12")]
+)
 def test_a_count_of_modes_that_is_none_is_refused(count: int, words: str) -> None:
     with pytest.raises(SceneError, match=words):
         Modal(modes=count).prepare(small())

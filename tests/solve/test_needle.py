@@ -315,7 +315,10 @@ def test_a_run_traces_the_path() -> None:
     [
         (lambda: scene((0.0, -0.005)), "starts inside the body"),
         (lambda: replace(scene(), tools=()), "0 needles"),
-        (lambda: replace(scene(), drives=(Drive("d", "top", (0.0, -1.0)),)), "drives beside"),
+        (
+            lambda: replace(scene(), drives=(Drive("d", "top", (0.0, -1.0)),)),
+            "drives together with",
+        ),
         (
             lambda: replace(scene(), tools=(Needle("n", "bottom", TIP, DOWN),)),
             "all 10 facets that it may touch are held",
@@ -334,7 +337,7 @@ def test_scenes_without_sense_are_refused(made, words: str) -> None:  # type: ig
         (lambda: Needle("n", "top", (np.nan, 0.0), DOWN), "finite"),
         (lambda: replace(scene(), tools=scene().tools * 2), "one at a time"),
         (lambda: scene((0.0, 0.0, 0.1)), "in a scene of 2 dimensions"),  # type: ignore[arg-type]
-        (lambda: NeedleLoop(gain=-5.0), "drives the volume away"),
+        (lambda: NeedleLoop(gain=-5.0), "a negative gain diverges"),
         (lambda: NeedleLoop(limit=0.0), "force limit 0 N"),
         (lambda: NeedleLoop(grip=-1.0), "grip -1 N"),
     ],

@@ -297,7 +297,7 @@ def test_what_cannot_begin_is_refused() -> None:
         StaticNewton().prepare(build(replace(scene, supports=scene.supports[:2])))
     with pytest.raises(SceneError, match="without drive, load and cavity"):
         StaticNewton().prepare(build(replace(scene, drives=())))
-    with pytest.raises(SceneError, match="volume ratio -1: a fluid volume must be positive"):
+    with pytest.raises(SceneError, match="volume ratio -1: expected a positive fluid volume"):
         StaticNewton(volume_ratio=-1.0)
     with pytest.raises(SceneError, match="0 iterations, 6 cuts: tolerance and iterations"):
         StaticNewton(max_iterations=0)

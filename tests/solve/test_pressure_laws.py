@@ -150,11 +150,11 @@ def test_a_reservoir_that_feeds_itself_beyond_the_bodys_stiffness_has_no_stable_
     assert pressures(mild)[0] == pytest.approx(100.0 + 0.5 * slope * (V - 1), rel=1e-9)
     assert wild.failure is not None
     assert wild.failure[0] == "not_converged"
-    assert "unstable: it grows faster" in wild.failure[1]
+    assert "unstable: it rises faster" in wild.failure[1]
     mild, wild = (stepped(ElasticPressure(100.0, B), two_cavities, 0.0005) for B in (-1e3, -1e6))
     assert mild.failure is None
     assert wild.failure is not None
-    assert "unstable: they grow faster" in wild.failure[1]
+    assert "unstable: they rise faster" in wild.failure[1]
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
@@ -199,8 +199,8 @@ def test_a_pulse_says_where_the_linear_model_ends(phantom: Responses) -> None:
     [
         (lambda: ExactPressure(1.0, 0.0), "bulk modulus 0 Pa"),
         (lambda: ExactPressure(1.0, -5.0), "bulk modulus -5 Pa"),
-        (lambda: ElasticPressure(stiffness=0.0), "the stiffness not zero"),
-        (lambda: ElasticPressure(preset=math.nan), "both finite"),
+        (lambda: ElasticPressure(stiffness=0.0), "a stiffness other than zero"),
+        (lambda: ElasticPressure(preset=math.nan), "expected finite values"),
         (lambda: PulsePressure(rate=-1.0), "a rate of 0 or more"),
         (lambda: PulsePressure(dt=0.0), "a positive step"),
         (lambda: PulsePressure(high=math.inf), "finite numbers"),
@@ -215,7 +215,7 @@ def test_laws_without_sense_are_refused(made, words: str) -> None:  # type: igno
 def test_a_search_over_one_pressure_is_refused_for_two(
     two_cavities: Responses, update: UpdateName
 ) -> None:
-    with pytest.raises(SceneError, match="knows one cavity, the scene has 2; use newton"):
+    with pytest.raises(SceneError, match="supports one cavity, the scene has 2; use newton"):
         PressureLoop(update=update).on(two_cavities)
 
 

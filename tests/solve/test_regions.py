@@ -107,7 +107,7 @@ def test_a_region_of_all_layers_is_the_whole_body_bit_for_bit_and_says_so() -> N
     assert np.array_equal(force(most, pushed), force(WHOLE, pushed))
     stepper = stepper_of(most)
     said = stepper.notices(stepper.step(stepper.rest(), np.zeros(2)))
-    assert said == ("1 of 2 regions lie beyond the body's 12 layers and are left out",)
+    assert said == ("1 of 2 regions lie beyond the body's 12 layers and are omitted",)
 
 
 def test_equal_rates_without_delay_are_the_one_solve() -> None:
@@ -327,7 +327,7 @@ def test_what_is_rounded_or_left_out_is_said_by_the_run_once() -> None:
     run = run_scheme("r", settings, bar(E, CELLS), t, still, np.array([4]))
     assert run.said == (
         "300 Hz does not divide 1000 Hz: solved every 3 ticks, at 333.3 Hz",
-        "1 of 3 regions lie beyond the body's 12 layers and are left out",
+        "1 of 3 regions lie beyond the body's 12 layers and are omitted",
     )
     assert run_scheme("r", NEAR, bar(E, CELLS), t, still, np.array([4])).said == ()
 
@@ -335,16 +335,16 @@ def test_what_is_rounded_or_left_out_is_said_by_the_run_once() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rates": (2000.0,)}, "2000 Hz beside a primary one at 1000 Hz"),
-        ({"rates": (0.0,)}, "0 Hz beside"),
+        ({"rates": (2000.0,)}, "2000 Hz with a primary one at 1000 Hz"),
+        ({"rates": (0.0,)}, "0 Hz with"),
         ({"rates": ()}, "1 layer counts and 0 rates"),
         ({"solvers": ("static",) * 3}, "3 solvers for 2 regions"),
-        ({"layers": (5, 0), "rates": (50.0, 5.0)}, "at least 1 each, or the region is empty"),
+        ({"layers": (5, 0), "rates": (50.0, 5.0)}, "expected at least 1 for each region"),
         ({"adapt": "linear", "most": 3}, "4 layers that grows to 3 at most"),
         ({"dt": 0.0}, "tick of 0 s"),
         ({"overlap": -1}, "overlap -1"),
-        ({"border": "joint", "overlap": 1}, "no overlap"),
-        ({"border": "joint", "solvers": ("explicit",)}, "no explicit solvers"),
+        ({"border": "joint", "overlap": 1}, "remove the overlap"),
+        ({"border": "joint", "solvers": ("explicit",)}, "remove the overlap and explicit solvers"),
         ({"grip": -1.0}, "grip -1 N"),
     ],
 )
@@ -357,20 +357,23 @@ def test_empty_regions_and_parted_bodies_are_refused_and_parted_regions_said() -
     graph = stepper_of(WHOLE).body.graph
     end = np.array([graph.shape[0] - 1])
     layer = layers_from(graph, end)
-    with pytest.raises(SceneError, match="at least 1 each, or the region is empty"):
+    with pytest.raises(SceneError, match="expected at least 1 for each region"):
         split(layer, (0,), graph)
     middle = layers_from(graph, np.array([5]))
-    assert "region 2 is 2 parts that only others link" in split(middle, (2,), graph).words
+    assert (
+        "region 2 is 2 parts that are connected only through other regions"
+        in split(middle, (2,), graph).words
+    )
     parted = graph.copy().tolil()
     parted[5, :] = 0
     parted[:, 5] = 0
-    with pytest.raises(SceneError, match="linked to no node of the contact"):
+    with pytest.raises(SceneError, match="not connected to the contact"):
         layers_from(parted.tocsr(), end)
 
 
 def test_damping_by_stiffness_is_refused() -> None:
     scene = bar(E, CELLS)
-    with pytest.raises(SceneError, match="drop stiffness_damping, or take Newmark"):
+    with pytest.raises(SceneError, match="remove stiffness_damping, or use Newmark"):
         stepper_of(NEAR, replace(scene, material=replace(scene.material, stiffness_damping=0.1)))
 
 
@@ -387,16 +390,16 @@ def test_regions_of_a_block_settle_where_the_whole_body_does(dimension: int) -> 
 
 @pytest.mark.parametrize(("least", "most"), [(0, 3), (4, 3), (-1, -1)])
 def test_layers_of_a_region_rise_from_one(least: int, most: int) -> None:
-    with pytest.raises(SceneError, match=f"primary region of {least} to {most} layers: at least 1"):
+    with pytest.raises(
+        SceneError, match=f"primary region of {least} to {most} layers: expected at least 1"
+    ):
         PrimarySize("linear", least, most, 1.0, 1e-3, 1e-3)
 
 
 def test_touched_bodies_have_the_damping_of_their_nodes_only() -> None:
     material = SimpleNamespace(stiffness_damping=0.1)
     system = SimpleNamespace(scene=SimpleNamespace(materials=(material,)), free=np.arange(3))
-    with pytest.raises(
-        SceneError, match=r"each node's own damping, C = alpha M .*; drop stiffness"
-    ):
+    with pytest.raises(SceneError, match=r"nodal damping, C = alpha M .*; remove stiffness"):
         RegionBody.of(system)  # type: ignore[arg-type]
 
 

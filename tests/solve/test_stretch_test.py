@@ -51,7 +51,7 @@ def test_a_scheme_that_steps_is_run_by_the_same_function() -> None:
     assert run.finished
     assert run.u[0, :, 2].max() > 0
     assert run.setup_s > 0
-    with pytest.raises(SceneError, match="StretchTest solves a material point alone"):
+    with pytest.raises(SceneError, match="StretchTest solves only a material point"):
         run_scheme("m", StretchTest(), scene, T, np.ones((10, 1)), np.array([9]))
     with pytest.raises(SceneError, match="QuasiStatic needs a mesh; use StretchTest"):
         run_scheme("m", QuasiStatic(), POINT, T, np.ones((10, 1)), np.array([9]))

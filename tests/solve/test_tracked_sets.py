@@ -127,7 +127,7 @@ def test_points_that_say_too_little_are_refused() -> None:
     line = tuple((str(i), (0.0, 0.01 * i, 0.0)) for i in range(4))
     with pytest.raises(SceneError, match="points determine 5 of the 6 numbers of a rigid"):
         Prescribed("base", BASE, line)
-    with pytest.raises(SceneError, match="each needs a label"):
+    with pytest.raises(SceneError, match="expected one label for each"):
         Prescribed("base", BASE, (*CORNERS, CORNERS[0]))
     with pytest.raises(SceneError, match=r"tracked points of \[2, 3\] coordinates"):
         Prescribed("base", BASE, (CORNERS[0], ("x", (0.0, 1.0))))

@@ -87,7 +87,7 @@ def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> No
 
 
 def test_a_unit_of_something_else_is_refused() -> None:
-    with pytest.raises(UsageError, match="'s' is no unit of displacement, force or pressure"):
+    with pytest.raises(UsageError, match="'s' is not a unit of displacement, force or pressure"):
         wanted("0.5s", "1000Hz")
 
 
@@ -99,12 +99,14 @@ def test_large_strain_is_left_out_for_the_reason_that_holds() -> None:
 @pytest.mark.parametrize("text", ["1.2.3mm", "mm", "5", "5 ", "", "infHz", "-Hz"])
 def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
     assert choose._split("2.5 mm", "--error", "1mm") == (2.5, "mm")
-    with pytest.raises(UsageError, match=f"--error {text}: a number with its unit, as in 1mm"):
+    with pytest.raises(
+        UsageError, match=f"--error {text}: expected a number with its unit; write for example 1mm"
+    ):
         choose._split(text, "--error", "1mm")
 
 
 def test_a_ladder_without_a_rung_is_refused() -> None:
     with pytest.raises(
-        UsageError, match="no rung of the ladder has a cell for this scene; see 'st"
+        UsageError, match="no candidate method of the ladder has a cell for this scene; see 'st"
     ):
         choose.choose(lambda *_: None, None, True, None)  # type: ignore[arg-type]

@@ -56,10 +56,14 @@ def test_a_shown_effect_excludes_the_candidates_without_it(
         "condensed, paper's loop at 1 %": "'loop', which the recording shows",
     }
     fluid, loop, contact, rest = words(effects, phantom, trial)
-    assert "40 u, seen by force; required: candidates without it are not the scene (super" in fluid
+    assert (
+        "40 u, seen by force; required: candidates without it do not solve this scene (super"
+    ) in fluid
     assert "4.2 u" in loop
-    assert contact.endswith("every candidate has it as the scene declares it")
-    assert rest == "effects that are not shown; membrane; below 2 u: not required by it"
+    assert contact.endswith("every candidate includes it as the scene declares it")
+    assert rest == (
+        "effects that the recording does not show; membrane; below 2 u: not required by it"
+    )
 
 
 def test_what_the_recording_does_not_show_excludes_nothing(

@@ -78,7 +78,7 @@ def test_a_cell_that_kills_every_worker_is_a_failure_and_the_other_is_done(
         return KilledWorker("task", None, 2) if "b" in keys else [given(c) for c in cells]
 
     scheduler = Scheduler(answer)
-    why = "its worker died 4 times: out of memory?"
+    why = "its worker process died 4 times: out of memory?"
     assert drained(scheduler, monkeypatch, size=2) == {"a": 1, f"b {why}": 1}
     assert scheduler.sent.count(("b",)) == 4
 

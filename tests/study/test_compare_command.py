@@ -113,7 +113,9 @@ def test_json_is_one_document_and_writes_nothing_unasked(tmp_path: Path) -> None
     ]
     assert {p.name for p in tmp_path.iterdir()} == {"one", "other"}
     assert "nearest: kf_printed" in refused("compare", *runs, "--method", "kf_print", cwd=tmp_path)
-    assert "--score x* fits none of 3" in refused("compare", *runs, "--score", "x*", cwd=tmp_path)
+    assert "--score x* matches none of 3" in refused(
+        "compare", *runs, "--score", "x*", cwd=tmp_path
+    )
 
 
 def test_patterns_cut_runs_down(tmp_path: Path) -> None:

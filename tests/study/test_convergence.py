@@ -54,5 +54,5 @@ def test_oscillating_answers_are_not_trusted() -> None:
 
 
 def test_sizes_must_rise() -> None:
-    with pytest.raises(ComparisonError, match="two and more, rising"):
+    with pytest.raises(ComparisonError, match="at least two, with increasing sizes"):
         richardson([2.0, 1.0], series([2.0, 1.0], 2.0), 2.0)

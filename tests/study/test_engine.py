@@ -87,7 +87,10 @@ def test_a_record_is_believed_where_its_seal_and_its_code_hold(tmp_path: Path) -
 
     write_record(tmp_path, Waiting("k"), record)
     assert read() == ({"k": record}, "")
-    assert read("other") == ({}, "k.json: made by other code; the cell is computed again")
+    assert read("other") == (
+        {},
+        "k.json: computed by a different version of the code; the cell is computed again",
+    )
     written = file.read_text("utf-8")
     file.write_text(written.replace('"seconds": 0.5', '"seconds": 0.6'), encoding="utf-8")
     assert file.read_text("utf-8") != written
@@ -96,7 +99,7 @@ def test_a_record_is_believed_where_its_seal_and_its_code_hold(tmp_path: Path) -
     lacking = unsealed(json.loads(written))
     del lacking["record"]["value"]["pid"]
     file.write_text(json.dumps(sealed(lacking)), encoding="utf-8")
-    assert read() == ({}, "k.json: no record; the cell is computed again")
+    assert read() == ({}, "k.json: it contains no record; the cell is computed again")
 
 
 # --- a scheduler of its own -----------------------------------------------------------------------
@@ -201,7 +204,7 @@ def test_a_scheduler_that_dies_is_one_line_and_the_cells_are_kept(tmp_path: Path
             own.all[0].kill()
 
     try:
-        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ went away .* goes on"):
+        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ was lost .* continue"):
             finish(waiting(tmp_path, cells), tmp_path / "cells", Where(scheduler=own.address), kill)
     finally:
         own.stop()
@@ -301,5 +304,5 @@ def test_a_file_that_the_experiment_names_is_part_of_it_and_no_other(tmp_path: P
 
 def test_fewer_workers_than_none_are_refused(tmp_path: Path) -> None:
     plan = waiting(tmp_path, (Waiting("a"),))
-    with pytest.raises(UsageError, match=r"--workers -1: 0 \(in this process\) or more"):
+    with pytest.raises(UsageError, match=r"--workers -1: expected 0 \(in this process\) or more"):
         finish(plan, tmp_path / "cells", Where(workers=-1))

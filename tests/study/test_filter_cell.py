@@ -119,7 +119,7 @@ def test_a_failure_is_a_record_with_one_line(pulled: Experiment, tmp_path: Path)
 
 def test_a_changed_file_stops_the_study(pulled: Experiment, tmp_path: Path) -> None:
     made = planned(pulled)
-    with pytest.raises(UsageError, match="not the file that the study began with"):
+    with pytest.raises(UsageError, match="has changed since the study started"):
         record(replace(made, job=replace(made.job, sha256="0")), tmp_path)
 
 
@@ -163,7 +163,9 @@ def test_a_twin_that_tells_no_truth_is_no_benchmark(
     made = planned(pulled)
     bench = Bench(pulled, made.job)
     monkeypatch.setattr(bench, "_repeated", lambda ready: Truth({}))
-    with pytest.raises(ComparisonError, match="the truth of the twin has no probes: 0 compared"):
+    with pytest.raises(
+        ComparisonError, match="the truth of the twin has no probes, so nothing can be compared"
+    ):
         run_cell(bench, made.cells[0])
 
 

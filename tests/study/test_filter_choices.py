@@ -170,7 +170,7 @@ def test_cells_that_are_scored_on_fewer_markers_have_no_place() -> None:
     (ranking,) = rankings(cells, records, WITHHELD)
     assert [r.cell.method for r in ranking.rows] == ["two"]
     ((cell, why),) = ranking.failed
-    assert (cell.method, "scored on m0, the others on m0, m1" in why) == ("one", True)
+    assert (cell.method, "scored on m0, other cells on m0, m1" in why) == ("one", True)
 
 
 def test_the_best_at_the_end_of_a_sweep_is_named() -> None:

@@ -105,14 +105,14 @@ def test_what_cannot_run_is_refused_at_once(
 
 
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
-    with pytest.raises(UsageError, match=r"has no filter: none of .* is given markers"):
+    with pytest.raises(UsageError, match=r"has no filter: no method of .* is given markers"):
         plan(phantom, Options({}), (), 2)
 
 
 def test_each_keeps_the_only_marker_of_a_filter_and_names_it(pulled: Experiment) -> None:
     alone = plan(pulled, Options({}), (), 2, ("each",))
     assert {(c.given, c.spared) for c in alone.cells} == {(("top",), ())}
-    words = "Given one marker, which is scored by its next sample only: kf (top)."
+    words = "These methods are given one marker only and are scored by its next sample: kf (top)."
     assert alone.single_words == words
     assert plan(pulled, Options({}), (), 2).single_words == ""
     two = replace(pulled.methods["kf"], markers=("top", "side"))
@@ -202,7 +202,7 @@ def test_seeds_need_a_parameter_and_stand_once() -> None:
         filter_plan._seeds(2, None, "")
     with pytest.raises(UsageError, match="--seeds 0: at least 1"):
         filter_plan._seeds(0, None, "twin.seed")
-    with pytest.raises(UsageError, match="a seed is given twice: each seed is one sample"):
+    with pytest.raises(UsageError, match="a seed is given twice, but each seed is one sample"):
         filter_plan._seeds((3, 3), None, "twin.seed")
 
 
@@ -226,7 +226,7 @@ def test_a_method_that_is_only_timed_has_no_error() -> None:
     methods = {"whole": SimpleNamespace(steps=None), "timed": SimpleNamespace(steps=20)}
     experiment = SimpleNamespace(methods=methods, repeats=True)
     with pytest.raises(
-        UsageError, match="method 'timed' runs 20 steps only, to be timed: it has no"
+        UsageError, match="method 'timed' runs 20 steps only, for timing, so it has no"
     ):
         filter_plan._methods(experiment, ("timed",), ())  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"unknown method 'hole'; .*whole"):

@@ -78,6 +78,6 @@ def test_extremes_of_shipped_filters_end_with_a_reason(
     by = {(c.cell.method, c.what, c.factor): e for c, e in found.rows}
     assert "lies 0.5 steps" in by["kf_load", "step", 2.0].why
     for name in ("roukf", "roukf_layer"):  # the second one has a layer without any stiffness
-        assert "leave the number range" in by[name, "start noise", 1000.0].why
+        assert "overflow" in by[name, "start noise", 1000.0].why
     assert "DGEMV" not in "".join(capfd.readouterr())
     assert all(e.why for _, e in found.rows if e.state != "finished")

@@ -106,7 +106,7 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
     line = refused(*common, "--parameters", "methods.newton.tolerance=1e-9:1e-3")
     assert "a setting of a method, which has nothing to identify" in line
     line = refused(*common, "--seeds", "0")
-    assert "--seeds 0: at least one start" in line
+    assert "--seeds 0: expected at least one start" in line
 
 
 def test_a_parameter_that_is_not_declared_needs_bounds(block: Path, tmp_path: Path) -> None:

@@ -85,12 +85,12 @@ def test_its_stability_map_says_that_nothing_is_stepped(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["study", "stability", "my_gel", "--quick", "--workers", "0"]) == 0
-    assert "no scheme of it marches in time" in " ".join(capsys.readouterr().out.split())
+    assert "no scheme that marches in time" in " ".join(capsys.readouterr().out.split())
     assert told(here, "stability")["points"] == 0
 
 
 def test_filters_are_refused_in_one_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["study", "filters", "my_gel"]) == 2
     error = capsys.readouterr().err
-    assert "'my_gel' has no filter: none of slip, bonded is given markers" in error
+    assert "'my_gel' has no filter: no method of slip, bonded is given markers" in error
     assert error.count("\n") == 1

@@ -54,7 +54,7 @@ def test_a_cell_that_kills_its_worker_is_a_row_and_the_others_finish(tmp_path: P
     found = study(str(file), sweep, values={"methods.kf.trap": "die"}, seeds=2, out=out)
     cell, why = next(f for f in found.rankings[0].failed if f[0].values["methods.kf.Q"] == "1e-09")
     assert cell.values == {"methods.kf.Q": "1e-09"}
-    assert "its worker died" in why
+    assert "its worker process died" in why
     assert len(found.rankings[0].rows) == 4 + BASELINES
     kept = list((out / "pulled" / "study-filters" / "cells").glob("*.json"))
     assert len(kept) == 4 + BASELINES  # another try may have more memory

@@ -83,10 +83,10 @@ def test_what_is_no_evidence_does_not_count_and_says_why(tmp_path: Path) -> None
     found = whys(tmp_path)
     assert found.pop("good") == ""
     assert {name: why.split(":")[0] for name, why in found.items()} == {
-        "quick": "a quick run", "doubtful": "doubtful",
+        "quick": "a quick run", "doubtful": "warning",
         "same": "recording and model are the same model",
-        "forced": "predicted with parameters that are not identifiable (--anyway)",
-        "old": "stored before sizes were; run it again",
+        "forced": "predicted with parameters that are not identifiable (option --anyway)",
+        "old": "stored by an older version, without sizes; run it again",
         "turned": "turned/results.json",
         "broken": "broken/results.json",
     }  # fmt: skip
@@ -106,7 +106,7 @@ def test_fitted_checks_never_enter(tmp_path: Path) -> None:
     assert [p.check for p in found] == ["force@3mm", "force@6mm", "force@9mm"]
     assert sum(left.values()) == 7
     assert left["fitted"] == 1
-    assert left["measured to no better than 25 %"] == 1
+    assert left["measured with an uncertainty above 25 %"] == 1
 
 
 def test_the_first_accepted_method_counts(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_the_first_accepted_method_counts(tmp_path: Path) -> None:
     stored(tmp_path, "a", methods=methods)
     (found,), left = predictions(stored_runs(tmp_path))
     assert found.method == "slip"
-    assert left == {"of a further method on the same data": 1}
+    assert left == {"from another method on the same data": 1}
 
 
 def test_other_settings_on_the_same_recording_are_no_other_experiment(tmp_path: Path) -> None:
@@ -130,9 +130,9 @@ def test_other_settings_on_the_same_recording_are_no_other_experiment(tmp_path: 
     stored(tmp_path, "pressed+copy", check(12.0), inputs=inputs, created=new,
            changed=[{"path": "recording", "value": "log.csv"}])  # fmt: skip
     assert whys(tmp_path) == {
-        "pressed": "the same recordings as pressed+copy, which is taken: it is newer",
-        "pressed+E": "the same recordings as pressed+copy, which is taken: fewer of its settings "
-        "are changed",
+        "pressed": "the same recordings as pressed+copy, which is used because it is newer",
+        "pressed+E": "the same recordings as pressed+copy, which is used because it has fewer "
+        "changed settings",
         "pressed+copy": "",
     }
     assert only(summary(tmp_path)).points[0].simulated == 12.0
@@ -169,7 +169,7 @@ def test_a_wrong_sign_is_said_and_has_no_ratio(tmp_path: Path) -> None:
     kind = only(summary(tmp_path))
     assert kind.stated is None
     assert kind.why == (
-        "1 of 2 predictions have the wrong sign (pressed: force@3mm): there is no ratio"
+        "1 of 2 predictions have the wrong sign (pressed: force@3mm): a ratio is not possible"
     )
     json.dumps(document(summary(tmp_path)), allow_nan=False)
 

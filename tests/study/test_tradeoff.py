@@ -369,7 +369,7 @@ def test_bad_input_exits_with_2_and_one_line(capsys: pytest.CaptureFixture[str])
     assert run(["study", "tradeoff", "bending_rood"]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 2
-    assert "as in 0.5mm" in lines[0]
+    assert "write for example 0.5mm" in lines[0]
     assert "bending_rod" in lines[1]
 
 
@@ -458,7 +458,9 @@ def test_a_trade_without_its_reference_compares_nothing() -> None:
     trial = SimpleNamespace(reference=("tet4", 9))
     cell = SimpleNamespace(part="best", element="tet4", level=9, key="k")
     done = SimpleNamespace(records={"k": Record("k", failed="out of memory")})
-    with pytest.raises(ComparisonError, match="no reference, 0 compared: out of memory"):
+    with pytest.raises(
+        ComparisonError, match="no reference, so nothing was compared: out of memory"
+    ):
         trade.traded(None, trial, (cell,), done, True)  # type: ignore[arg-type]
 
 
@@ -486,7 +488,7 @@ def test_cells_that_mixed_elements_do_not_know_have_no_locking(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def unknown(scene: object) -> None:
-        raise SceneError("mixed elements are for linear meshes")
+        raise SceneError("mixed elements support linear meshes")
 
     monkeypatch.setattr(stability_cell, "mixed_static", unknown)
     assert stability_cell._locking(None) is None  # type: ignore[arg-type]
@@ -515,17 +517,21 @@ def test_a_solver_that_is_refused_has_a_stride_of_its_words(
 def test_studies_of_what_cannot_be_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stability_cell, "body_of", lambda experiment: None)
     job = SimpleNamespace(experiment=lambda: None)
-    with pytest.raises(ComparisonError, match="the experiment declares no density: nothing steps"):
+    with pytest.raises(
+        ComparisonError, match="the experiment declares no density, so no scheme can step"
+    ):
         stability_cell.open_bench(job)  # type: ignore[arg-type]
     marked = SimpleNamespace(markers=("tip",), steps=None)
     experiment = SimpleNamespace(name="x", methods={"kf": marked}, reference="", accepted=("kf",))
-    with pytest.raises(ComparisonError, match="x: no method without markers could be the truth"):
+    with pytest.raises(
+        ComparisonError, match="x: every method uses markers, so none can be the truth"
+    ):
         coverage_plan.true_method(experiment, "kf")  # type: ignore[arg-type]
     failed = SimpleNamespace(failure=("not_converged", "no root"))
     stepper = SimpleNamespace(rest=lambda: None, step=lambda *_: failed)
     exact = SimpleNamespace(on=lambda columns: stepper)
     monkeypatch.setattr(gain, "ExactPressure", lambda: exact)
-    with pytest.raises(ComparisonError, match="no pressure keeps the volume: no root"):
+    with pytest.raises(ComparisonError, match="no pressure keeps the volume constant: no root"):
         gain._predicted(None, None)  # type: ignore[arg-type]
 
     def coupled(*_: object) -> None:

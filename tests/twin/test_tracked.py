@@ -132,7 +132,7 @@ def test_rest_in_front_is_not_doubled_and_must_be_rest() -> None:
     exact = Camera(0.0)
     same = made(exact, begun).markers["markers"].x
     assert np.array_equal(same, made(exact).markers["markers"].x)
-    with pytest.raises(RecordingError, match="4 mm off their rest at t = 0"):
+    with pytest.raises(RecordingError, match="4 mm away from their rest position at t = 0"):
         made(exact, replace(begun, u=begun.u[::-1]))
 
 
@@ -234,6 +234,8 @@ def test_a_careless_camera_has_its_limits(wrong: dict[str, float]) -> None:
 @pytest.mark.parametrize("variance", [0.0, -1e-9, float("nan")])
 def test_a_tracker_without_noise_is_refused(variance: float) -> None:
     with pytest.raises(
-        UsageError, match=f"twin.noise = {variance:g} m2: a variance above 0; 1e-16"
+        UsageError,
+        match=f"twin.noise = {variance:g} m2: expected a variance above 0; for a "
+        "tracker without noise use 1e-16",
     ):
         require_noise(variance)

@@ -61,7 +61,7 @@ class Statement:
 def statement(points: Sequence[Predicted]) -> Statement:
     """Bias and scatter of predictions. Raises `ComparisonError` for none."""
     if not points:
-        raise ComparisonError("0 predictions: nothing to state")
+        raise ComparisonError("0 predictions, so there is no bias to report")
     own = rms([p.own for p in points])
     names = dict.fromkeys(p.specimen for p in points)
     groups = [np.array([p.log_ratio for p in points if p.specimen == name]) for name in names]

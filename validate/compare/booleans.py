@@ -50,7 +50,9 @@ def _loops(boundary: Boundary) -> list[list[int]]:
     after = dict(boundary.pieces.tolist())
     if len(after) != len(boundary.pieces):
         twice = len(boundary.pieces) - len(after)
-        raise ComparisonError(f"the boundary touches itself in {twice} nodes; it is no outline")
+        raise ComparisonError(
+            f"the boundary touches itself in {twice} nodes, so it is not an outline"
+        )
     loops = []
     while after:
         start, at = after.popitem()

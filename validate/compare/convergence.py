@@ -75,7 +75,7 @@ class GridConvergence:
     @property
     def words(self) -> str:
         if self.conduct == "at rounding":
-            return f"{self.sizes} sizes differ by nothing that counts ({self.u:.1g})"
+            return f"{self.sizes} sizes differ by a negligible amount ({self.u:.1g})"
         if self.order is None:
             return (
                 f"{self.conduct} over {self.sizes} sizes that can be trusted (formal "
@@ -134,8 +134,8 @@ def convergence(
     sizes, values = np.asarray(h, dtype=float), np.array([np.ravel(a) for a in answers])
     if len(values) != len(sizes) or len(np.unique(sizes)) < 3 or not sizes.min() > 0:
         raise ComparisonError(
-            f"{len(values)} answers at sizes {', '.join(f'{x:.3g}' for x in sizes)}: u_num needs "
-            "three and more different ones"
+            f"{len(values)} answers at sizes {', '.join(f'{x:.3g}' for x in sizes)}: u_num "
+            "needs at least three different ones"
         )
     share = sizes / sizes[judged]
     like = answers[judged]
@@ -281,7 +281,10 @@ def richardson(h: Sequence[float], answers: Sequence[Floats], theoretical: float
     the larger factor of safety. Raises `ComparisonError` for fewer than two, or sizes not rising.
     """
     if len(h) != len(answers) or len(h) < 2 or min(np.diff(h)) <= 0:
-        raise ComparisonError(f"{len(answers)} answers at sizes {list(h)}: two and more, rising")
+        raise ComparisonError(
+            f"{len(answers)} answers at sizes {list(h)}: expected at least "
+            "two, with increasing sizes"
+        )
     steps = [rms(np.atleast_2d(a - b)) for a, b in pairwise(answers)]
     r21 = h[1] / h[0]
     if len(h) == 2:

@@ -99,10 +99,10 @@ class Term:
         """What it claims and what it shows, with its numbers."""
         if self.kind == "numerical":
             return (
-                f"{self.name}: {self.part:.3g} of mesh and step, of which a model judged by itself "
-                "on its own mesh shows nothing"
+                f"{self.name}: {self.part:.3g} of mesh and step, which a comparison of the "
+                "model with itself on the same mesh cannot observe"
             )
-        seen = f"{self.name}: {self.part:.3g} claimed, {self.shown:.3g} shown"
+        seen = f"{self.name}: {self.part:.3g} claimed, {self.shown:.3g} observed"
         if self.bounded:
             return f"{seen}: its spread is right, but a uniform range ends at 1.73 u"
         return seen
@@ -148,6 +148,6 @@ def find_fault(share: Share, terms: Sequence[Term]) -> Finding:
 
 
 def _named(word: Word, share: Share, worst: Term | None) -> Finding:
-    chance = "; by chance? take more draws" if share.by_chance else ""
-    said = worst.words if worst else "no term by itself: they act together"
+    chance = "; this may be chance; take more draws" if share.by_chance else ""
+    said = worst.words if worst else "no single term: they act together"
     return Finding(word, worst, said + chance)

@@ -32,10 +32,12 @@ class Expected:
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise ComparisonError(
-                f"expected verdict '{self.verdict}': it is one of {', '.join(VERDICTS)}"
+                f"expected verdict '{self.verdict}': expected one of {', '.join(VERDICTS)}"
             )
         if not self.why.strip():
-            raise ComparisonError(f"expected verdict '{self.verdict}' of {self.check}: say why")
+            raise ComparisonError(
+                f"expected verdict '{self.verdict}' of {self.check}; give the reason"
+            )
 
     def fits(self, method: str, check: str) -> bool:
         return fnmatchcase(method, self.method) and fnmatchcase(check, self.check)
@@ -53,7 +55,7 @@ class MovedVerdict:
 
     @property
     def words(self) -> str:
-        told = self.expected or f"one of {', '.join(UNDECLARED)}, for none is declared"
+        told = self.expected or f"one of {', '.join(UNDECLARED)}, because none is declared"
         return f"{self.method}: {self.check} is {self.found}; expected {told}"
 
 

@@ -80,8 +80,8 @@ FIELD_METRICS: tuple[Metric[FieldPair], ...] = (
         "E_n",
         relative_nodal_norm,
         "1",
-        "relative norm of paper 002, eq 1: root of the sum over nodes of |u' - u|^2 over that of "
-        "|u|^2, as printed; unweighted, so it depends on the mesh",
+        "relative norm of paper 002, eq 1: root of the sum over nodes of |u' - u|^2 over that "
+        "of |u|^2, as printed; it is unweighted and depends on the mesh",
         _NODES,
     ),
     Metric(

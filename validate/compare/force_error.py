@@ -36,7 +36,7 @@ class ForcePair:
 
     @property
     def where(self) -> str:
-        return f"{self.name} at the reference's times the run meets"
+        return f"{self.name} at the times of the reference that the run covers"
 
     @property
     def units(self) -> Mapping[str, object]:
@@ -61,12 +61,12 @@ def force_pair(
             f"{reference.unit}; choose one column each in one unit"
         )
     if lag_within <= 0:
-        raise ComparisonError(f"{name}: lags within {lag_within:g} s; give a positive time")
+        raise ComparisonError(f"{name}: lags within {lag_within:g} s; expected a positive time")
     seen = met(run.t, reference.t) if len(run.t) > 1 else np.zeros(len(reference.t), dtype=bool)
     if seen.sum() < MIN_MATCHED:
         raise ComparisonError(
-            f"{name}: {int(seen.sum())} of {len(reference.t)} reference samples meet the run, "
-            f"{MIN_MATCHED} are needed; check the clocks"
+            f"{name}: {int(seen.sum())} of {len(reference.t)} reference samples lie within the "
+            f"run, at least {MIN_MATCHED} are needed; check the clocks"
         )
     t = reference.t[seen]
     y = np.interp(t, run.t, run.y[:, 0])
@@ -113,7 +113,9 @@ def phase_error(force: ForcePair) -> float:
 
 def _positive(scale: float, force: ForcePair) -> float:
     if scale == 0:
-        raise ComparisonError(f"{force.name}: the reference force is 0 throughout; no scale")
+        raise ComparisonError(
+            f"{force.name}: the reference force is always 0, so a relative error has no scale"
+        )
     return scale
 
 
@@ -127,7 +129,11 @@ def _of_track(value: Callable[[TrackError], float]) -> Callable[[ForcePair], flo
 #: Of a force alone, and MAE, RMSE, SD, NRMSE as for displacements.
 FORCE_METRICS: tuple[Metric[ForcePair], ...] = (
     Metric(
-        "peak", peak_error, "{force}", "largest |force| of the run less the reference's", _SAMPLES
+        "peak",
+        peak_error,
+        "{force}",
+        "largest |force| of the run minus that of the reference",
+        _SAMPLES,
     ),
     Metric(
         "peak.relative",
@@ -136,7 +142,7 @@ FORCE_METRICS: tuple[Metric[ForcePair], ...] = (
         "peak error over the reference's largest |force|",
         _SAMPLES,
     ),
-    Metric("rms", rms_error, "{force}", "root mean square of run less reference", _SAMPLES, True),
+    Metric("rms", rms_error, "{force}", "root mean square of run minus reference", _SAMPLES, True),
     Metric(
         "rms.relative",
         relative_rms_error,
@@ -148,7 +154,7 @@ FORCE_METRICS: tuple[Metric[ForcePair], ...] = (
         "phase",
         phase_error,
         "s",
-        "how much later the run comes than the reference: lag of best correlation",
+        "delay of the run against the reference: lag of the best correlation",
         _SAMPLES,
     ),
     *(

@@ -30,7 +30,7 @@ class HeldForce:
         for name in ("x", "given", "true"):
             checked(getattr(self, name), f"held force, {name}", shape, error=ComparisonError)
         if len(self.x) < 2:
-            raise ComparisonError(f"{len(self.x)} ticks of a held force: at least 2")
+            raise ComparisonError(f"{len(self.x)} ticks of a held force; at least 2 are needed")
 
     @cached_property
     def off(self) -> Floats:

@@ -79,9 +79,10 @@ class Overall:
     def corrections(self) -> str:
         """How many checks are taken into account, in a sentence."""
         return (
-            "All requirements must be met, each alone: no correction (intersection-union test, "
-            f"Berger 1982). Corrected for {self.total} checks (Holm 1979), {len(self.differs)} "
-            f"differ from zero, and {len(self.alone)} by themselves only."
+            "Each requirement must be met, so no correction is needed (intersection-union "
+            f"test, Berger 1982). Corrected for {self.total} checks (Holm 1979), "
+            f"{len(self.differs)} differ from zero; {len(self.alone)} more differ only without "
+            "the correction."
         )
 
 

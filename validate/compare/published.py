@@ -78,9 +78,11 @@ class Published:
             nothing = self.claim == "reproduced"
             return ("not computed", "compared nothing") if nothing else (self.claim, "")
         if not math.isfinite(ours):
-            return "not computed", f"not computed: ours is {ours}"
+            return "not computed", f"not computed: our value is {ours}"
         if self.expected is not None and abs(ours - self.expected) > (self.drift or 0.0):
-            return "moved", f"ours moved from {self.expected:g} to {ours:g}, beyond {self.drift:g}"
+            return "moved", (
+                f"our value moved from {self.expected:g} to {ours:g}, beyond {self.drift:g}"
+            )
         return self._beside(ours)
 
     def _beside(self, ours: float) -> tuple[PublishedVerdict, str]:
@@ -89,9 +91,9 @@ class Published:
             return self.claim, ""
         off = abs(ours - self.theirs)
         if self.claim == "reproduced" and off > self.tolerance:
-            return "not reproduced", f"off by {off:g}, beyond the tolerance {self.tolerance:g}"
+            return "not reproduced", f"error {off:g}, outside the tolerance {self.tolerance:g}"
         if self.claim == "not reproduced" and off <= self.tolerance:
-            return "reproduced", f"off by {off:g}, within the tolerance {self.tolerance:g}"
+            return "reproduced", f"error {off:g}, within the tolerance {self.tolerance:g}"
         return self.claim, ""
 
 
@@ -129,7 +131,7 @@ class Figure:
         if not all(x is None or math.isfinite(x) for x in numbers):
             raise ComparisonError(
                 f"figure '{self.name}': theirs, tolerance, expected and drift are {numbers}; a "
-                "number that is not finite compares with nothing"
+                "number that is not finite cannot be compared"
             )
         held = (self.of, self.theirs, self.tolerance)
         if self.claim == "reproduced" and None in held:
@@ -150,9 +152,9 @@ class Figure:
         scale = self.scale or abs(self.theirs or 0.0)
         if not tolerance <= _WIDEST * scale * (1 + 1e-9):
             raise ComparisonError(
-                f"figure '{self.name}': a tolerance of {tolerance:g} {self.unit} is wider than a "
-                f"tenth of its reference's scale, {scale:g} {self.unit}; at most "
-                f"{_WIDEST * scale:g} could fail"
+                f"figure '{self.name}': a tolerance of {tolerance:g} {self.unit} is wider than "
+                f"a tenth of the scale of its reference, {scale:g} {self.unit}; it must be at "
+                f"most {_WIDEST * scale:g}, or the figure could not fail"
             )
 
     def beside(self, values: Values) -> Published:

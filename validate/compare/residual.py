@@ -100,8 +100,8 @@ def unanswered(registered: Registered, run: Run) -> tuple[str, ...]:
         left = seen.unanswered(run)
         if left:
             found.append(
-                f"{seen.name}: {', '.join(left)} compared with nothing, for no probe or trace of "
-                "the scene has that name"
+                f"{seen.name}: {', '.join(left)} compared with nothing, because no probe or "
+                "trace of the scene has that name"
             )
     return tuple(found)
 
@@ -144,7 +144,7 @@ def _volumes(run: Run, selection: Selection) -> list[Deviation]:
         if name.endswith(".volume_ratio"):
             ratio = selection.read(run.t, trace.y, run.t)
             one = (float(ratio[0]), 1.0) if len(ratio) == 1 else (None, None)
-            words = "cavity volume over its rest volume less one; reference: incompressible fluid"
+            words = "cavity volume over its rest volume minus one; reference: incompressible fluid"
             values = (ratio - 1)[:, None]
             found.append(Deviation("volume.relative_error", values, "1", 0.0, 0.0, words, *one))
     return found

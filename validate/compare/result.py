@@ -26,11 +26,11 @@ Kind = Literal["measured", "twin", "same law, finer mesh", "same model", "refere
 KINDS: Mapping[Kind, str] = MappingProxyType(
     {
         "measured": "measured",
-        "twin": "twin, made by another model than the one judged",
+        "twin": "twin, made by another model than the checked one",
         "same law, finer mesh": (
             "same law, finer mesh: evidence of code and registration, not of physics"
         ),
-        "same model": "same model, the recording and the judged model are one: no evidence",
+        "same model": "same model, made by the checked model itself: no evidence",
         "reference": "reference, computed by third-party code",
     }
 )

@@ -42,7 +42,7 @@ METRICS: tuple[tuple[str, Callable[[Floats], float], str], ...] = (
     ("rms", rms, "root mean square over the points"),
     ("mean", mean_length, "mean absolute distance over the points"),
     ("max", max_length, "largest distance over the points"),
-    ("bias", bias, "mean over the points, sign kept"),
+    ("bias", bias, "mean over the points, with its sign"),
 )
 
 
@@ -66,7 +66,7 @@ def scores_of(residual: Residual, against: str) -> tuple[Score, ...]:
 def _scalar_scores(residual: Residual, against: str) -> tuple[Score, ...]:
     q, load = residual.quantity, residual.load
     rows = [
-        (f"{q}@{load}", float(residual.values[0, 0]), "simulated less measured"),
+        (f"{q}@{load}", float(residual.values[0, 0]), "simulated minus measured"),
         (f"{q}.simulated@{load}", residual.simulated, "simulated"),
         (f"{q}.measured@{load}", residual.measured, "measured (or reference)"),
     ]

@@ -49,7 +49,7 @@ def require_upright(mesh: Mesh, name: str) -> None:
     if len(wrong):
         raise ComparisonError(
             f"{len(wrong)} of {len(mesh.cells)} cells of {name} are inverted or flat at rest, "
-            f"first {wrong[0]}; turn their node order round or mend the mesh"
+            f"first {wrong[0]}; reverse their node order or repair the mesh"
         )
 
 
@@ -58,8 +58,8 @@ def require_comparable(sound: Soundness, name: str) -> None:
     inverted = f"{len(sound.inverted)} of {sound.cells} cells are inverted"
     if sound.volume <= 0:
         raise ComparisonError(
-            f"{name} is inside out (signed volume {sound.volume:.3g}; {inverted}), so it has no "
-            "interior to compare; check the run's outcome"
+            f"{name} is turned inside out (signed volume {sound.volume:.3g}; {inverted}), so "
+            "it has no interior to compare; check the run's outcome"
         )
     if sound.crossings:
         raise ComparisonError(

@@ -14,7 +14,7 @@ _KINDS: tuple[tuple[type[Stream], str], ...] = (
 )
 _ROLES = {
     "drives": "drives the simulation",
-    "calibrates": "served to identify",
+    "calibrates": "used to identify",
     "validates": "compared with what is simulated",
 }
 
@@ -59,16 +59,16 @@ def _kind(stream: Stream) -> str:
 def _use(topic: str, stream: Stream, roles: Mapping[str, str], found_in: Mapping[str, str]) -> str:
     """What a stream is used for; empty where it is not."""
     if topic in found_in:
-        return f"the outlines '{found_in[topic]}' are found in them"
+        return f"source of the outlines '{found_in[topic]}'"
     made = isinstance(stream, Contours) and stream.images
-    end = f"; found in the images '{made}', not as recorded" if made else ""
+    end = f"; extracted from the images '{made}', not as recorded" if made else ""
     return f"{roles[topic]}{end}" if topic in roles else ""
 
 
 def _why_not(stream: Stream, recording: Recording, roles: Mapping[str, str]) -> str:
     if not isinstance(stream, Frames):
-        return "the experiment names no observation of it"
+        return "no observation of the experiment uses it"
     others = [f"'{topic}'" for topic in recording.contours if topic in roles]
     if others:
-        return f"no outline is looked for in them: {', '.join(others)} are compared as recorded"
-    return "no outline is looked for in them"
+        return f"no outline is extracted from them: {', '.join(others)} are compared as recorded"
+    return "no outline is extracted from them"

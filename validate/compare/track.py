@@ -63,7 +63,7 @@ def largest(error: TrackError) -> float:
 def nrmse(error: TrackError) -> float:
     """Raises `ComparisonError` where the reference does not move."""
     if error.spread <= 0:
-        raise ComparisonError(f"{error.name}: the reference does not move, so NRMSE has no scale")
+        raise ComparisonError(f"{error.name}: the reference does not move, so NRMSE is not defined")
     return rmse(error) / error.spread
 
 
@@ -86,7 +86,7 @@ def track_scores(error: TrackError, against: str, condition: str = "") -> tuple[
             unit,
             len(error.values),
             against,
-            f"{error.component} displacement at {error.name}, estimate less reference; {words}",
+            f"{error.component} displacement at {error.name}, estimate minus reference; {words}",
         )
         for name, statistic, unit, words in TRACK_METRICS
     )

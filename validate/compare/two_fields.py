@@ -20,21 +20,21 @@ CHECKS: tuple[Metric[FieldPair], ...] = (
         "inverted",
         lambda p: float(len(p.one.soundness.inverted)),
         "1",
-        "cells whose Jacobian is not positive at a node or Gauss point of the deformed run",
+        "cells of the deformed run whose Jacobian is not positive at a node or Gauss point",
         Counted("cells", lambda p: p.one.soundness.cells),
     ),
     Metric(
         "inverted.reference",
         lambda p: float(len(p.other.soundness.inverted)),
         "1",
-        "cells whose Jacobian is not positive at a node or Gauss point of the deformed reference",
+        "cells of the deformed reference whose Jacobian is not positive at a node or Gauss point",
         Counted("cells", lambda p: p.other.soundness.cells),
     ),
     Metric(
         "crossings",
         lambda p: float(p.one.soundness.crossings + p.other.soundness.crossings),
         "1",
-        "pairs of boundary pieces of either deformed body that cross; E_s exists where it is 0",
+        "pairs of crossing boundary pieces of either deformed body; E_s exists if it is 0",
         OF_BODIES,
         symmetric=True,
     ),
@@ -42,7 +42,8 @@ CHECKS: tuple[Metric[FieldPair], ...] = (
         "outside",
         lambda p: float(count_outside(p)),
         "1",
-        "nodes of the common mesh outside the mesh they read; they take its nearest point",
+        "nodes of the common mesh outside the mesh from which they are interpolated; they "
+        "take its nearest point",
         _CARRIED,
         symmetric=True,
     ),
@@ -50,7 +51,7 @@ CHECKS: tuple[Metric[FieldPair], ...] = (
         "outside.max",
         lambda p: float(p.outside.max(initial=0.0)),
         "m",
-        "largest distance of a node of the common mesh from the mesh it reads",
+        "largest distance of a node of the common mesh from the mesh from which it is interpolated",
         _CARRIED,
         symmetric=True,
     ),
@@ -104,7 +105,7 @@ def compare_fields(
     if found.refused:
         name, reason = found.refused[0]
         raise ComparisonError(
-            f"{len(found.refused)} metrics of {one.name} against {other.name} do not exist; "
+            f"{len(found.refused)} metrics of {one.name} against {other.name} are not defined; "
             f"{name}: {reason}"
         )
     return found.scores

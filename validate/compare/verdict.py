@@ -53,9 +53,9 @@ Origin = Literal["ours", "source"]
 _DROWNED = 30.0  # a shift so many times the noise: then it alone decides
 ALPHA = 2 * float(ndtr(-2.0))  # 4.6 %: two standard uncertainties of a normal law to both sides
 # The name of the part of u_val that a filter itself claims.
-OWN_COVARIANCE = "the filter's own covariance"
+OWN_COVARIANCE = "the covariance of the filter"
 _SMALLER = {
-    OWN_COVARIANCE: "a filter that is surer of its estimate",
+    OWN_COVARIANCE: "a filter with a smaller covariance",
     "mesh": "a finer mesh",
     "time step": "a shorter time step",
 }
@@ -84,11 +84,11 @@ class Accept:
     def __post_init__(self) -> None:
         if self.limit is not None and not 0 < self.limit < math.inf:
             raise ComparisonError(
-                f"accept '{self.quantity}': limit {self.limit:g} is not a positive number"
+                f"accept '{self.quantity}': limit {self.limit:g}: expected a positive number"
             )
         if self.statistic not in _STATISTICS:
             raise ComparisonError(
-                f"accept '{self.quantity}': statistic '{self.statistic}'; it is one of "
+                f"accept '{self.quantity}': statistic '{self.statistic}'; expected one of "
                 f"{', '.join(_STATISTICS)}"
             )
 
@@ -102,7 +102,11 @@ class Accept:
         """The reason with its origin; what is missing where there is none."""
         if self.required is not None:
             return f"{self.origin}: {self.reason}"
-        return "no reason is written: no requirement" if self.limit else "no requirement"
+        return (
+            "no requirement: the limit has no reason; give one"
+            if self.limit
+            else ("no requirement")
+        )
 
 
 @dataclass(frozen=True)
@@ -349,7 +353,7 @@ class _Interval:
 
     def _against_zero(self, validation: Validation) -> str:
         if self.u_val == 0:
-            return "E is exactly zero, and so is u_val" if self.E == 0 else "u_val is zero"
+            return "E and u_val are exactly zero" if self.E == 0 else "u_val is zero"
         blunt = abs(self.E) / self.parts["measurement"] if self.parts["measurement"] else 0.0
         beyond = f" but {blunt:.0f} times u_D" if blunt > 5 and validation != "differs" else ""
         size = f"|E| is {abs(self.E) / self.u_val:.1f} u_val{beyond}, largest part: {self._largest}"
@@ -361,8 +365,8 @@ class _Interval:
             return "no requirement", ""
         if self.scale is not None and limit >= self.scale:
             return "undecided", (
-                f"the limit {self._shown(limit)} is as wide as the largest that was measured, "
-                f"{self._shown(self.scale)}: nothing could fail it; require a tighter one"
+                f"the limit {self._shown(limit)} is as large as the largest measured value, "
+                f"{self._shown(self.scale)}: no model could fail it; set a smaller limit"
             )
         if abs(self.E) + 2 * self.u_val <= limit:
             return "good enough", ""
@@ -373,7 +377,7 @@ class _Interval:
         return "undecided", (
             f"{max(low, 0.0):.3g} to {self._shown(high)} straddles the limit "
             f"{self._shown(limit)}: a u_val below {self._shown(room)} would decide; "
-            f"{self._better} makes it smaller"
+            f"{self._better} reduces it"
         )
 
     def _shown(self, value: float) -> str:

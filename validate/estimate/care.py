@@ -45,12 +45,14 @@ from validate.parameters import quantity
 
 def gate_setting() -> Any:
     """The field of every filter for its gate."""
-    return quantity(None, "1", "share of a marker's good looks that pass, as .999; none: no gate")
+    return quantity(
+        None, "1", "share of a marker's good samples that pass, e.g. .999; none: no gate"
+    )
 
 
 def clock_setting() -> Any:
     """The field of every filter for the clock of its measurements."""
-    return quantity(None, "s", "sd of the time of a look; none: that of the recording's clock")
+    return quantity(None, "s", "sd of a sample's time stamp; none: that of the recording's clock")
 
 
 @dataclass(frozen=True)
@@ -162,10 +164,12 @@ def care_of(
     Raises `UsageError` for a gate that is no share, and for a time that is none.
     """
     if gate is not None and not 0 < gate < 1:
-        raise UsageError(f"gate = {gate:g}: a share of good looks between 0 and 1, as 0.999")
+        raise UsageError(
+            f"gate = {gate:g}: expected a share of good samples between 0 and 1, for example 0.999"
+        )
     sd_t = measurements.sd_t if clock is None else clock
     if not (np.isfinite(sd_t) and sd_t >= 0):
-        raise UsageError(f"clock = {sd_t:g} s: a standard deviation >= 0")
+        raise UsageError(f"clock = {sd_t:g} s: expected a standard deviation >= 0")
     if gate is None and sd_t == 0:
         return None
     owners = [name.rpartition(".")[0] for name in measurements.names]

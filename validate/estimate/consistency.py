@@ -69,12 +69,12 @@ class Consistency:
             return ""
         if self.kind == "NEES":
             return (
-                f"the claimed covariance does not hold here: NEES per degree of freedom "
+                "the claimed covariance is wrong here: NEES per degree of freedom "
                 f"{self.mean:.3g} over {self.samples} steps, 1 expected"
             )
         return (
             f"wrong model class: {self.kind} per degree of freedom {self.mean:.3g} over "
-            f"{self.samples} steps, 1 expected, above {WRONG_CLASS:g} no tuning explains it"
+            f"{self.samples} steps, 1 expected; above {WRONG_CLASS:g} no tuning can explain it"
         )
 
     @property
@@ -166,8 +166,8 @@ def _consistency(kind: Literal["NIS", "NEES"], values: ArrayLike, dof: ArrayLike
     total = round(float(degrees[measured].sum()))
     if total == 0:
         raise ComparisonError(
-            f"{kind} over {len(degrees)} steps: 0 compared, nothing landed on a step; check the "
-            "times of the measurements"
+            f"{kind} over {len(degrees)} steps: nothing was compared, because no measurement "
+            "lies on a step; check the times of the measurements"
         )
     mean = float(statistic[measured].sum()) / total
     bands = (_band(0.95, total), _band(0.999, total))

@@ -305,9 +305,12 @@ def load_shapes(system: System, H: Floats) -> Floats:
     Raises `SceneError` for a scene without loads, or one whose loads move nothing that is measured.
     """
     if not system.scene.loads:
-        raise SceneError("a load-shaped Q needs a load in the scene; use the white one")
+        raise SceneError("a load-shaped Q needs a load in the scene; use the white Q")
     shapes = system.factor().solve(np.ascontiguousarray(system.loads[system.free]))
     most = np.abs(H @ shapes).max(axis=0)
     if most.min() <= 1e-9 * np.abs(shapes).max():
-        raise SceneError("a load moves no measured component: its shape cannot be estimated there")
+        raise SceneError(
+            "a load moves no measured component, so its shape cannot be "
+            "estimated; measure where it moves the body"
+        )
     return np.asarray(shapes / most)

@@ -108,16 +108,16 @@ def doubts(scene: Scene, names: Sequence[str], sd: Sequence[float], bias_sd: flo
     """
     twice = [n for n in names if list(names).count(n) > 1]
     if twice:
-        raise UsageError(f"parameter '{twice[0]}' is named twice; name each once")
+        raise UsageError(f"parameter '{twice[0]}' is named twice; name each parameter once")
     if len(sd) not in (1, len(names)) or min(sd, default=0.0) <= 0 or bias_sd <= 0:
         raise UsageError(
-            f"sd {list(sd)} and bias_sd {bias_sd:g} N of {len(names)} parameters: all above 0, one "
-            "sd for all or one each"
+            f"sd {list(sd)} and bias_sd {bias_sd:g} N of {len(names)} parameters: expected "
+            "values above 0, one sd for all or one for each"
         )
     known, each = {p.name: p for p in _known(scene)}, list(sd) * (len(names) // len(sd))
     odd = [n for n in names if n not in known]
     if odd:
-        raise UsageError(f"parameter '{odd[0]}': this scene has {', '.join(known)}")
+        raise UsageError(f"parameter '{odd[0]}': not in this scene, which has {', '.join(known)}")
     found = (known[n] for n in names)
     return Doubts(
         tuple(

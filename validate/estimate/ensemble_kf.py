@@ -34,9 +34,9 @@ class EnsembleKf(MemberModel):
     noise_settings: ClassVar[NoiseSettings] = NoiseSettings("walk", "R", "sd")
 
     runs: int = quantity(10, "1", "members")
-    seed: int = quantity(1, "1", "of everything that is drawn")
+    seed: int = quantity(1, "1", "of all random draws")
     update: Literal["perturbed", "deterministic"] = quantity(
-        "perturbed", "1", "measurements drawn for every member, or the same for all"
+        "perturbed", "1", "perturbed measurements for every member, or the same for all"
     )
     radius: float | None = quantity(None, "m", "of localisation, along the mesh; none: everywhere")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of every scale's logarithm")

@@ -50,7 +50,7 @@ class ExplicitStep:
 
     def lost(self, largest: float) -> str:
         """Why a run ends whose largest displacement is that many m, or not a number."""
-        found = f"{largest:.3g} m" if np.isfinite(largest) else "beyond all numbers"
+        found = f"{largest:.3g} m" if np.isfinite(largest) else "not finite"
         return (
             f"displacements of {found} in a body of {self.far / FAR:.3g} m at steps of {self.h:g} "
             "s: take smaller steps, or correct U_{t-dt} together with U_t"

@@ -128,14 +128,14 @@ class FilterpyGuest:
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, drives=False)
     noise_settings: ClassVar[NoiseSettings] = NoiseSettings("load_walk", "R", "load_start")
 
-    make: Make | str = quantity("KalmanFilter", "1", "name, or a function of the model")
+    make: Make | str = quantity("KalmanFilter", "1", "name, or a function that takes the model")
     dt: float = quantity(0.002, "s", "time step")
     modes: int = quantity(5, "1", "lowest modes kept")
     load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
     load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
-    load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
+    load_jitter: float = quantity(0.0, "N", "sd of an independent force at each step")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
-    seed: int = quantity(0, "1", "of filters that draw")
+    seed: int = quantity(0, "1", "of filters with random draws")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
@@ -163,7 +163,7 @@ def _made(make: Make | str) -> Make:
         return make
     if make not in GUESTS:
         raise ComparisonError(
-            f"no guest '{make}'; by name: {', '.join(GUESTS)}, or give a function"
+            f"no external filter '{make}'; expected one of {', '.join(GUESTS)}, or a function"
         )
     return GUESTS[make]
 
@@ -179,16 +179,18 @@ def require_shapes(guest: Any, model: LinearModel) -> None:
         got = np.shape(value) if value is not None else None
         if got != shape:
             raise ComparisonError(
-                f"guest {type(guest).__name__}.{name}: shape {got}, expected {shape}; filterpy "
-                "itself would take it and go on"
+                f"external filter {type(guest).__name__}.{name}: shape {got}, expected "
+                f"{shape}; filterpy would accept it without an error"
             )
         if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise ComparisonError(f"guest {type(guest).__name__}.{name}: not finite")
+            raise ComparisonError(f"external filter {type(guest).__name__}.{name}: not finite")
     for name in ("P", "Q", "R"):
         require_symmetric(np.asarray(getattr(guest, name)), f"guest {name}")
     for name in ("predict", "update"):
         if not callable(getattr(guest, name, None)):
-            raise ComparisonError(f"guest {type(guest).__name__} has no `{name}`: not a filter")
+            raise ComparisonError(
+                f"external filter {type(guest).__name__} has no `{name}`: not a filter"
+            )
 
 
 def require_exact_covariances(guest: Any) -> None:
@@ -196,8 +198,9 @@ def require_exact_covariances(guest: Any) -> None:
     unscented filter takes its gain from points that were moved without the step's noise."""
     if not isinstance(guest, KalmanFilter) or guest.alpha != 1.0:
         raise UsageError(
-            f"smooth needs the model's own covariances and gains, which {type(guest).__name__} has "
-            "not: take make='KalmanFilter' (alpha = 1), or smooth=false"
+            "smooth needs the covariances and gains of the model, which "
+            f"{type(guest).__name__} does not have: take make='KalmanFilter' (alpha = 1), or "
+            "smooth=false"
         )
 
 

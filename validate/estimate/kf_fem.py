@@ -59,14 +59,14 @@ class DisplacementNoise:
     noise_settings: ClassVar[NoiseSettings] = NoiseSettings("Q", "R", "P0")
 
     dt: float = quantity(0.002, "s", "time step")
-    Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, read as mm2")
+    Q: float = quantity(1e-9, "m2", "model error of a step; the paper's .001, taken as mm2")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     P0: float = quantity(1e-9, "m2", "variance at the start")
-    recursion: Recursion = quantity("prior", "1", "which displacement v and a follow")
-    structure: Structure = quantity("white", "1", "where the model errs")
-    gains: Gains = quantity("shared", "1", "computed beforehand, or at every step")
+    recursion: Recursion = quantity("prior", "1", "displacement from which v and a are derived")
+    structure: Structure = quantity("white", "1", "where the model has its error")
+    gains: Gains = quantity("shared", "1", "computed in advance, or at every step")
     rule: RuleName = quantity("average", "1", "Newmark's rule")
-    settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
+    settled: float = quantity(1e-6, "1", "relative change of the gain below which it is frozen")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
@@ -76,9 +76,13 @@ class DisplacementNoise:
         rule_of(self.rule, self.dt)
         for name, value in (("Q", self.Q), ("P0", self.P0)):
             if not (np.isfinite(value) and value >= 0):
-                raise SceneError(f"variance {name} = {value:g} m2: a number >= 0 (1 mm2 is 1e-6)")
+                raise SceneError(
+                    f"variance {name} = {value:g} m2: expected a number >= 0 (1 mm2 is 1e-6)"
+                )
         if self.R is not None and not (np.isfinite(self.R) and self.R > 0):
-            raise SceneError(f"variance R = {self.R:g} m2: a number above 0 (1 mm2 is 1e-6)")
+            raise SceneError(
+                f"variance R = {self.R:g} m2: expected a number above 0 (1 mm2 is 1e-6)"
+            )
 
     def care(self, measurements: Measurements) -> Care | None:
         return care_of(measurements, self.gate, self.clock, self.dt)

@@ -38,14 +38,14 @@ _OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answ
 
 @dataclass(frozen=True)
 class LoadScale:
-    """`scale_sd` is the doubt of the scale at the start (1 = none), `walk` its growth per sqrt(s);
+    """`scale_sd` is the initial uncertainty of the scale (1 = none), `walk` its growth per sqrt(s);
     `Q` m^2 the variance that a step adds to the amplitude, R m^2 (None: the measurements' own)."""
 
     handles: ClassVar[Handles] = replace(LINEAR_DYNAMICS, inertia=False, drives=False)
     noise_settings: ClassVar[NoiseSettings] = NoiseSettings("Q", "R", "scale_sd")
 
     dt: float = quantity(0.002, "s", "time step")
-    scale_sd: float = quantity(0.5, "1", "doubt of the scale at the start")
+    scale_sd: float = quantity(0.5, "1", "uncertainty of the scale at the start")
     walk: float = quantity(0.0, "1/s^0.5", "random walk of the scale")
     Q: float = quantity(1e-14, "m2", "variance that a step adds to the amplitude")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
@@ -57,7 +57,7 @@ class LoadScale:
         """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
         require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
-            raise SceneError(f"{len(system.scene.loads)} loads: one shape is for one load")
+            raise SceneError(f"{len(system.scene.loads)} loads: one shape needs exactly one load")
         H = measurements.free(system.free)
         shape = load_shapes(system, H)[:, 0]
         care = care_of(measurements, self.gate, self.clock, self.dt)
@@ -74,8 +74,8 @@ def _core(
     ratio = c / (2 * np.sqrt(m * k))
     if ratio < _OVERDAMPED:
         raise SceneError(
-            f"the load's shape has damping ratio {ratio:.2g}, it swings: a filter without inertia "
-            f"needs {_OVERDAMPED:g}; use ReducedKf"
+            f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
+            f"without inertia needs {_OVERDAMPED:g}; use ReducedKf"
         )
     per_newton = float(s @ system.loads[free, 0]) / k
     return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton, care)

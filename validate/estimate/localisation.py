@@ -13,7 +13,7 @@ def gaspari_cohn(distance: Floats, radius: float) -> Floats:
     """1 at distance 0, 5/24 at `radius`, 0 from twice the radius on, twice differentiable in
     between (Gaspari & Cohn 1999, eq 4.10); both in m. Raises `UsageError` for a radius <= 0."""
     if not radius > 0:
-        raise UsageError(f"localisation radius {radius:g} m: it must be positive")
+        raise UsageError(f"localisation radius {radius:g} m: expected a positive number")
     r = np.abs(np.asarray(distance, dtype=np.float64)) / radius
     near, far = np.minimum(r, 1.0), np.clip(r, 1.0, 2.0)
     inner = (((-near / 4 + 1 / 2) * near + 5 / 8) * near - 5 / 3) * near**2 + 1

@@ -50,7 +50,9 @@ class Measurements:
         if m == 0 or nt == 0:
             raise ComparisonError(f"{nt} times of {m} components: nothing measured")
         if nt > 1 and np.diff(self.t).min() <= 0:
-            raise ComparisonError("measurement times must rise; sort the recording by its stamps")
+            raise ComparisonError(
+                "measurement times do not increase; sort the recording by its time stamps"
+            )
         if self.sd.min() <= 0:
             raise ComparisonError(f"measurement sd {self.sd.min():g} m: it must be positive")
 
@@ -75,7 +77,10 @@ class Measurements:
         reach = np.asarray(abs(self.H[:, free]).sum(axis=1)).ravel()
         pick = np.flatnonzero(reach > 0)
         if len(pick) == 0:
-            raise ComparisonError("every measured component is held or driven: nothing to estimate")
+            raise ComparisonError(
+                "every measured component is held or driven, so there is "
+                "nothing to estimate; choose free nodes"
+            )
         return self._only(pick)
 
     def _only(self, pick: Ints) -> "Measurements":
@@ -117,14 +122,14 @@ class Timetable:
             (self.missing, "have all components missing"),
             (self.at_rest, "lie at the start, where the state is known"),
             (late, f"come after the last of {steps} steps"),
-            (met, f"were met, and the gate rejected {gated} looks of markers" if gated
-             else "were met in part only, which this filter does not take"),
+            (met, f"were met, and the gate rejected {gated} marker samples" if gated
+             else "were only partly complete, which this filter does not accept"),
         )  # fmt: skip
         told = ", ".join(f"{count} {words}" for count, words in reasons if count)
         total = self.missing + self.at_rest + len(self.z)
         return (
-            f"0 of {total} measurements reached the filter ({told}): what ran is the model alone; "
-            "compare it with a method without markers"
+            f"0 of {total} measurements reached the filter ({told}), so the model ran without "
+            "corrections; compare it with a method without markers"
         )
 
 
@@ -144,8 +149,8 @@ def timetable(measurements: Measurements, dt: float) -> Timetable:
         )
     if len(np.unique(steps)) < len(steps):
         raise ComparisonError(
-            f"{len(steps)} measurements land on {len(np.unique(steps))} steps of {dt:g} s; take a "
-            f"step of at most {np.diff(t).min():g} s"
+            f"{len(steps)} measurements lie on {len(np.unique(steps))} steps of {dt:g} s; "
+            f"choose a step of at most {np.diff(t).min():g} s"
         )
     seen = np.isfinite(measurements.z).any(axis=1) & (steps > 0)
     rows = {int(steps[i]): measurements.z[i] for i in np.flatnonzero(seen)}
@@ -163,7 +168,7 @@ def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
 def _landing(t: Floats, dt: float) -> str:
     """The largest step up to `dt` on which all times land, as advice."""
     step = _landed(t, dt)
-    return "no step lands on all of them" if step is None else f"take dt = {step:.6g} s"
+    return "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
 
 
 def _landed(t: Floats, dt: float) -> float | None:
@@ -187,7 +192,7 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     found += [_of_outline(o, registered) for o in outlines]
     if not found:
         raise ComparisonError(
-            "the recording has no markers and no outlines: a filter has nothing to measure"
+            "the recording has no markers and no outlines, so the filter has no measurements"
         )
     return together(found)
 

@@ -64,19 +64,21 @@ class MemberModel:
         ("stiffness",), "1", "stiffness[.region|.body], support.<facets>, load.<load>, bias.<load>"
     )
     sd: tuple[float, ...] = quantity(
-        (0.25,), "1", "of every scale's logarithm at the start; one for all, or one each"
+        (0.25,), "1", "of every scale's logarithm at the start; one for all, or one for each"
     )
     bias_sd: float = quantity(0.1, "N", "of every bias at the start")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
     rule: Literal["average", "backward_euler"] = quantity("average", "1", "of a linear scene")
     a0: StartName = quantity("equilibrium", "1", "of a linear scene: M^-1 f, or zero")
     coordinates: Coordinates = quantity("shapes", "1", "of a linear scene: few shapes, or nodes")
-    shapes: int = quantity(6, "1", "of every load, with each stiffness that is tried")
+    shapes: int = quantity(6, "1", "of every load, with each tested stiffness")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
-    inflation: float = quantity(1.0, "1", "of the members' distance from their mean, an update")
+    inflation: float = quantity(
+        1.0, "1", "factor on the members' distance from their mean at each update"
+    )
     beyond_limit: Literal["refuse", "run"] = quantity(
-        "refuse", "1", "an explicit step above the stiffest member's critical one"
+        "refuse", "1", "an explicit step above the critical step of the stiffest member"
     )
 
     def __post_init__(self) -> None:
@@ -301,8 +303,9 @@ class MemberStepper(OneAtATime):
             return None
         name = doubts.names[scales[int(largest.argmax())]]
         return "diverged", (
-            f"a member of {len(x)} has {name} more than 1e{_AWAY / np.log(10):.0f} times off the "
-            "model's: a gate keeps outliers away, a larger R what the model cannot follow"
+            f"a member of {len(x)} has {name} more than 1e{_AWAY / np.log(10):.0f} times away "
+            "from the model's: set a gate against outliers, or a larger R for what the model "
+            "cannot follow"
         )
 
     def _lost(self, X: Floats) -> tuple[Ending, str] | None:
@@ -316,7 +319,7 @@ class MemberStepper(OneAtATime):
         largest = kernel.farthest(np.ravel(u))
         if largest < far:
             return None
-        found = f"moved by {largest:.3g} m" if np.isfinite(largest) else "is beyond all numbers"
+        found = f"moved by {largest:.3g} m" if np.isfinite(largest) else "is not finite"
         return "diverged", f"a member of {len(X)} {found} in a body of {far / FAR:.3g} m"
 
     def _estimates(self, x: Floats) -> Mapping[str, float]:

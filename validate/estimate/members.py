@@ -237,8 +237,8 @@ def _outside(v: Floats, basis: Floats, M: sparse.csr_array) -> tuple[Floats, flo
 
 def _off_model(what: str) -> SceneError:
     return SceneError(
-        f"a member lies so far off the model that its {what} leave the number range; take a "
-        "smaller sd of the parameters"
+        f"a member is so far from the model that its {what} overflow; take a smaller sd of the "
+        "parameters"
     )
 
 

@@ -28,7 +28,7 @@ class ModalKf(DisplacementNoise):
     """`gains`: "every_step" is the exact recursion as it goes, "shared" the same beforehand; with a
     gate or a doubtful clock, as it goes."""
 
-    gains: Gains = quantity("every_step", "1", "computed beforehand, or at every step")
+    gains: Gains = quantity("every_step", "1", "computed in advance, or at every step")
 
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
         """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""

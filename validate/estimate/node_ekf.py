@@ -52,14 +52,16 @@ class NodeEKF:
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
-    P0: float = quantity(1e-9, "m2", "initial variance; the paper's .001, read as mm2")
+    P0: float = quantity(1e-9, "m2", "initial variance; the paper's .001, taken as mm2")
     Qp: float = quantity(1e-7, "m2", "process noise per explicit step; the paper's .1, mm2")
     Qm: float | None = quantity(1e-9, "m2", "measurement variance (.001 mm2); none: declared")
     block: Block = quantity("component", "1", "what is filtered together")
     covariance: Literal["printed", "joseph"] = quantity("printed", "1", "P - K H P, or Joseph's")
     correct_previous: bool = quantity(False, "1", "shift U_{t-dt} with U_t")
     overflow: Literal["stop", "hold"] = quantity("stop", "1", "what to do when P overflows")
-    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    beyond_limit: Literal["refuse", "run"] = quantity(
+        "refuse", "1", "a step above the critical step"
+    )
     precision: Precision = quantity("double", "1", "of the element loops: double or single")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
@@ -68,7 +70,7 @@ class NodeEKF:
         if not (self.dt > 0 and self.substeps >= 1):
             raise UsageError(f"dt {self.dt:g} s in {self.substeps} substeps: both must be positive")
         if min(self.P0, self.Qp) < 0 or (self.Qm is not None and self.Qm <= 0):
-            raise UsageError("P0 and Qp are variances >= 0, Qm one above 0")
+            raise UsageError("P0 and Qp must be >= 0, and Qm above 0")
 
     def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
         """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
@@ -135,9 +137,9 @@ class NodeCore:
         if not memory.held or self.settings.overflow == "hold":
             return None
         return "diverged", (
-            f"{memory.held} of {memory.P.shape[1]} covariances beyond {kernel.HUGE:g} m2: nodes "
-            "without measurements grow like a^(2k); overflow='hold' goes on with the field, "
-            "block='companion' keeps them small"
+            f"{memory.held} of {memory.P.shape[1]} covariances beyond {kernel.HUGE:g} m2: "
+            "nodes without measurements grow like a^(2k); overflow='hold' continues with the "
+            "field, block='companion' keeps them small"
         )
 
     def correct(self, memory: NodeMemory, number: int, z: Floats) -> tuple[NodeMemory, Innovation]:
@@ -190,8 +192,8 @@ def _components(measurements: Measurements) -> Ints:
         best = int(np.argmax(np.abs(H.data[part]))) if H.data[part].size else -1
         if best < 0 or abs(H.data[part][best] - 1) > _PURE:
             raise ComparisonError(
-                f"'{name}' is no component of a node: a filter by nodes cannot use it; measure at "
-                "nodes or take ReducedEKF"
+                f"'{name}' is not a component of a node, so a node filter cannot use it; "
+                "measure at nodes or use ReducedEKF"
             )
         rows[m] = H.indices[part][best]
     return rows

@@ -58,15 +58,19 @@ class ReducedEKF:
 
     dt: float = quantity(2e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "explicit steps in each; inputs are interpolated")
-    basis: Literal["modes", "pod"] = quantity("modes", "1", "lowest modes, or shapes of own runs")
-    shapes: int = quantity(20, "1", "how many; 5 of a POD do as well as 20 modes")
-    snapshot_load: float = quantity(1.0, "N", "load of the runs that a POD takes its shapes from")
+    basis: Literal["modes", "pod"] = quantity(
+        "modes", "1", "lowest modes, or shapes from simulated runs"
+    )
+    shapes: int = quantity(20, "1", "number; 5 shapes of a POD are as good as 20 modes")
+    snapshot_load: float = quantity(1.0, "N", "load of the runs from which a POD takes its shapes")
     load_walk: float = quantity(1.0, "N/s^0.5", "random walk of every load's bias")
     load_sd: float = quantity(0.0, "N", "standard deviation of the bias at rest")
     process: float = quantity(1e-6, "m/s^0.5", "random walk of the shapes, rms over the body")
     noise: Literal["white", "load"] = quantity("white", "1", "where the process noise acts")
     gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or the steady one")
-    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    beyond_limit: Literal["refuse", "run"] = quantity(
+        "refuse", "1", "a step above the critical step"
+    )
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
@@ -107,8 +111,8 @@ class ReducedEKF:
         top = float(np.sqrt(basis.squares.max()))
         if steps.h * top >= 2:
             raise UsageError(
-                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {steps.h:g} s carry those "
-                f"below {2 / steps.h:.4g}; take fewer shapes or smaller steps"
+                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {steps.h:g} s are "
+                f"stable for those below {2 / steps.h:.4g}; take fewer shapes or smaller steps"
             )
         return basis
 

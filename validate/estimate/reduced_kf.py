@@ -36,7 +36,7 @@ from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
 _DIES = 1 - 1e-6  # of an error, from one look to the next: what never dies has no steady gain
-_DOUBLINGS, _DOUBLED = 60, 1e-13  # turns, and the relative change that ends them
+_DOUBLINGS, _DOUBLED = 60, 1e-13  # iterations, and the relative change that ends them
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class ReducedKf:
     modes: int = quantity(20, "1", "lowest modes kept")
     load_start: float = quantity(0.1, "N", "sd of every load's bias at the start")
     load_walk: float = quantity(0.1, "N/s^0.5", "random walk of every load's bias")
-    load_jitter: float = quantity(0.0, "N", "sd of a force of each step on its own")
+    load_jitter: float = quantity(0.0, "N", "sd of an independent force at each step")
     R: float | None = quantity(None, "m2", "variance of a measurement; none: declared")
-    settled: float = quantity(1e-6, "1", "change of the gain, of itself, at which it is frozen")
-    gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or where it settles")
+    settled: float = quantity(1e-6, "1", "relative change of the gain below which it is frozen")
+    gains: Literal["sequence", "steady"] = quantity("sequence", "1", "exact, or the steady one")
     gate: float | None = gate_setting()
     clock: float | None = clock_setting()
     smooth: bool = smooth_setting()
@@ -114,7 +114,9 @@ def _riccati(A: Floats, B: Floats, Q: Floats) -> Floats:
     left = A - B @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ X @ B, B.T @ X @ A)
     radius = float(np.abs(np.linalg.eigvals(left)).max())
     if not radius < _DIES:
-        raise ValueError(f"an error would stay: {radius:.7f} of it from one look to the next")
+        raise ValueError(
+            f"an error would not decay: {radius:.7f} of it remains from one measurement to the next"
+        )
     return X
 
 
@@ -131,7 +133,7 @@ def _doubled(A: Floats, G: Floats, X: Floats) -> Floats:
             break
         if np.abs(more).max() <= _DOUBLED * np.abs(X).max():
             return X
-    raise ValueError(f"doubling does not settle within {_DOUBLINGS} turns")
+    raise ValueError(f"the doubling algorithm does not converge within {_DOUBLINGS} iterations")
 
 
 def _sizes(F: Floats, Q: Floats, P: Floats) -> Floats:

@@ -37,7 +37,9 @@ class LoadDoubt:
         for name in ("start", "walk", "jitter"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
-                raise SceneError(f"doubt of the load, {name} = {value:g}: a number >= 0")
+                raise SceneError(
+                    f"uncertainty of the load, {name} = {value:g}: expected a number >= 0"
+                )
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,9 @@ _LEFT = 1e-12  # singular values of W, of the largest, that are left out of more
 
 def smooth_setting() -> Any:
     """The field of every filter that can smooth."""
-    return quantity(False, "1", "estimate each step from all looks, later ones too: no real time")
+    return quantity(
+        False, "1", "estimate each step from all measurements, also later ones; not in real time"
+    )
 
 
 class Transition(Protocol):

@@ -237,7 +237,7 @@ def _renumbered(places: Floats, nodes: Floats) -> Ints:
     """The library's unknown at each of our nodes; it numbers edges and faces in its own order."""
     distance, theirs = cKDTree(places).query(nodes)
     if np.max(distance) > 1e-9 * np.ptp(nodes) or len(np.unique(theirs)) != len(nodes):
-        raise AssertionError("scikit-fem has its unknowns elsewhere than the mesh its nodes")
+        raise AssertionError("scikit-fem has unknowns at other places than the nodes of the mesh")
     return np.asarray(theirs, dtype=np.int64)
 
 

@@ -29,14 +29,15 @@ def require_bricks(scene: Scene) -> None:
     """Raises `SceneError` for what mixed hexahedra have no explicit form of."""
     if scene.dilatation != "mixed":
         raise SceneError(
-            f"explicit hexahedra are mixed; {scene.dilatation} ones lock: take dilatation='mixed'"
+            f"explicit hexahedra must be mixed, because {scene.dilatation} ones lock; use "
+            "dilatation='mixed'"
         )
     for m in (scene.material, *(r.material for r in scene.regions)):
         form = m.coefficients.volumetric
         if m.law not in _LAWS or form != "split":
             raise SceneError(
-                f"explicit hexahedra know the laws {', '.join(_LAWS)} in their split form, not "
-                f"'{m.law}' ({form})"
+                f"explicit hexahedra support the laws {', '.join(_LAWS)} in their split form, "
+                f"not '{m.law}' ({form})"
             )
 
 

@@ -41,7 +41,7 @@ def cavity_surface(mesh: Mesh, name: str, facets: str) -> CavitySurface:
     (_require_closed_line if mesh.dimension == 2 else _require_closed)(surface)
     volume = volume_of(surface, mesh.nodes)
     if volume <= 0:
-        raise SceneError(f"cavity '{name}' is inside out: volume {1e9 * volume:.4g} mm3")
+        raise SceneError(f"cavity '{name}' is turned inside out: volume {1e9 * volume:.4g} mm3")
     return surface
 
 
@@ -51,7 +51,8 @@ def _require_closed(surface: CavitySurface) -> None:
     _, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     if (uses != 2).any():
         raise SceneError(
-            f"cavity '{surface.name}' is open: {int((uses != 2).sum())} edges without partner"
+            f"cavity '{surface.name}' is open: {int((uses != 2).sum())} edges that belong to "
+            "one facet only"
         )
     _, same_way = np.unique(edges, axis=0, return_counts=True)
     if (same_way != 1).any():

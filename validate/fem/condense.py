@@ -86,7 +86,7 @@ class Condensed:
         if unknown not in self._columns:
             if not np.isin(unknown, self.free):
                 node = int(self.nodes[unknown // self.dimension])
-                raise SceneError(f"node {node} is held or driven: a tool cannot move it")
+                raise SceneError(f"node {node} is held or driven, so a tool cannot move it")
             self._columns[unknown] = self._solved(np.array([unknown]))[:, 0]
         return self._columns[unknown]
 

@@ -105,8 +105,8 @@ def lanczos_step(
     """
     if products < _FEWEST or not 0 <= margin <= 0.5:
         raise SceneError(
-            f"{products} products, margin {margin:g}: at least {_FEWEST} products (fewer "
-            "overestimate the step) and a margin in 0..0.5"
+            f"{products} products, margin {margin:g}: expected at least {_FEWEST} products "
+            "(fewer overestimate the step) and a margin in 0..0.5"
         )
     top, open_part, done = _largest(apply, 1 / np.sqrt(masses), products)
     limit = 2 / float(np.sqrt(top))

@@ -146,8 +146,8 @@ class ExplicitBody:
             return self.geometry
         if not knows_single(self.scene):
             raise SceneError(
-                "single precision is for tet4 of St. Venant-Kirchhoff or neo-Hooke in its split "
-                "form, without a Prony series; take precision='double'"
+                "single precision supports tet4 of St. Venant-Kirchhoff or neo-Hooke in its "
+                "split form, without a Prony series; take precision='double'"
             )
         return _in_single(self.geometry)
 
@@ -247,7 +247,7 @@ class ExplicitBody:
 
     def _require_tets(self) -> None:
         if self.scene.mesh.bricks:
-            raise SceneError("filters of single nodes are for tetrahedra; use box()")
+            raise SceneError("node filters support tetrahedra only; use box()")
 
     def _blocks(self, u: Floats, f: Floats, d: Floats) -> None:
         self._require_tets()
@@ -269,17 +269,17 @@ def knows_single(scene: Scene) -> bool:
 def require_threads(threads: int) -> None:
     """Raises `SceneError` for fewer than one."""
     if threads < 1:
-        raise SceneError(f"{threads} threads: take 1, or as many as there are idle cores")
+        raise SceneError(f"{threads} threads: use 1, or at most the number of idle cores")
 
 
 def _require_one_caller(mesh: Mesh, threads: int) -> None:
     if mesh.bricks:
         raise SceneError(
-            "explicit hexahedra remember no stress: drop the Prony series, or take tet4 or "
+            "explicit hexahedra do not support a Prony series: remove it, or use tet4 or "
             "NewtonDynamics"
         )
     if threads > 1:
-        raise SceneError(f"{threads} threads: a viscoelastic body has one; take threads=1")
+        raise SceneError(f"{threads} threads: a viscoelastic body supports one; use threads=1")
 
 
 def _own(x: Floats) -> Floats:
@@ -296,9 +296,9 @@ def _require(scene: Scene) -> None:
     materials = (scene.material, *(r.material for r in scene.regions))
     if kind == "tet4" and len({_code(m) for m in materials}) > 1:
         forms = sorted({f"{m.law} {m.coefficients.volumetric}" for m in materials})
-        raise SceneError(f"explicit steps are for one law in one form, not {forms}")
+        raise SceneError(f"explicit steps support one law in one form, not {forms}")
     if scene.membranes:
-        raise SceneError("membranes are linear only: drop them, or take the linear law")
+        raise SceneError("membranes are linear only: remove them, or use the linear law")
     if kind == "tet4" and scene.dilatation != "pointwise":
         raise SceneError(
             f"{scene.dilatation} dilatation of tet4 has no explicit form; use 'pointwise'"
@@ -310,7 +310,7 @@ def _code(material: Material) -> int:
     law, form = material.law, material.coefficients.volumetric
     if (law, form) not in _LAWS:
         known = sorted({name for name, _ in _LAWS})
-        raise SceneError(f"law '{law}' has no form at large strain; choose one of {known}")
+        raise SceneError(f"law '{law}' has no large-strain form; choose one of {known}")
     return _LAWS[law, form]
 
 

@@ -57,8 +57,8 @@ def _require_positive(A: sparse.csr_array) -> None:
     SuperLU would hand an empty column to BLAS, which prints a line of its own."""
     if not np.isfinite(A.data).all():
         raise SceneError(
-            f"{int((~np.isfinite(A.data)).sum())} entries of the stiffness matrix are not finite; "
-            "look for sizes or material parameters beyond the number range"
+            f"{int((~np.isfinite(A.data)).sum())} entries of the stiffness matrix are not "
+            "finite; check for sizes or material parameters that overflow"
         )
     diagonal = A.diagonal()
     if (diagonal <= 0).any():

@@ -76,9 +76,9 @@ class Body:
     def __init__(self, scene: Scene) -> None:
         mesh = scene.mesh
         if scene.membranes:
-            raise SceneError("membranes are linear only: drop them, or take the linear law")
+            raise SceneError("membranes are linear only: remove them, or use the linear law")
         if mesh.dimension == 2 and any(m.prony.g for m in scene.materials):
-            raise SceneError("a Prony series is for bodies in 3-D: drop it, or take a 3-D mesh")
+            raise SceneError("a Prony series needs a body in 3-D: remove it, or use a 3-D mesh")
         require_positive_cells(mesh)
         self.mesh = mesh
         self.parts, self.sheet = tuple(_parts(scene)), scene.plane == "stress"
@@ -244,7 +244,7 @@ class Body:
             else:
                 continue
             words = f"principal stretch {found:.3f} in element {numbers[cells][cell]}"
-            return f"beyond the law's validity: {words} is {ends}"
+            return f"outside the range in which the law is valid: {words} is {ends}"
         return ""
 
     def _mean(self, b: _Block, values: Floats) -> Floats:

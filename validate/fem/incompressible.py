@@ -52,7 +52,7 @@ def keep_volumes(
         left = forces - held - system.K @ u
         u[free] += factor.solve(left[free])
     raise SceneError(
-        f"nu = 0.5: the cells change their volume by {worst.max():.1e} of it per unit input after "
-        f"{_ITERATIONS} iterations; what is held and driven leaves no motion of constant volume: "
-        "free a face, or take nu <= 0.4999"
+        f"nu = 0.5: the cells change their volume by {worst.max():.1e} of it per unit input "
+        f"after {_ITERATIONS} iterations; the held and driven nodes allow no motion of "
+        "constant volume: free a face, or use nu <= 0.4999"
     )

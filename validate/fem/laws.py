@@ -123,11 +123,11 @@ def law_of(material: Material, *, isochoric: bool = False) -> Law:
     law, c = material.law, material.coefficients
     names = [kind.name for kind in LAWS]
     if law not in names:
-        raise SceneError(f"law '{law}' has no form at large strain; choose one of {sorted(names)}")
+        raise SceneError(f"law '{law}' has no large-strain form; choose one of {sorted(names)}")
     if isochoric and c.volumetric == "coupled":
         raise SceneError(
-            f"law '{law}' in its coupled form has no isochoric part; take volumetric 'split', or "
-            "dilatation 'pointwise' with elements of order 2"
+            f"law '{law}' in its coupled form has no isochoric part; use volumetric 'split', "
+            "or dilatation 'pointwise' with elements of order 2"
         )
     mu, kappa = material.shear_modulus, 0.0 if isochoric else material.bulk_modulus
     if law == "svk":

@@ -54,13 +54,13 @@ def _outward(mesh: Mesh, load: Pressure) -> Ints:
     """The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
     facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body."""
     if mesh.dimension != 3:
-        raise SceneError(f"pressure '{load.name}': for 3-D meshes, not {mesh.kind}")
+        raise SceneError(f"pressure '{load.name}': supported for 3-D meshes, not for {mesh.kind}")
     outside = {tuple(row): i for i, row in enumerate(np.sort(mesh.surface, axis=1).tolist())}
     wanted = np.sort(facets_of(mesh, load.facets), axis=1).tolist()
     at = [outside.get(tuple(row), -1) for row in wanted]
     if -1 in at:
         raise SceneError(
-            f"pressure '{load.name}': {at.count(-1)} of {len(at)} faces lie within the body; "
+            f"pressure '{load.name}': {at.count(-1)} of {len(at)} faces lie inside the body; "
             "choose faces of its surface"
         )
     return np.asarray(mesh.surface[at])

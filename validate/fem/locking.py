@@ -84,8 +84,8 @@ def _mean(scene: Scene, cells: str) -> Locking | None:
         return None
     return Locking(
         f"nu = {nu:g}, {across:.1f} across the body",
-        f"few {cells} of nodal mean dilatation are too stiff where plates hold the body; compare "
-        "with order 2 or a finer mesh",
+        f"a mesh of few {cells} with nodal mean dilatation is too stiff where plates hold the "
+        "body; compare with order 2 or a finer mesh",
     )
 
 
@@ -105,7 +105,7 @@ def _bending(scene: Scene, cells: str) -> Locking | None:
         return None
     return Locking(
         f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long",
-        f"few {cells} lock in bending; compare with order 2 or a finer mesh",
+        f"a mesh of few {cells} locks in bending; compare with order 2 or a finer mesh",
     )
 
 

@@ -93,18 +93,18 @@ def _squeeze(p: Any, q: Any, w: Any) -> Any:
 def _require_plain(scene: Scene) -> None:
     if scene.mesh.kind not in _PAIRS or scene.plane == "stress":
         raise SceneError(
-            f"mixed elements are for linear meshes in plane strain or 3-D, not {scene.mesh.kind} "
-            f"in plane {scene.plane}"
+            "mixed elements support linear meshes in plane strain or 3-D, not "
+            f"{scene.mesh.kind} in plane {scene.plane}"
         )
     places = [p.facets for p in (*scene.supports, *scene.drives, *scene.loads)
               if not isinstance(p, Weight)]  # fmt: skip
     shaped = any(d.shape for d in scene.drives)
     if scene.masses or scene.tracked or shaped or {"faces"} != {"faces", *map(kind_of, places)}:
         raise SceneError(
-            "mixed elements know faces alone, no edges, points, masses, tracked sets or shapes"
+            "mixed elements support faces only, no edges, points, masses, tracked sets or shapes"
         )
     if scene.foundations or scene.membranes or scene.cavities:
-        raise SceneError("mixed elements know supports, pins, drives and loads alone")
+        raise SceneError("mixed elements support supports, pins, drives and loads only")
     spread = [x.name for x in scene.loads if not isinstance(x, Weight)
               and (isinstance(x, Pressure) or x.spread != "consistent")]  # fmt: skip
     if spread or not scene.loads:

@@ -40,7 +40,7 @@ def _modes(system: System, count: int | None) -> Modes:
     m = len(free)
     wanted = m if count is None else count
     if wanted > m:
-        raise SceneError(f"{wanted} modes of {m} unknowns: at most {m}")
+        raise SceneError(f"{wanted} modes of {m} unknowns: expected at most {m}")
     K, M = (X[free][:, free] for X in (system.K, system.M))
     squares, shapes = lowest(K, M, wanted + max(8, wanted // 10))
     omega = np.sqrt(squares)
@@ -52,8 +52,8 @@ def _modes(system: System, count: int | None) -> Modes:
     damping = np.diag(C).copy()
     if np.abs(C - np.diag(damping)).max() > _COUPLED * max(float(np.abs(C).max()), 1e-300):
         raise SceneError(
-            "the damping couples the modes (regions damped differently); use Newmark, or one "
-            "mass_damping and stiffness_damping for all materials"
+            "the damping couples the modes (regions damped differently); use Newmark, or the "
+            "same mass_damping and stiffness_damping for all materials"
         )
     return Modes(shapes, omega, damping)
 

@@ -50,9 +50,7 @@ def response(point: MaterialPoint, stretches: Floats, t: Floats | None = None) -
         if not law.least_stretch < value <= law.most_stretch:
             ends = f"above {law.least_stretch:.4g}"
             ends += f" up to {law.most_stretch:.4g}" if law.most_stretch < np.inf else ""
-            raise SceneError(
-                f"stretch {value:.4g}: the law '{point.material.law}' has sense {ends}"
-            )
+            raise SceneError(f"stretch {value:.4g}: the law '{point.material.law}' is valid {ends}")
     driven = np.einsum("nk,kiJ->niJ", stretch - 1, np.stack(moves))
     guess = _first_guess(point, stretch)
     if t is not None and point.material.prony.g:
@@ -109,8 +107,8 @@ def _free_strain(law: Law, driven: Floats, free: Floats, h: Floats) -> Floats:
             break
     worst = int(np.argmax(np.abs(change) / (1 + h)))
     raise SceneError(
-        f"at stretch {1 + driven[worst, 0, 0]:.4g} no free stretch is without stress: "
-        "the law has no state there; stretch less"
+        f"at stretch {1 + driven[worst, 0, 0]:.4g} no lateral stretch gives zero stress, so "
+        "the law has no state there; use a smaller stretch"
     )
 
 

@@ -141,8 +141,8 @@ def build(scene: Scene) -> System:
         moves[driven, j] = sum(drive.direction)
     if held.all():
         raise SceneError(
-            f"all {N} unknowns of {len(mesh.nodes)} nodes are held or driven, nothing is left to "
-            "solve: put at least 2 elements between what is held, or one of order 2"
+            f"all {N} unknowns of {len(mesh.nodes)} nodes are held or driven, so nothing is "
+            "left to solve: put at least 2 elements between held faces, or one of order 2"
         )
     _require_felt(scene, held & ~moves.any(axis=1))
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
@@ -159,7 +159,7 @@ def responses(system: System) -> Responses:
         raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
     if system.scene.loads:
         raise SceneError(
-            "response columns know drives and cavities; give loads to a dynamic scheme"
+            "response columns support drives and cavities only; for loads use a dynamic scheme"
         )
     mesh, factor = system.scene.mesh, system.factor()
     loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
@@ -235,7 +235,7 @@ def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
         )
         raise SceneError(
             f"{what} '{name}': supports and pins hold all {len(nodes) * int(along.sum())} "
-            f"unknowns of its {len(nodes)} nodes, it would do nothing; {hint}"
+            f"unknowns of its {len(nodes)} nodes, so it would have no effect; {hint}"
         )
 
 

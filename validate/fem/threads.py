@@ -34,7 +34,7 @@ class ThreadChoice:
     def words(self) -> str:
         taken = f"threads: {self.threads} of {self.most}"
         if not self.seconds:
-            return f"{taken}, no other core is idle"
+            return f"{taken}; no other core is idle"
         times = ", ".join(f"{n}: {1e6 * s:.3g} us" for n, s in self.seconds.items())
         return f"{taken}, pilot {times}"
 
@@ -131,5 +131,6 @@ class Team:
         if len(self._recent) == _RECENT and now > alone:
             self.threads = 1
             self.said += (
-                f"; then 1, as {self.choice.threads} took {1e6 * now:.3g} us: the machine got busy"
+                f"; then 1, as {self.choice.threads} took {1e6 * now:.3g} us, because the "
+                "machine became busy"
             )

@@ -34,11 +34,15 @@ def volume_penalty(scene: Scene, weight: float, normals: Normals = "area") -> sp
     other than linear simplices.
     """
     if not (np.isfinite(weight) and weight >= 0):
-        raise SceneError(f"penalty of {weight:g} Pa on a change of volume: at least 0")
+        raise SceneError(f"penalty of {weight:g} Pa on a change of volume: expected at least 0")
     if scene.plane == "stress":
-        raise SceneError("in plane stress the thickness gives way: penalise in plane strain or 3-D")
+        raise SceneError(
+            "in plane stress the thickness is free: use the penalty in plane strain or 3-D"
+        )
     if scene.mesh.order != 1:
-        raise SceneError(f"a penalty along face normals is for linear cells, not {scene.mesh.kind}")
+        raise SceneError(
+            f"a penalty along face normals supports linear cells, not {scene.mesh.kind}"
+        )
     B, volumes = divergence(scene.mesh)
     scale = sparse.diags_array(scene.thickness * weight * volumes)
     along = B if normals == "area" else _unit_rows(scene)

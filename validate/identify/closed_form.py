@@ -32,7 +32,7 @@ def linear_fit(residual: Residual, space: Space) -> Fit:
         found = [np.asarray(residual(np.array([x]))) for x in _AT]
         calls = len(_AT)
         if len({len(r) for r in found}) > 1:
-            return _none(middle, calls, "what is compared depends on it")
+            return _none(middle, calls, "the compared data depend on it")
         slope = (found[2] - found[0]) / (values[2] - values[0])
         square = float(slope @ slope)
         off = found[1] - found[0] - slope * (values[1] - values[0])
@@ -41,7 +41,7 @@ def linear_fit(residual: Residual, space: Space) -> Fit:
         best = values[1] - float(slope @ found[1]) / square
         r = space.ranges[0]
         if not r.low < best < r.high:
-            return _none(middle, calls, "the minimum lies outside of the range")
+            return _none(middle, calls, "the minimum lies outside the range")
         x = space.coordinates([best])
         ended = np.asarray(residual(x))
     except ValidateError as error:

@@ -175,7 +175,10 @@ class Identification:
         if not others:
             return ()
         ends = ", ".join(f"{self.space.value(i, float(f.x[i])):.4g}" for f in others[:3])
-        return (f"{len(others)} of {len(self.fits)} starts end elsewhere and fit as well: {ends}",)
+        return (
+            f"{len(others)} of {len(self.fits)} starts end at other values with an equally "
+            f"good fit: {ends}",
+        )
 
 
 def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1) -> Identification:
@@ -217,14 +220,15 @@ def best_of(fits: Sequence[Fit], space: Space) -> Fit:
         if least.count == 0:
             raise ComparisonError(least.why)
         raise ComparisonError(
-            f"{', '.join(space.names)}: none of {len(fits)} starts converged (lowest chi-square "
-            f"{least.chi_square:.4g} over {least.count} residuals; {least.why}); search narrower "
-            "bounds, or look whether these residuals depend on them"
+            f"{', '.join(space.names)}: none of {len(fits)} starts converged (lowest "
+            f"chi-square {least.chi_square:.4g} over {least.count} residuals; {least.why}); "
+            "search narrower bounds, or check whether these residuals depend on them"
         )
     best = min(ended, key=lambda f: f.chi_square)
     if best.count < len(space.ranges):
         raise ComparisonError(
-            f"{best.count} residuals for {len(space.ranges)} parameters ({', '.join(space.names)}):"
-            " at least as many are needed; name further quantities or fewer parameters"
+            f"{best.count} residuals for {len(space.ranges)} parameters "
+            f"({', '.join(space.names)}): expected at least as many residuals as parameters; "
+            "name more quantities or fewer parameters"
         )
     return best

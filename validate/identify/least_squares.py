@@ -74,13 +74,16 @@ class CalledOnce:
             return self._penalty
         if self._penalty is None:
             if len(found) == 0:
-                raise ComparisonError("0 matched samples to identify from")
+                raise ComparisonError(
+                    "0 matched samples, so nothing can be identified; check "
+                    "the clocks of the recording"
+                )
             far = _OFTEN * max(1.0, float(np.sqrt(np.mean(found**2))))
             self._penalty = np.full(len(found), far)
         elif len(found) != len(self._penalty):
             raise ComparisonError(
-                f"{len(self._penalty)} residuals at first, {len(found)} elsewhere: what is "
-                "compared must not depend on what is identified"
+                f"{len(self._penalty)} residuals at the start, {len(found)} later: the "
+                "compared data must not depend on the identified parameters"
             )
         return found
 

@@ -41,7 +41,7 @@ class Cylinder:
     def __post_init__(self) -> None:
         for name, size in (("diameter", self.diameter), ("height", self.height)):
             if not (math.isfinite(size) and size > 0):
-                raise RecordingError(f"cylinder {name} {size} m is not a size above 0")
+                raise RecordingError(f"cylinder {name} {size} m: expected a size above 0")
 
     @property
     def area(self) -> float:
@@ -98,7 +98,7 @@ def cylinder_of(recording: Recording) -> Cylinder:
         except (KeyError, ValueError) as error:
             raise RecordingError(
                 f"{recording.name}: no number '{name}' in its specimen record {dict(record)}; "
-                "state the cylinder"
+                "declare the size of the cylinder"
             ) from error
     return Cylinder(*sizes)
 
@@ -132,7 +132,7 @@ def fit_modulus(
 def summarise(fits: Sequence[ModulusFit]) -> ModulusSummary:
     """Mean, scatter over repeats (n - 1) and sd of the mean; raises `UsageError` without fits."""
     if not fits:
-        raise UsageError("no fits to summarise: give at least one force-displacement log")
+        raise UsageError("no fits to summarise; give at least one force-displacement log")
     values = np.array([fit.E_apparent for fit in fits])
     windows = {fit.window for fit in fits}
     if len(windows) > 1:
@@ -228,7 +228,7 @@ def require_test(recording: Recording, test: TestKind) -> None:
     if said and said != test:
         presses = "presses" if test == "compression" else "pulls"
         raise RecordingError(
-            f"{recording.name} is a test in {said}, the experiment one in {test}: --set "
+            f"{recording.name} is a test in {said}, but the experiment is one in {test}: --set "
             f"test={said}; or if it {presses}, import it again with --map test={test}"
         )
 
@@ -260,8 +260,8 @@ def zero_of(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, 
     if len(loaded) == 0:
         raise RecordingError(
             f"no contact in {len(force)} samples: no force is {_threshold(force, noise):.3g} N "
-            f"(5 sd of the noise) off the unloaded one, and all lie within {np.ptp(force):.3g} N; "
-            "check the load cell's channel, unit and range"
+            "(5 sd of the noise) away from the unloaded force, and all lie within "
+            f"{np.ptp(force):.3g} N; check the load cell's channel, unit and range"
         )
     start = int(loaded[0])
     if start < 2 * PLATEAU:

@@ -109,7 +109,8 @@ def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
         topics = (*recording.markers, *lengths, *recording.contours)
         if not topics:
             raise ComparisonError(
-                f"{recording.name}: no markers, no signal in m and no outlines; nothing moves"
+                f"{recording.name}: it has no markers, no signal in m and no outlines, so no "
+                "motion is recorded"
             )
         topic = topics[0]
     if topic not in recording.streams:
@@ -130,7 +131,7 @@ def motion_in(topic: str, stream: object) -> RecordedMotion:
         moved = along_normals(stream.outlines[0], stream.outlines, EVERY_TEN)
         named = dict(zip(outline_places(EVERY_TEN), moved.transpose(1, 0, 2), strict=True))
         return recorded_motion(stream.t, named, stream.sd)
-    raise ComparisonError(f"'{topic}': images show no motion by themselves; find outlines in them")
+    raise ComparisonError(f"'{topic}': images have no motion as they are; find outlines in them")
 
 
 def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) -> RecordedMotion:
@@ -141,7 +142,7 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     sizes = {name: _extent(x) for name, x in moved.items()}
     name = max(sizes, key=lambda n: sizes[n], default="")
     if not name or not sizes[name] > 0:
-        raise ComparisonError("nothing moves in the recording: 0 of its markers are seen twice")
+        raise ComparisonError("the recording has no motion: none of its markers is seen twice")
     x = moved[name]
     seen = np.isfinite(x).all(axis=1)
     t_all, t, x = t, t[seen], x[seen]

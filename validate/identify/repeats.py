@@ -42,11 +42,13 @@ def labels_of(said: str | None, logs: Sequence[Recording]) -> tuple[str, ...]:
     for log in logs:
         if not {"displacement", "force"} <= set(log.signals) or "specimen" not in log.metadata:
             raise UsageError(
-                f"{log.name} is no log of a testing machine, and only these are taken as repeats; "
-                "import one file at a time, and put their streams together by `validate merge`"
+                f"{log.name} is not a log of a testing machine; only such logs can be repeats. "
+                "Import one file at a time, and combine their streams with `validate merge`"
             )
     if said is None:
-        raise UsageError(f"{len(logs)} logs, {', '.join(names[:8])}: of which specimens? {_ASK}")
+        raise UsageError(
+            f"{len(logs)} logs, {', '.join(names[:8])}: their specimens are not declared; {_ASK}"
+        )
     if said in ("one", "each"):
         return tuple("1" if said == "one" else str(i + 1) for i in range(len(logs)))
     labels = tuple(label.strip() for label in said.split(","))
@@ -68,7 +70,7 @@ def averaged(logs: Sequence[Recording], labels: Sequence[str], name: str) -> Rec
     logs of different tests or sizes, and for less than 10 samples in common.
     """
     if len(logs) < 2:
-        raise RecordingError(f"{len(logs)} logs, at least 2 are needed for a mean")
+        raise RecordingError(f"{len(logs)} logs; a mean needs at least 2")
     test, sizes = _alike(logs)
     names = _names(logs)
     paths = [_loaded(log, test) for log in logs]
@@ -98,8 +100,8 @@ def _alike(logs: Sequence[Recording]) -> tuple[TestKind, Record]:
     tests = {r.get("test", "") for r in records}
     if len(tests) > 1 or not tests <= {"compression", "tension"}:
         raise RecordingError(
-            f"repeats are of one test, these are {', '.join(sorted(tests))}; import each by itself "
-            "with --map test=compression or --map test=tension"
+            f"repeats must be of one test, these are of {', '.join(sorted(tests))}; import "
+            "each separately with --map test=compression or --map test=tension"
         )
     found: dict[str, str] = {}
     for key in sorted({k for r in records for k in r} - {"test", "speed_m_per_s"}):
@@ -107,8 +109,8 @@ def _alike(logs: Sequence[Recording]) -> tuple[TestKind, Record]:
         if len(values) < len(logs) or np.ptp(values) > _ALIKE * np.mean(values):
             shown = ", ".join(f"{v:.6g}" for v in values[:8])
             raise RecordingError(
-                f"repeats are of one size, {key} of {len(values)} of {len(logs)} logs is {shown}; "
-                "leave the others out"
+                f"repeats must be of one size, but {key} of {len(values)} of {len(logs)} logs "
+                f"is {shown}; leave the others out"
             )
         found[key] = repr(float(np.mean(values)))
     (test,) = tests
@@ -173,7 +175,11 @@ def _told(
     end: float,
 ) -> dict[str, Record]:
     specimens = len(last.means)
-    of = "specimens" if specimens > 1 else "repeats of one specimen: how specimens differ is open"
+    of = (
+        "specimens"
+        if specimens > 1
+        else ("repeats of one specimen: the scatter between specimens is unknown")
+    )
     many = "specimens" if specimens > 1 else "specimen"
     what = f"mean of {len(paths)} logs of {specimens} {many} to {1e3 * end:.4g} mm"
     durations = [float(np.interp(end, p.d, p.t)) for p in paths]

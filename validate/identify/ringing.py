@@ -39,7 +39,7 @@ def ringing(t: Floats, y: Floats) -> Ringing:
     Raises `ComparisonError` for fewer than three periods, too few samples, and what does not ring.
     """
     if len(t) < 4 * _LINEAR:
-        raise ComparisonError(f"{len(t)} samples of ringing: {4 * _LINEAR} are needed")
+        raise ComparisonError(f"{len(t)} samples of ringing; at least {4 * _LINEAR} are needed")
     t = t - t[0]
     f0 = _peak(t, y)
     if f0 * t[-1] < _PERIODS:

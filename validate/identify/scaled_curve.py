@@ -215,6 +215,6 @@ def fit_modulus_of(
         if abs(found.scale - before) <= PROPORTIONAL * before:
             return curve, found, solutions
     raise ComparisonError(
-        f"no modulus settles after {_STEPS} solutions (last {found.scale:.4g} Pa): coefficients of "
-        "the law carry more of the force than the modulus; set material.E"
+        f"the modulus does not converge after {_STEPS} solutions (last {found.scale:.4g} Pa): "
+        "the coefficients of the law contribute more force than the modulus; set material.E"
     )

@@ -66,7 +66,9 @@ class Space:
         Raises `UsageError` for no start.
         """
         if count < 1:
-            raise UsageError(f"--seeds {count}: at least one start, ten or more to trust it")
+            raise UsageError(
+                f"--seeds {count}: expected at least one start; ten or more for a reliable result"
+            )
         p = len(self.ranges)
         drawn = qmc.LatinHypercube(p, rng=seed).random(count - 1) if count > 1 else np.empty((0, p))
         return np.vstack([np.full((1, p), 0.5), drawn])

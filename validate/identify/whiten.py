@@ -27,8 +27,8 @@ def whitened(
     along = float(np.sqrt(sd**2 + k * systematic**2))
     if along == 0:
         raise ComparisonError(
-            f"{name}: {k} values with a standard deviation of {sd:g} weigh without limit; state "
-            "the noise of the sensor"
+            f"{name}: {k} values with a standard deviation of {sd:g} have infinite weight; "
+            "declare the noise of the sensor"
         )
     mean = values.mean(axis=0)
     across = (values - mean) / sd if k > 1 else np.zeros_like(values)

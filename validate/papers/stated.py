@@ -3,8 +3,8 @@
 from validate.compare.published import Figure
 
 INPUT = "an input, taken as printed"
-CITED = "cited from others, nothing of the paper's own"
-MACHINE = "another machine: ours stands in the report's environment"
+CITED = "cited from other work, not a result of the paper"
+MACHINE = "another machine: ours is in the environment section of the report"
 
 
 def taken(name: str, theirs: float, ours: float, unit: str, source: str,

@@ -82,7 +82,7 @@ def _body(blocks: Sequence[KeywordBlock], part: str | None) -> tuple[_Body, list
     """The one body with solid elements, and what the others are."""
     homes = list(dict.fromkeys(b.home for b in blocks if b.keyword == "ELEMENT"))
     if not homes:
-        raise SceneError("no elements: no Abaqus input file, or one without a body")
+        raise SceneError("no elements: the file is not an Abaqus input file, or has no body")
     solid = [h for h in homes if any(_is_solid(b) for b in blocks if b.home == h)] or homes[:1]
     bodies = [(home, at) for home in solid for at in _instances(blocks, home)]
     found = _chosen(bodies, part)
@@ -97,8 +97,8 @@ def _chosen(bodies: Sequence[_Body], part: str | None) -> _Body:
     listed = ", ".join(f"'{_names(b)[-1]}'" for b in (named or bodies)[:12])
     first = _names((named or bodies)[0])[-1]
     raise SceneError(
-        f"{len(named or bodies)} bodies ({listed}): one is read; choose it: validate body FILE "
-        f"--unit mm --part {first} -o body.npz"
+        f"{len(named or bodies)} bodies ({listed}): only one can be read; choose it: validate "
+        f"body FILE --unit mm --part {first} -o body.npz"
     )
 
 
@@ -150,7 +150,7 @@ def _solids(own: Sequence[KeywordBlock]) -> Elements:
     for block in filter(_is_solid, own):
         for number, nodes in _rows_of(block, _size(block)):
             if found.setdefault(number, nodes) is not nodes:
-                raise block.wrong(f"element {number} stands twice; export one part")
+                raise block.wrong(f"element {number} is defined twice; export one part")
     return found
 
 
@@ -264,7 +264,7 @@ def _range(block: KeywordBlock, row: str) -> range:
     """The numbers from the first to the last by a step, as a row states them."""
     said = block.floats(row)
     if len(said) not in (2, 3) or not all(x.is_integer() and 0 < x < _MOST for x in said):
-        raise block.wrong(f"'{row[:40]}' is no first, last and step")
+        raise block.wrong(f"'{row[:40]}': expected first, last and step")
     first, last, *step = (int(x) for x in said)
     return range(first, last + 1, *step)
 

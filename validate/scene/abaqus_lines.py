@@ -121,7 +121,9 @@ def _included(line: DeckLine) -> str | None:
     if keyword != "INCLUDE":
         return None
     if "PASSWORD" in given:
-        raise SceneError(f"*Include in {line.where}: a file that is locked; export it open")
+        raise SceneError(
+            f"*Include in {line.where}: the file is encrypted; export it without encryption"
+        )
     return given.get("INPUT", "")
 
 

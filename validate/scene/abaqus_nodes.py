@@ -20,7 +20,7 @@ def nodes_of(own: Sequence[KeywordBlock]) -> tuple[list[int], Floats]:
         numbers, places = _written(block)
         for number, place in zip(numbers, _from_system(places, block.system), strict=True):
             if at.setdefault(number, x := tuple(place.tolist())) != x:
-                raise block.wrong(f"node {number} has two places; export one part")
+                raise block.wrong(f"node {number} has two positions; export one part")
     if not at:
         raise SceneError("no nodes in the part that has solid elements")
     return list(at), np.array(list(at.values()), dtype=np.float64)
@@ -31,7 +31,7 @@ def _written(block: KeywordBlock) -> tuple[list[int], Floats]:
     for row in block.rows:
         number, *x = block.floats(row)
         if not number.is_integer() or len(x) not in (2, 3):
-            raise block.wrong(f"'{row[:40]}' is no number of a node with x, y, z")
+            raise block.wrong(f"'{row[:40]}': expected a node number with x, y, z")
         numbers.append(int(number))
         places.append([*x, 0.0][:3])
     return numbers, np.array(places, dtype=np.float64)
@@ -47,7 +47,10 @@ def _from_system(x: Floats, system: KeywordBlock | None) -> Floats:
         return x
     rows = [system.floats(row) for row in system.rows]
     if [len(row) for row in rows] not in ([3], [6], [6, 3]):
-        raise system.wrong("expected an origin, a point on x, and in a second row one beside it")
+        raise system.wrong(
+            "expected an origin, a point on the x axis, and in a second row a "
+            "point away from that axis"
+        )
     origin = np.array(rows[0][:3])
     if len(rows[0]) == 3:
         return np.asarray(x + origin)
@@ -58,7 +61,7 @@ def _from_system(x: Floats, system: KeywordBlock | None) -> Floats:
     else:
         along[2] = 0.0
     if not (np.linalg.norm(along) > 0 and np.linalg.norm(up) > 0):
-        raise system.wrong("its points are one, or on a line")
+        raise system.wrong("its points coincide or lie on a line")
     e_x, e_z = along / np.linalg.norm(along), up / np.linalg.norm(up)
     return np.asarray(origin + x @ np.array([e_x, np.cross(e_z, e_x), e_z]))
 
@@ -73,7 +76,7 @@ def placed(points: Floats, instance: KeywordBlock) -> Floats:
         return moved
     a, b = np.array(rows[1][:3]), np.array(rows[1][3:6])
     if not np.linalg.norm(b - a) > 0:
-        raise instance.wrong("turned about two points that are one")
+        raise instance.wrong("the rotation axis has two equal points")
     axis = (b - a) / np.linalg.norm(b - a)
     turn = Rotation.from_rotvec(np.deg2rad(rows[1][6]) * axis)
     return np.asarray(turn.apply(moved - a) + a)

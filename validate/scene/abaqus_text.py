@@ -83,9 +83,9 @@ def blocks_of(deck: Deck) -> list[KeywordBlock]:
 
 def _require_own_rows(block: KeywordBlock) -> None:
     if block.keyword in _MAKES:
-        raise block.wrong("is not followed; export plain nodes and elements")
+        raise block.wrong("is not supported; export plain nodes and elements")
     if block.keyword == "NODE" and block.given.get("SYSTEM", "R").upper() != "R":
-        raise block.wrong("coordinates that are not rectangular; export them as x, y, z")
+        raise block.wrong("coordinates that are not Cartesian; export them as x, y, z")
 
 
 def _split(deck: Deck) -> Iterator[KeywordBlock]:
@@ -109,5 +109,7 @@ def _of_its_file(block: KeywordBlock, deck: Deck) -> list[str]:
         return []
     lines = list(deck.beside(block.given["INPUT"], block.where))
     if keyword := next((line for line in lines if line.is_keyword), None):
-        raise block.wrong(f"keyword '{keyword.text[:40]}' in {keyword.where}; rows alone are taken")
+        raise block.wrong(
+            f"keyword '{keyword.text[:40]}' in {keyword.where}; only rows are supported"
+        )
     return [line.text for line in lines]

@@ -75,5 +75,6 @@ def facts(mesh: Mesh) -> Mapping[str, str]:
         "volume" if mesh.dimension == 3 else "area": size,
         "quality": f"worst {q.min():.3g} (element {int(q.argmin())}), median {np.median(q):.3g}; "
         f"{poor} below {POOR:g}; 1 is best",
-        "facet sets": sets or "none: name them by plane, box or nearest point, as --face top=zmax",
+        "facet sets": sets
+        or "none: name them by plane, box or nearest point, for example --face top=zmax",
     }

@@ -146,7 +146,9 @@ class RigidContact:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction >= 0):
-            raise SceneError(f"contact '{self.name}': friction {self.friction:g}, needs 0 or above")
+            raise SceneError(
+                f"contact '{self.name}': friction {self.friction:g}, expected 0 or more"
+            )
         if self.direction is not None:
             length = float(np.linalg.norm(self.direction))
             if abs(length - 1) > 1e-9:
@@ -168,8 +170,8 @@ def require_clear(contacts: tuple[RigidContact, ...], mesh: Mesh) -> None:
         shared = [claimed[n] for n in nodes.tolist() if n in claimed]
         if shared:
             raise SceneError(
-                f"contact '{part.name}' shares {len(shared)} nodes with '{shared[0]}'; a node can "
-                "touch one rigid body: choose facets apart"
+                f"contact '{part.name}' shares {len(shared)} nodes with '{shared[0]}'; a node "
+                "can touch one rigid body: choose facets without common nodes"
             )
         claimed |= dict.fromkeys(nodes.tolist(), part.name)
 
@@ -181,8 +183,8 @@ def _require_outside(part: RigidContact, x: Floats, size: float) -> None:
         deepest = int(np.argmin(gaps))
         at = ", ".join(f"{1e3 * c:.3g}" for c in x[deepest])
         raise SceneError(
-            f"contact '{part.name}' starts inside the body: {int(inside.sum())} of {len(x)} nodes, "
-            f"{-1e3 * gaps[deepest]:.3g} mm at ({at}) mm; move it back by as much"
+            f"contact '{part.name}' starts inside the body: {int(inside.sum())} of {len(x)} "
+            f"nodes, {-1e3 * gaps[deepest]:.3g} mm at ({at}) mm; move it out by this distance"
         )
 
 

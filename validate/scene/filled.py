@@ -44,8 +44,9 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
     around = f"{int(found['triangles'])} triangles around {1e6 * enclosed:.4g} cm3"
     if abs(volume - enclosed) > may:
         raise SceneError(
-            f"{path.name}: {around}, filled are {share}, where {100 * may / enclosed:.2g} % may "
-            "differ: it cuts itself, or parts of it overlap; unite them first"
+            f"{path.name}: {around}, filled are {share}, where {100 * may / enclosed:.2g} % "
+            "may differ: the surface intersects itself, or parts of it overlap; unite them "
+            "first"
         )
     turned = f"{int(found['turned'])} of {int(found['triangles'])} triangles"
     return ForeignBody(mesh, {"surface": around, "turned": turned, "filled": share})

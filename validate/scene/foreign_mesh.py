@@ -59,7 +59,7 @@ def metres(name: str, unit: str) -> float:
     """Metres in one `unit`; raises `SceneError` for what is no length."""
     factor = in_si(1.0, unit, "m")
     if factor is None:
-        raise SceneError(f"{name}: '{unit}' is no unit of length; as mm")
+        raise SceneError(f"{name}: '{unit}' is not a unit of length; write for example mm")
     return factor
 
 
@@ -108,13 +108,15 @@ def _body(
     if len(shapes) != 1 or next(iter(shapes)) not in _KINDS:
         listed = ", ".join(f"{len(v)} {k}" for k, v in shapes.items()) or "none"
         raise SceneError(
-            f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} alone is taken: export "
-            "them split into tetrahedra"
+            f"{name}: its elements are {listed}; one of {', '.join(_KINDS)} alone is "
+            "supported: export them split into tetrahedra"
         )
     ((shape, cells),) = shapes.items()
     kind, points = _KINDS[shape], factor * found["points"]
     if not len(cells):
-        raise SceneError(f"{name}: its {shape} elements are none; damaged, or cut")
+        raise SceneError(
+            f"{name}: its {shape} elements are not valid; the file is damaged or truncated"
+        )
     if cells.min() < 0 or cells.max() >= len(points):
         raise SceneError(
             f"{name}: its elements name nodes {cells.min()} to {cells.max()} of "
@@ -133,7 +135,7 @@ def _body(
         mesh, turned = _turned(mesh) if turn else (mesh, 0)
         require_positive_cells(
             mesh,
-            "write their nodes the other way round, or save it as .vtu, where they are turned",
+            "reverse the order of their nodes, or save it as .vtu, where validate reverses it",
         )
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
@@ -146,9 +148,9 @@ def _body(
     if part is not None:
         told["part"] = f"{part}: {len(mesh.cells)} of {len(cells)} elements"
     if "beside" in found:
-        told["left out"] = f"{found['beside']} beside the solid; their sets name its facets"
+        told["left out"] = f"{found['beside']} in addition to the solid; their sets name its facets"
     if "placed" in found:
-        told["moved"] = f"to where its instance '{found['placed']}' stands"
+        told["moved"] = f"to the position of its instance '{found['placed']}'"
     if "included" in found:
         told["included"] = str(found["included"])
     mesh = replace(mesh, facets=_facets(mesh, used, found))
@@ -196,6 +198,6 @@ def _require_straight(name: str, x: Floats, between: tuple[tuple[int, ...], ...]
         if bent.any():
             raise SceneError(
                 f"{name}: {int(bent.sum())} edges or faces {'-'.join(map(str, corners))} are "
-                f"curved, middles up to {1e3 * off.max():.3g} mm off; straight ones are taken: "
-                "export linear elements"
+                f"curved, middles up to {1e3 * off.max():.3g} mm off; only straight elements "
+                "are supported: export linear elements"
             )

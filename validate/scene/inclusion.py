@@ -99,11 +99,11 @@ def block_with_inclusion(block: Block, grid: tuple[int, int, int], shape: Inclus
     touches a face, is smaller than an element, or when the projection inverts a cell.
     """
     if min(grid) < 4:
-        raise SceneError(f"mesh of {grid} nodes: at least 4 along each side are needed")
+        raise SceneError(f"mesh of {grid} nodes: expected at least 4 along each side")
     if int(np.prod(grid)) > _MOST_NODES:
         raise SceneError(
-            f"mesh of {grid} nodes: {int(np.prod(grid))} in all, at most {_MOST_NODES} are taken; "
-            "coarsen it"
+            f"mesh of {grid} nodes: {int(np.prod(grid))} in total; expected at most "
+            f"{_MOST_NODES}: use a coarser mesh"
         )
     _require_inside(block, shape)
     _require_resolved(block, grid, shape)

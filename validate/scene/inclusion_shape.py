@@ -72,12 +72,12 @@ class SlicedShape:
         if n < 2 or (np.diff(along) <= 0).any():
             raise SceneError(
                 f"{n} slices between {1e3 * self.ends[0]:.2f} and {1e3 * self.ends[1]:.2f} mm: "
-                "two or more with growing positions between the ends are needed"
+                "expected two or more with increasing positions between the ends"
             )
         if (self.radii <= 0).any() or self.radii.shape[1] < 8:
             raise SceneError(
                 f"slices: radii {self.radii.shape}, smallest {1e3 * self.radii.min():.3g} mm; "
-                "positive ones at 8 or more angles are needed"
+                "expected positive radii at 8 or more angles"
             )
 
     @cached_property

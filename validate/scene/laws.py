@@ -61,7 +61,7 @@ class Coefficients:
         (0.2, 5.0), "1", "principal stretches between which the law is checked and used"
     )
     stability: StabilityRule = quantity(
-        "required", "1", "open: a law that loses positive energy there is made all the same"
+        "required", "1", "open: a law that loses positive energy there is accepted"
     )
 
     def __post_init__(self) -> None:
@@ -74,11 +74,13 @@ class Coefficients:
         if len(self.ogden_alpha) != len(self.ogden_mu) + 1 or not all(self.ogden_alpha):
             raise SceneError(
                 f"Ogden with {len(self.ogden_alpha)} powers {self.ogden_alpha} and "
-                f"{len(self.ogden_mu)} moduli after the first: one power a term, none of them 0"
+                f"{len(self.ogden_mu)} moduli after the first: expected one power for each "
+                "term, none of them 0"
             )
         if len(self.stretches) != 2 or not 0 < self.stretches[0] < 1 < self.stretches[1]:
             raise SceneError(
-                f"stretches {self.stretches} of a law: two numbers, above 0 and below 1, above 1"
+                f"stretches {self.stretches} of a law: expected two numbers, the first between "
+                "0 and 1, the second above 1"
             )
 
     def known_to(self, law: str) -> "Coefficients":

@@ -37,28 +37,31 @@ class Material:
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
     stiffness_damping: float = quantity(0.0, "s", "Rayleigh's beta")
-    coefficients: Coefficients = part(Coefficients(), "what the law has beyond E and nu")
-    prony: Prony = quantity(Prony(), "1", "how the isochoric stress relaxes")
+    coefficients: Coefficients = part(
+        Coefficients(), "coefficients of the law in addition to E and nu"
+    )
+    prony: Prony = quantity(Prony(), "1", "relaxation of the isochoric stress")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.E) and self.E > 0):
-            raise SceneError(f"modulus E = {self.E:g} Pa: it must be positive")
+            raise SceneError(f"modulus E = {self.E:g} Pa: expected a positive number")
         if not -1 < self.nu <= 0.5:
             raise SceneError(
-                f"Poisson ratio nu = {self.nu:g}: needs -1 < nu <= 0.5; use at most 0.4999, or 0.5 "
-                "with mixed cells"
+                f"Poisson ratio nu = {self.nu:g}: expected -1 < nu <= 0.5; use at most 0.4999, "
+                "or 0.5 with mixed cells"
             )
         if self.rho is not None and not (np.isfinite(self.rho) and self.rho > 0):
-            raise SceneError(f"density rho = {self.rho:g} kg/m3: it must be positive")
+            raise SceneError(f"density rho = {self.rho:g} kg/m3: expected a positive number")
         for name, value in (("mass", self.mass_damping), ("stiffness", self.stiffness_damping)):
             if not (np.isfinite(value) and value >= 0):
-                raise SceneError(f"{name} damping {value:g}: a number >= 0")
+                raise SceneError(f"{name} damping {value:g}: expected a number >= 0")
         self.coefficients.require_known(self.law)
         if self.prony != Prony() and not self._relaxes(self.law):
             form = self.coefficients.volumetric
             raise SceneError(
-                f"law '{self.law}' ({form}) has no isochoric part that could relax: drop the Prony "
-                "series, or take neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
+                f"law '{self.law}' ({form}) has no isochoric part that can relax: remove the "
+                "Prony series, or use neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
+                "'split'"
             )
         if self.coefficients.stability == "required":
             self.require_stable()

@@ -24,7 +24,7 @@ class MaterialPoint(Meshless):
 
     def __post_init__(self) -> None:
         if self.material.incompressible:
-            raise SceneError("nu = 0.5 at a material point: it needs nu < 0.5; use nu <= 0.49999")
+            raise SceneError("nu = 0.5 at a material point: expected nu < 0.5; use nu <= 0.49999")
 
     @property
     def materials(self) -> tuple[Material, ...]:

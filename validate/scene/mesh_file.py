@@ -50,17 +50,17 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
     suffix = path.suffix.lower()
     if suffix in FOREIGN and unit is None:
         raise SceneError(
-            f"{path.name}: no unit of length; say it: specimen.mesh_unit or body.unit=mm"
+            f"{path.name}: no unit of length; give it: specimen.mesh_unit or body.unit=mm"
         )
     if suffix in FOREIGN:
         return read_foreign(path, unit or "").mesh
     if suffix in SURFACES:
         raise SceneError(
-            f"{path.name}: a surface; fill it first: validate body {path.name} --unit mm "
-            "-o body.npz"
+            f"{path.name}: the file is a surface; fill it first: validate body {path.name} "
+            "--unit mm -o body.npz"
         )
     if unit is not None and metres(path.name, unit) != 1.0:
-        raise SceneError(f"{path.name}: npz is in metres, not in {unit}; leave the unit away")
+        raise SceneError(f"{path.name}: npz is in metres, not in {unit}; omit the unit")
     try:
         arrays = npz_arrays(path, MAX_BYTES)
     except RecordingError as error:

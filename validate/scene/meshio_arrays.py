@@ -18,8 +18,8 @@ _FLAT = {"triangle": 3, "quad": 4, "triangle6": 3, "quad8": 4, "quad9": 4}  # co
 _NOT_SOLID = {*_FLAT, "line", "line3", "vertex"}
 _LABEL = "gmsh:physical"
 SURFACE = (
-    "a surface of VTK (PolyData); a closed one is filled from STL: save it as one (ParaView: File, "
-    "Save Data; pyvista: mesh.save('FILE.stl')), then validate body FILE.stl --unit mm"
+    "a surface of VTK (PolyData); save a closed surface as STL (ParaView: File, Save Data; "
+    "pyvista: mesh.save('FILE.stl')), then validate body FILE.stl --unit mm"
 )
 
 
@@ -77,7 +77,9 @@ def read_quietly(path: Path, name: str) -> Any:
     with open_file(path) as file:
         head = file.read(4096)
     if b"vtkLZ4DataCompressor" in head:
-        raise SceneError("packed by LZ4, which is not unpacked; save it with zlib or unpacked")
+        raise SceneError(
+            "compressed by LZ4, which is not supported; save it with zlib or uncompressed"
+        )
     if b"DATASET POLYDATA" in head.upper():
         raise SceneError(SURFACE)
     said = io.StringIO()
@@ -98,6 +100,6 @@ def _require_version(path: Path) -> None:
     plain = version.rstrip("0").rstrip(".") if "." in version else version  # netgen's 2.000000
     if gmsh and plain not in _READ:
         raise SceneError(
-            f"Gmsh's format {version}; 2.2 and 4.1 are read: save it again, "
-            "gmsh FILE -0 -format msh41 -o NEW.msh"
+            f"Gmsh's format {version} is not supported; save it as 2.2 or 4.1: gmsh FILE -0 "
+            "-format msh41 -o NEW.msh"
         )

@@ -71,7 +71,9 @@ def point_of(text: str) -> tuple[float, ...]:
     found = [split(part) for part in text.split(",")]
     units = {bool(f[1]) for f in found if f and f[0] != 0}
     if len(found) != 3 or len(units) > 1:
-        raise SceneError(f"point '{text[:40]}': three lengths, each with its unit, as 10mm,0,20mm")
+        raise SceneError(
+            f"point '{text[:40]}': expected three lengths with their units, for example 10mm,0,20mm"
+        )
     return tuple(_metres(part) for part in text.split(","))
 
 
@@ -103,8 +105,8 @@ def _require_at(text: str, low: tuple[float, ...], high: tuple[float, ...], mesh
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     if away > size:
         raise SceneError(
-            f"place '{text[:60]}': {1e3 * away:.3g} mm off a body of {1e3 * size:.3g} mm; a number "
-            "without a unit is in metres, write 10mm"
+            f"place '{text[:60]}': {1e3 * away:.3g} mm away from a body of {1e3 * size:.3g} "
+            "mm; a number without a unit is in metres, write 10mm"
         )
 
 
@@ -127,7 +129,7 @@ def _metres(text: str) -> float:
     found = split(text)
     value = in_si(found[0], found[1] or "m", "m") if found else None
     if value is None:
-        raise SceneError(f"'{text[:40]}': no length; as 20mm or 0.02")
+        raise SceneError(f"'{text[:40]}': expected a length, for example 20mm or 0.02")
     return value
 
 

@@ -21,20 +21,20 @@ class Prony:
     g: tuple[float, ...] = quantity((), "1", "moduli of the branches over the relaxed one")
     tau: tuple[float, ...] = quantity((), "s", "relaxation times of the branches")
     statics: Literal["relaxed", "instantaneous"] = quantity(
-        "relaxed", "1", "the limit that statics stand for: after long, or at once"
+        "relaxed", "1", "limit that statics use: long-term or instantaneous"
     )
 
     def __post_init__(self) -> None:
         numbers = np.array([*self.g, *self.tau])
         if len(self.g) != len(self.tau):
             raise SceneError(
-                f"Prony series of {len(self.g)} moduli and {len(self.tau)} times: one of each a "
-                "branch"
+                f"Prony series of {len(self.g)} moduli and {len(self.tau)} times: expected one "
+                "of each for every branch"
             )
         if not (np.isfinite(numbers).all() and (numbers > 0).all()):
             raise SceneError(
-                f"Prony series g = {self.g}, tau = {self.tau} s: all must be positive, or a branch "
-                "gives energy"
+                f"Prony series g = {self.g}, tau = {self.tau} s: expected positive numbers, "
+                "otherwise a branch creates energy"
             )
 
     @property

@@ -38,7 +38,7 @@ def ogden(
     Raises `SceneError` for another number of moduli than of powers.
     """
     if len(mu) != len(alpha) or not mu:
-        raise SceneError(f"Ogden: {len(mu)} moduli for {len(alpha)} powers; give one a term")
+        raise SceneError(f"Ogden: {len(mu)} moduli for {len(alpha)} powers; give one for each term")
     shear = sum(m * a for m, a in zip(mu, alpha, strict=True)) / 2
     more_terms = Coefficients(ogden_mu=tuple(mu[1:]), ogden_alpha=tuple(alpha))
     return _rubber("ogden", shear, nu, more_terms, volumetric, more)

@@ -75,7 +75,7 @@ class Drive:
     def __post_init__(self) -> None:
         starts = [t for t, _ in self.speeds]
         if not all(np.isfinite(v) for _, v in self.speeds) or starts != sorted(starts):
-            raise SceneError(f"drive '{self.name}': speeds must be finite, their times rising")
+            raise SceneError(f"drive '{self.name}': expected finite speeds and increasing times")
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,8 @@ class Mass:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass > 0):
             raise SceneError(
-                f"mass '{self.name}': {self.mass:g} kg; give one above 0, or drop the part"
+                f"mass '{self.name}': {self.mass:g} kg; expected a mass above 0; otherwise "
+                "remove the part"
             )
 
 
@@ -172,7 +173,9 @@ class Foundation:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.stiffness) and self.stiffness >= 0):
-            raise SceneError(f"foundation stiffness {self.stiffness:g} N/m3: a number >= 0")
+            raise SceneError(
+                f"foundation stiffness {self.stiffness:g} N/m3: expected a number >= 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ class Membrane:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.thickness) and self.thickness > 0):
-            raise SceneError(f"membrane thickness {self.thickness:g} m: a number above 0")
+            raise SceneError(f"membrane thickness {self.thickness:g} m: expected a number above 0")
 
 
 @dataclass(frozen=True)
@@ -233,7 +236,7 @@ class Scene:
         own = tuple(d for d in self.drives if d.follows is None)
         object.__setattr__(self, "drives", (*own, *(d for p in self.tracked for d in _drives(p))))
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
-            raise SceneError("nodal mean dilatation is for linear elements; use order 1")
+            raise SceneError("nodal mean dilatation needs linear elements; use order 1")
         if self.mesh.dimension == 2 and (
             self.dilatation == "nodal_mean" or self.foundations or self.membranes
         ):
@@ -241,20 +244,20 @@ class Scene:
         self._check_cells()
         self._check_incompressible()
         if self.dilatation == "nodal_mean" and self.regions:
-            raise SceneError("nodal mean dilatation is for one material; drop the regions")
+            raise SceneError("nodal mean dilatation supports one material; remove the regions")
         for region in self.regions:
             self._check_region(region)
             if (region.material.law == "linear") != (self.material.law == "linear"):
                 raise SceneError(
                     f"region '{region.name}' has law '{region.material.law}', the body "
-                    f"'{self.material.law}': take linear laws alone, or none"
+                    f"'{self.material.law}': use linear laws only, or no linear law"
                 )
         for material in self.materials:
             material.require_stable()
         if self.force_unit not in ("N", *SYMBOLIC):
             raise SceneError(f"forces in '{self.force_unit}': N, or {', '.join(SYMBOLIC)}")
         if self.copies < 1:
-            raise SceneError(f"{self.copies} copies of the mesh: at least 1")
+            raise SceneError(f"{self.copies} copies of the mesh: expected at least 1")
         self._check_places()
 
     def _check_places(self) -> None:
@@ -268,8 +271,8 @@ class Scene:
         for place in sheets:
             if kind_of(place) != "faces":
                 raise SceneError(
-                    f"a foundation, membrane or pressure on {kind_of(place)}: it covers an area; "
-                    "choose faces"
+                    f"a foundation, membrane or pressure on {kind_of(place)}; it needs an "
+                    "area: choose faces"
                 )
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
@@ -290,11 +293,11 @@ class Scene:
         """What bricks cannot have, and plane state and thickness, which are for 2-D meshes."""
         flat, kind = self.mesh.dimension == 2, self.mesh.kind
         if self.mesh.bricks and self.dilatation == "nodal_mean":
-            raise SceneError(f"nodal mean dilatation is for simplices, not {kind}; use 'mixed'")
+            raise SceneError(f"nodal mean dilatation supports simplices, not {kind}; use 'mixed'")
         if self.dilatation == "mixed" and (kind in ("tri3", "tet4") or self.plane == "stress"):
             raise SceneError(
-                f"mixed dilatation is for hexahedra and quadratic simplices in 3-D or plane strain,"
-                f" not {kind} in plane {self.plane}; use 'nodal_mean' or order 2"
+                "mixed dilatation supports hexahedra and quadratic simplices in 3-D or plane "
+                f"strain, not {kind} in plane {self.plane}; use 'nodal_mean' or order 2"
             )
         if self.mesh.bricks and not flat and (self.foundations or self.membranes or self.cavities):
             raise SceneError(
@@ -315,14 +318,15 @@ class Scene:
             if self.dilatation != "mixed":
                 raise SceneError(
                     f"Poisson ratio nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} "
-                    "dilatation: they need nu < 0.5; use mixed cells (hexahedra or order 2, "
+                    "dilatation: expected nu < 0.5; use mixed cells (hexahedra or order 2, "
                     "dilatation 'mixed') or nu <= 0.4999"
                 )
             if material.law == "svk" or material.coefficients.volumetric == "coupled":
                 raise SceneError(
                     f"Poisson ratio nu = 0.5 with law '{material.law}' "
-                    f"({material.coefficients.volumetric}): it has no incompressible form; take "
-                    "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric 'split'"
+                    f"({material.coefficients.volumetric})has no incompressible form; use "
+                    "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
+                    "'split'"
                 )
 
     @property

@@ -170,8 +170,9 @@ class Chosen:
             nearest = int(np.argmin(away))
             at = ", ".join(f"{1e3 * x:.3g}" for x in _middles(mesh, known[[nearest]])[0])
             raise SceneError(
-                f"none of {len(known)} {self.of} is chosen by {self.where}; the nearest, at ({at}) "
-                f"mm, is {1e3 * away[nearest]:.3g} mm off: move the choice or refine the mesh"
+                f"none of {len(known)} {self.of} is chosen by {self.where}; the nearest, at "
+                f"({at}) mm, is {1e3 * away[nearest]:.3g} mm away: move the selection or "
+                "refine the mesh"
             )
         return np.asarray(known[inside])
 

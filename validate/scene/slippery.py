@@ -22,8 +22,9 @@ def resting_pins(x: Floats, one: int, other: int, place: str, finer: str) -> tup
     off, width = float(np.linalg.norm(middle - centre)), float(np.ptp(x, axis=0).max())
     if off > _OFF * width:
         raise SceneError(
-            f"{place}: no node within {1e3 * _OFF * width:.3g} mm of its middle (the nearest is "
-            f"{1e3 * off:.3g} mm off), about which the body widens; a finer mesh has one: {finer}"
+            f"{place}: no node within {1e3 * _OFF * width:.3g} mm of its middle (the nearest "
+            f"is {1e3 * off:.3g} mm away), but sliding needs one there; use a finer mesh: "
+            f"{finer}"
         )
     along, across = np.abs((x - middle)[:, one]), np.abs((x - middle)[:, other])
     far = np.flatnonzero(along >= _FAR * along.max())

@@ -52,8 +52,8 @@ def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
     if lost:
         raise SceneError(
             f"law '{law}' with {_words(law, c, mu)} loses positive energy at stretch "
-            f"{lost.stretch:.4g} ({lost.mode}): stiffness {lost.stiffness:.3g} Pa there; take "
-            "other coefficients, or say with `stretches` between which ones it is used"
+            f"{lost.stretch:.4g} ({lost.mode}): stiffness {lost.stiffness:.3g} Pa there; use "
+            "other coefficients, or give with `stretches` the range in which it is used"
         )
     if c.volumetric == "coupled":
         _require_stiff_volume(law, c, mu, kappa)
@@ -68,9 +68,9 @@ def _require_stiff_volume(law: str, c: Coefficients, mu: float, kappa: float) ->
     factor = coupled_lambda(c, mu, kappa)
     if factor < 0 and c.known_to("neo_hooke") != c:
         raise SceneError(
-            f"law '{law}' with {_words(law, c, mu)} loses positive energy in volume: the coupled "
-            f"form needs lambda - 4 C01 - 8 C20 >= 0, it is {factor:.4g} Pa; take volumetric "
-            "'split' or a Poisson ratio nearer to .5"
+            f"law '{law}' with {_words(law, c, mu)} loses positive energy in volume: the "
+            f"coupled form needs lambda - 4 C01 - 8 C20 >= 0, it is {factor:.4g} Pa; use "
+            "volumetric 'split' or a Poisson ratio nearer to .5"
         )
 
 

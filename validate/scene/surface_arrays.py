@@ -58,12 +58,14 @@ def _surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
     triangles = np.asarray(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
     if not len(triangles):
-        raise SceneError("no triangles in it: no surface")
+        raise SceneError("the file has no triangles, so it is not a surface")
     if len(triangles) > _MOST:
         raise SceneError(f"{len(triangles)} triangles, the limit is {_MOST}; simplify it")
     points = np.asarray(mesh.vertices, dtype=np.float64)
     if not np.isfinite(points).all():
-        raise SceneError(f"{int((~np.isfinite(points)).sum())} coordinates are no numbers; damaged")
+        raise SceneError(
+            f"{int((~np.isfinite(points)).sum())} coordinates are not numbers; the file is damaged"
+        )
     return points, triangles
 
 
@@ -72,7 +74,7 @@ def _within(seconds: int) -> Iterator[None]:
     """Ends a reader that hangs, as some do on a cut file; meshing may take longer."""
 
     def late(*_: object) -> None:
-        raise SceneError(f"its reader took over {seconds} s: cut or damaged")
+        raise SceneError(f"its reader took over {seconds} s; the file is truncated or damaged")
 
     signal.signal(signal.SIGALRM, late)
     signal.alarm(seconds)

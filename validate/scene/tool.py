@@ -25,7 +25,9 @@ class Needle:
 
     def __post_init__(self) -> None:
         if not np.isfinite((*self.tip, *self.axis)).all():
-            raise SceneError(f"needle '{self.name}': tip {self.tip} m, axis {self.axis}: finite")
+            raise SceneError(
+                f"needle '{self.name}': tip {self.tip} m, axis {self.axis}: expected finite numbers"
+            )
         length = float(np.linalg.norm(self.axis))
         if abs(length - 1) > _UNIT:
             raise SceneError(f"needle '{self.name}': axis of length {length:g}, needs 1")
@@ -38,7 +40,7 @@ class Needle:
 def require_usable(tools: tuple[Needle, ...], mesh: Mesh) -> None:
     """Raises `SceneError` for needles of another dimension, more than one, or on no faces."""
     if len(tools) > 1:
-        raise SceneError(f"{len(tools)} needles: one at a time")
+        raise SceneError(f"{len(tools)} needles: expected one")
     for tool in tools:
         if len(tool.tip) != mesh.dimension or len(tool.axis) != mesh.dimension:
             raise SceneError(

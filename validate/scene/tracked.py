@@ -28,7 +28,9 @@ class Prescribed:
     def __post_init__(self) -> None:
         labels = [label for label, _ in self.points]
         if not labels or len(set(labels)) < len(labels):
-            raise SceneError(f"'{self.name}': {len(labels)} tracked points, each needs a label")
+            raise SceneError(
+                f"'{self.name}': {len(labels)} tracked points; expected one label for each"
+            )
         sizes = {len(place) for _, place in self.points}
         if sizes not in ({2}, {3}):
             raise SceneError(f"'{self.name}': tracked points of {sorted(sizes)} coordinates")

@@ -44,14 +44,14 @@ def _listed(path: Path) -> list[tuple[float, Path]]:
     """Time and file of every step, in order of time."""
     text = read_bytes(path)
     if b"<!" in text.replace(b"<!--", b""):
-        raise SceneError("declares entities: no list of files needs that")
+        raise SceneError("declares XML entities, which a list of files does not need")
     try:
         sets = list(ET.fromstring(text).iter("DataSet"))
         found = sorted((float(s.attrib["timestep"]), s.attrib["file"]) for s in sets)
     except (ET.ParseError, KeyError, ValueError) as error:
-        raise SceneError(f"no list of files ({' '.join(str(error).split())[:100]})") from None
+        raise SceneError(f"not a list of files ({' '.join(str(error).split())[:100]})") from None
     if not found:
-        raise SceneError("lists no file")
+        raise SceneError("it lists no file")
     return [(t, inside(path.parent, name)) for t, name in found]
 
 

@@ -54,7 +54,9 @@ def modes_with(system: System, scheme: Newmark | ExplicitLinear) -> tuple[Floats
     """Frequencies and dampings c (r,) 1/s of all modes with the scheme's masses and damping."""
     free = system.free
     if len(free) > DENSE_LIMIT:
-        raise SceneError(f"{len(free)} unknowns: all modes of at most {DENSE_LIMIT}; coarsen it")
+        raise SceneError(
+            f"{len(free)} unknowns: all modes need at most {DENSE_LIMIT}; use a coarser mesh"
+        )
     matrices = (
         system.K,
         mass_of(system, scheme.mass),

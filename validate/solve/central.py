@@ -59,10 +59,14 @@ class CentralDifference:
     dt: float = quantity(1e-4, "s", "time step of the run")
     substeps: int = quantity(1, "1", "equal explicit steps in each")
     damping: Damping = quantity("mass", "1", "none, alpha M, or beta K too at the last half step")
-    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
-    margin: float = quantity(0.05, "1", "share of the critical step kept free")
-    watch: int = quantity(20, "1", "steps between looks at energy, det F, critical step")
-    threads: int = quantity(1, "1", "most cores to share the cells of a step, where it pays")
+    beyond_limit: Literal["refuse", "run"] = quantity(
+        "refuse", "1", "a step above the critical step"
+    )
+    margin: float = quantity(0.05, "1", "share of the critical step kept as a margin")
+    watch: int = quantity(20, "1", "steps between checks of energy, det F, critical step")
+    threads: int = quantity(
+        1, "1", "largest number of cores for the cells of a step, if they save time"
+    )
     precision: Precision = quantity("double", "1", "of the element loops: double or single")
 
     @staticmethod
@@ -93,11 +97,13 @@ class CentralDifference:
     def __post_init__(self) -> None:
         if not (self.dt > 0 and self.substeps >= 1 and self.watch >= 1):
             raise SceneError(
-                f"dt {self.dt:g} s, {self.substeps} substeps, a watch every {self.watch} steps: "
-                "all must be positive"
+                f"dt {self.dt:g} s, {self.substeps} substeps, a check every {self.watch} "
+                "steps: all must be positive"
             )
         if not 0 <= self.margin < 1:
-            raise SceneError(f"margin {self.margin:g}: a share of the critical step, 0 to 1")
+            raise SceneError(
+                f"margin {self.margin:g}: expected a share of the critical step, 0 to 1"
+            )
 
     @property
     def step(self) -> float:
@@ -130,11 +136,13 @@ class CentralDifference:
             return 0.0
         if self.damping == "mass":
             raise SceneError(
-                f"stiffness damping {max(betas):g} s has no explicit form; take damping='lagged', "
-                "or 'none' to leave all damping out"
+                f"stiffness damping {max(betas):g} s has no explicit form; take "
+                "damping='lagged', or 'none' to omit all damping"
             )
         if len(betas) > 1:
-            raise SceneError(f"lagged damping is for one stiffness damping, got {sorted(betas)} s")
+            raise SceneError(
+                f"lagged damping needs one value of stiffness damping, got {sorted(betas)} s"
+            )
         return float(betas.pop())
 
     def _rule(self, system: System, beta: float) -> CentralRule:
@@ -234,7 +242,9 @@ class CentralStepper:
             self.body.share(self.team.threads)
         if not finite:
             ratio = self.rule.dt / past.limit
-            words = f"no finite displacements after it; dt is {ratio:.3g} of the critical step"
+            words = (
+                f"the displacements are not finite after it; dt is {ratio:.3g} of the critical step"
+            )
             return replace(state, failure=("diverged", words))
         new = _worked(past, motion, inputs, work, taken)
         numbers, failure = dict(state.numbers), None

@@ -52,9 +52,13 @@ class ContactNewton:
         ("linear", *LARGE), inertia=False, cavities=False, contact=("foundations", "rigid")
     )
 
-    tolerance: float = quantity(1e-9, "1", "residual, of the forces that act; gaps, of the body")
-    max_iterations: int = quantity(40, "1", "of Newton and the sets of touching nodes in a step")
-    cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
+    tolerance: float = quantity(
+        1e-9, "1", "residual relative to the acting forces; gaps relative to the body"
+    )
+    max_iterations: int = quantity(
+        40, "1", "iterations of Newton and of the sets of touching nodes in a step"
+    )
+    cuts: int = quantity(6, "1", "number of halvings of a load step without equilibrium")
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
@@ -70,7 +74,9 @@ class ContactNewton:
         require_handled(scene, self)
         N, free = len(system.moves), system.free
         parts = candidates(system)
-        require_held(scene, system.held, _touched_rows(parts, scene), ", or let it touch at rest")
+        require_held(
+            scene, system.held, _touched_rows(parts, scene), ", or place it in contact at rest"
+        )
         node, K = free // scene.mesh.dimension, system.K[free][:, free]
         order = elimination_order(K, node, scene.mesh.nodes)
         rank = np.empty(N, dtype=np.int64)
@@ -268,8 +274,8 @@ def _singular(status: Ints, why: SceneError) -> str:
     if not touching or (status == STICK).any():
         return str(why)
     return (
-        f"it slides off: nothing holds the body but {touching} touching nodes, all of which slip; "
-        "add a support, or more friction"
+        f"the body slides off: it is held only by {touching} touching nodes, and all of them "
+        "slip; add a support, or more friction"
     )
 
 

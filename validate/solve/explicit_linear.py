@@ -55,7 +55,9 @@ class ExplicitLinear:
     )
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
     drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
-    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a step above the critical")
+    beyond_limit: Literal["refuse", "run"] = quantity(
+        "refuse", "1", "a step above the critical step"
+    )
 
     @staticmethod
     def steppings() -> tuple[Stepping, ...]:
@@ -80,7 +82,9 @@ class ExplicitLinear:
     def __post_init__(self) -> None:
         rule_of("average", self.dt)
         if self.drive_rates == "rule":
-            raise SceneError("an explicit step has no rule for drives; use drive_rates=difference")
+            raise SceneError(
+                "an explicit step does not support drive rules; use drive_rates=difference"
+            )
 
     @property
     def treatment(self) -> str:

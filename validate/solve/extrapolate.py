@@ -54,6 +54,6 @@ def require_schedule(every: int, late: int) -> None:
     """Raises `UsageError` for ticks between readings and of answers that do not fit."""
     if not (every >= 1 and 0 <= late <= every):
         raise UsageError(
-            f"a reading every {every} ticks that is answered {late} ticks later: at least 1, and "
-            "an answer no later than the next reading"
+            f"a reading every {every} ticks that is answered {late} ticks later: expected at "
+            "least 1, and an answer no later than the next reading"
         )

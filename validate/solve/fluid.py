@@ -70,10 +70,13 @@ class ExactPressure:
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:
-            raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
+            raise SceneError(
+                f"volume ratio {self.volume_ratio:g}: expected a positive fluid volume"
+            )
         if self.bulk_modulus is not None and not 0 < self.bulk_modulus < math.inf:
             raise SceneError(
-                f"bulk modulus {self.bulk_modulus:g} Pa: a fluid's is positive, water's 2.2 GPa"
+                f"bulk modulus {self.bulk_modulus:g} Pa: expected a positive value; that of "
+                "water is 2.2 GPa"
             )
 
     def prepare(self, system: System) -> Stepper:
@@ -104,8 +107,9 @@ class ElasticPressure:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.preset) and math.isfinite(self.stiffness) and self.stiffness):
             raise SceneError(
-                f"preset {self.preset:g} Pa, stiffness {self.stiffness:g} Pa: both finite, the "
-                "stiffness not zero (a constant pressure is prescribed: PulsePressure)"
+                f"preset {self.preset:g} Pa, stiffness {self.stiffness:g} Pa: expected finite "
+                "values and a stiffness other than zero (for a constant pressure use "
+                "PulsePressure)"
             )
 
     def prepare(self, system: System) -> Stepper:
@@ -130,10 +134,11 @@ class Settling(LinearStepper):
             return self._state(k, z, updates, ratios=ratios)
         found = ", ".join(f"{P:.4g}" for P in z[self.responses.drives + 1 :])
         why = (
-            f"pressures {found} Pa are unstable: they grow faster with the volume than the body's"
+            f"pressures {found} Pa are unstable: they rise faster with the volume than the "
+            "pressure of the body"
             if softness < 0
-            else f"pressures {found} Pa are a spurious root: between zero and there the volume "
-            "falls as pressure grows; check the gain's sign and the load"
+            else f"pressures {found} Pa are a spurious root: between zero and this pressure "
+            "the volume falls as pressure rises; check the sign of the gain and the load"
         )
         return self._state(k, z, updates, ("not_converged", why), ratios)
 
@@ -164,7 +169,10 @@ class ExactStepper(Settling):
         start = float(state.inner.z[p - 1])
         root = root_of(cubic(form, z, p), V0, start, self.ratio, self.softness)
         z[p] = root.P
-        why: tuple[Ending, str] = ("not_converged", f"no pressure keeps the volume: {root.failed}")
+        why: tuple[Ending, str] = (
+            "not_converged",
+            f"no pressure keeps the volume constant: {root.failed}",
+        )
         ratio = np.array([root.volume / V0])
         return self._state(state.k + 1, z, root.updates, why if root.failed else None, ratio)
 
@@ -184,5 +192,8 @@ class ExactStepper(Settling):
             if np.abs(step).max() <= 1e-14 * np.abs(z[k + 1 :]).max():
                 return self._settled(state.k + 1, z, updates + 1, softness=self.softness)
         worst = float(np.abs(error / scale).max())
-        why = f"no pressure keeps the volume: error {worst:.2%} after {NEWTON_STEPS} Newton steps"
+        why = (
+            f"no pressure keeps the volume constant: error {worst:.2%} after {NEWTON_STEPS} "
+            "Newton steps"
+        )
         return self._state(state.k + 1, z, NEWTON_STEPS, ("not_converged", why))

@@ -38,9 +38,9 @@ class FromEquilibrium:
     handles: ClassVar[Handles] = replace(LARGE_DYNAMICS, viscous=False)
 
     dt: float = quantity(0.005, "s", "time step")
-    rule: RateRule = quantity("average", "1", "how v and a follow u")
-    tolerance: float = quantity(1e-7, "1", "residual, of the forces that act")
-    max_iterations: int = quantity(20, "1", "of Newton in a step")
+    rule: RateRule = quantity("average", "1", "how v and a are derived from u")
+    tolerance: float = quantity(1e-7, "1", "residual relative to the acting forces")
+    max_iterations: int = quantity(20, "1", "Newton iterations in a step")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
     preload: tuple[float, ...] = quantity((), "1", "inputs at which the body rests at 0 s, SI")
 

@@ -81,32 +81,34 @@ def require_handled(scene: AnyScene, settings: Handling) -> None:
 def _refused(handles: Handles, scene: AnyScene) -> tuple[str, str] | None:
     """The first part of a scene that is not handled, as a key of `INSTEAD` and in words."""
     if not isinstance(scene, Scene | MaterialPoint):
-        return "rigid_body", "needs a body that deforms"
+        return "rigid_body", "needs a deformable body"
     law, point = scene.material.law, isinstance(scene, MaterialPoint)
     if not isinstance(scene, MaterialPoint):  # the first that is not handled, or the body's own
         laws = (law, *(r.material.law for r in scene.regions))
         law = next((x for x in laws if x not in handles.law), law)
     if handles.mesh == point:
-        return ("point", "needs a mesh") if point else ("mesh", "solves a material point alone")
+        return ("point", "needs a mesh") if point else ("mesh", "solves only a material point")
     if law not in handles.law:
         return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
     if any(m.prony.g for m in scene.materials) and not handles.viscous:
-        return "viscous", "remembers no stress: it takes no Prony series"
+        return "viscous", "does not support a Prony series"
     if any(m.incompressible for m in scene.materials) and not handles.incompressible:
-        return "incompressible", "solves nu <= 0.4999, not 0.5"
+        return "incompressible", "solves nu <= 0.4999 only, not 0.5"
     if isinstance(scene, MaterialPoint):
         return None
     if scene.cavities and not handles.cavities:
-        return "cavities", "knows no fluid in cavities; drop them from the scene"
+        return "cavities", "does not support fluid in cavities; remove them from the scene"
     if scene.loads and not handles.loads:
-        return "loads", f"knows no loads, the scene has {len(scene.loads)}"
+        return "loads", f"does not support loads, the scene has {len(scene.loads)}"
     if not handles.drives and (scene.drives or not scene.loads):
         counts = f"{len(scene.drives)} drives and {len(scene.loads)} loads"
-        return "drives", f"needs loads alone, the scene has {counts}"
+        return "drives", f"needs a scene with loads only, the scene has {counts}"
     if scene.membranes and "membranes" not in handles.contact:
-        return "membranes", "knows no membranes: they are linear only"
+        return "membranes", "does not support membranes: they are linear only"
     if scene.contacts and "rigid" not in handles.contact:
-        return "rigid", f"knows no rigid bodies that touch, the scene has {len(scene.contacts)}"
+        return "rigid", (
+            f"does not support contact with rigid bodies, the scene has {len(scene.contacts)}"
+        )
     if scene.tools and "needle" not in handles.contact:
-        return "needle", "knows no needle whose path is given"
+        return "needle", "does not support a needle with a prescribed path"
     return None

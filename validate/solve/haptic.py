@@ -52,7 +52,7 @@ class TickTimes:
     def __post_init__(self) -> None:
         given = checked(self.seconds, "tick times [s]", (None,), error=UsageError)
         if not len(given):
-            raise UsageError("tick times: 0 ticks, nothing to tell")
+            raise UsageError("tick times: 0 ticks, so there is nothing to report")
         object.__setattr__(self, "seconds", given)
 
     def missed(self, deadline: float) -> int:

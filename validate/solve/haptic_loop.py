@@ -43,7 +43,7 @@ _AXES = "xyz"
 class HapticLoop:
     """Settings. `every` 1 and `late` 0: the body answers every tick, at once.
 
-    `margin` is the share of the critical step kept free for how the limit falls as the body
+    `margin` is the share of the critical step kept as a margin for how the limit falls as the body
     deforms; `damping` and `watch` (of answers) are those of `CentralDifference`, and the spring's
     those of `AsyncRegions`. `limit` N: no larger force is given to the hand.
     """
@@ -56,33 +56,39 @@ class HapticLoop:
     every: int = quantity(10, "1", "ticks between two readings of the probe by the simulation")
     late: int = quantity(10, "1", "ticks from a reading to its answer")
     extrapolation: Extrapolation = quantity("linear", "1", "hold, linear, quadratic")
-    extrapolates: Literal["force", "place"] = quantity("force", "1", "what is carried on in time")
-    background: bool = quantity(False, "1", "simulate in a thread of its own")
-    margin: float = quantity(0.25, "1", "share of the critical step kept free")
+    extrapolates: Literal["force", "place"] = quantity(
+        "force", "1", "quantity that is extrapolated in time"
+    )
+    background: bool = quantity(False, "1", "simulate in a separate thread")
+    margin: float = quantity(0.25, "1", "share of the critical step kept as a margin")
     damping: Damping = quantity("mass", "1", "none, alpha M, or beta K too at the last half step")
-    watch: int = quantity(20, "1", "answers between looks at energy, det F, critical step")
+    watch: int = quantity(20, "1", "answers between checks of energy, det F, critical step")
     spring: float = quantity(1000.0, "N/m", "between probe and contact")
-    reach: float = quantity(2e-3, "m", "distance at which the probe takes hold")
-    pad: float = quantity(0.01, "m", "surface nodes that near to the contact share the spring")
-    grip: float | None = quantity(0.0, "N", "pull at which the body lets go; none: never")
+    reach: float = quantity(2e-3, "m", "distance at which the probe makes contact")
+    pad: float = quantity(
+        0.01, "m", "distance from the contact within which surface nodes share the spring"
+    )
+    grip: float | None = quantity(0.0, "N", "pulling force at which contact ends; none: never")
     slides: bool = quantity(False, "1", "the contact moves to the node nearest to the probe")
-    limit: float = quantity(5.0, "N", "largest force given to the hand")
+    limit: float = quantity(5.0, "N", "largest force on the hand")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.dt) and self.dt > 0):
-            raise SceneError(f"tick of {self.dt:g} s: a finite number above 0")
+            raise SceneError(f"tick of {self.dt:g} s: expected a finite number above 0")
         require_schedule(self.every, self.late)
         if not 0 <= self.margin < 1:
-            raise SceneError(f"margin {self.margin:g}: a share of the critical step, 0 to 1")
+            raise SceneError(
+                f"margin {self.margin:g}: expected a share of the critical step, 0 to 1"
+            )
         if not (self.spring > 0 and self.reach > 0 and self.pad >= 0):
             raise SceneError(
-                f"spring {self.spring:g} N/m, reach {self.reach:g} m, pad {self.pad:g} m: a spring "
-                "and a reach above 0, no pad below it"
+                f"spring {self.spring:g} N/m, reach {self.reach:g} m, pad {self.pad:g} m: "
+                "expected spring and reach above 0, and a pad of 0 or more"
             )
         if not (np.isfinite(self.limit) and self.limit > 0):
-            raise SceneError(f"force limit {self.limit:g} N: a finite number above 0")
+            raise SceneError(f"force limit {self.limit:g} N: expected a finite number above 0")
         if not (self.grip is None or self.grip >= 0):
-            raise SceneError(f"grip {self.grip:g} N: 0 or above, or none")
+            raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a scene without one probe, with drives, or held where it may be
@@ -91,8 +97,8 @@ class HapticLoop:
         require_handled(scene, self)
         if len(scene.tools) != 1 or scene.drives:
             raise SceneError(
-                f"{len(scene.tools)} probes and {len(scene.drives)} drives: the haptic loop takes "
-                "one probe and no drive"
+                f"{len(scene.tools)} probes and {len(scene.drives)} drives: the haptic loop "
+                "needs one probe and no drive"
             )
         tool, bare = scene.tools[0], replace(system, scene=replace(scene, tools=()))
         touchable = TouchableBody(bare, _free_surface(system, tool))

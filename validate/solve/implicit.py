@@ -45,10 +45,10 @@ class NewtonDynamics:
     handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(0.01, "s", "time step")
-    rule: RateRule = quantity("average", "1", "how v and a follow u")
+    rule: RateRule = quantity("average", "1", "how v and a are derived from u")
     mass: Literal["lumped", "consistent"] = quantity("lumped", "1", "mass matrix")
-    tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
-    max_iterations: int = quantity(20, "1", "of Newton in a step")
+    tolerance: float = quantity(1e-9, "1", "residual relative to the acting forces")
+    max_iterations: int = quantity(20, "1", "Newton iterations in a step")
 
     @staticmethod
     def steppings() -> tuple[Stepping, ...]:
@@ -201,7 +201,7 @@ class ImplicitStepper:
                 return replace(state, failure=("not_converged", str(vanished)))
             taken = self._upright(u, correction, move)
             if taken is None:
-                words = f"a correction inverts cells even at 1/{2**_HALVINGS} of its size"
+                words = f"a Newton correction inverts cells even at 1/{2**_HALVINGS} of its size"
                 return replace(state, failure=("not_converged", words))
             pressures = self.body.extrapolated(u, taken)
             u = u + taken

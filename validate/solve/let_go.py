@@ -30,8 +30,8 @@ class LetGo:
     handles: ClassVar[Handles] = LARGE_DYNAMICS
 
     dt: float = quantity(0.005, "s", "time step of the swing")
-    tolerance: float = quantity(1e-7, "1", "residual, of the forces that act")
-    max_iterations: int = quantity(20, "1", "of Newton in a step")
+    tolerance: float = quantity(1e-7, "1", "residual relative to the acting forces")
+    max_iterations: int = quantity(20, "1", "Newton iterations in a step")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         """At t (nt,) s, steps of dt from 0 s and at last the instant of rest, under inputs (nt, l).
@@ -42,8 +42,8 @@ class LetGo:
         steps = np.diff(t, prepend=0.0)
         if len(t) < 2 or np.abs(steps[:-1] - self.dt).max() > 1e-6 * self.dt:
             raise SceneError(
-                f"LetGo takes steps of dt = {self.dt:g} s and a last instant of rest; the times "
-                "are others"
+                f"LetGo takes steps of dt = {self.dt:g} s after a last instant of rest; the "
+                "given times differ"
             )
         start = perf_counter()
         swing = NewtonDynamics(

@@ -79,7 +79,7 @@ def condensed(responses: Responses) -> Floats:
     scene = responses.scene
     sets = [*(c.facets for c in scene.cavities), *(d.facets for d in scene.drives)]
     if not sets:
-        raise SceneError("scene without drive and cavity: nothing moves")
+        raise SceneError("scene without drive and cavity: nothing moves; add one")
     nodes = np.unique(np.concatenate([nodes_of(scene.mesh, place) for place in sets]))
     kept = responses.fields[:, nodes].reshape(len(responses.fields), -1).T
     forces = responses.reactions.reshape(-1, kept.shape[1])

@@ -190,8 +190,8 @@ def solver_of(
         return kind(J, tolerance)
     if J.shape[0] > DENSE_LIMIT:
         raise SceneError(
-            f"{name} with {J.shape[0]} unknowns: at most {DENSE_LIMIT} as a dense matrix; "
-            "use solver = prefactored"
+            f"{name} with {J.shape[0]} unknowns: a dense matrix may have at most "
+            f"{DENSE_LIMIT}; use solver = prefactored"
         )
     dense = J.toarray()
     if name == "gaussian_elimination":

@@ -46,7 +46,7 @@ def locking_factor(scene: Scene, probe: str) -> float:
     ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
     length = float(reference @ reference)
     if length == 0:
-        raise SceneError(f"locking at '{probe}': it does not move under the load")
+        raise SceneError(f"locking at '{probe}': the probe does not move under the load")
     return float(ours @ reference) / length
 
 

@@ -88,7 +88,9 @@ def march(
     times: it is none for real time.
     """
     if len(t) == 0 or len(at) == 0:
-        raise ComparisonError(f"{method}: {len(t)} steps and {len(at)} output frames; none to do")
+        raise ComparisonError(
+            f"{method}: {len(t)} steps and {len(at)} output frames; both must be above 0"
+        )
     smooths = isinstance(stepper, Smoothing) and stepper.smooth
     frames = frozenset(at.tolist())
     shown = _smoothed(stepper, inputs, frames) if smooths else _filtered
@@ -199,7 +201,7 @@ def _run_away(stepper: Stepper, state: State, rows: Rows | None, *, shown: bool)
     size = float(np.ptp(stepper.scene.mesh.nodes, axis=0).max())
     if found <= RUNAWAY * size:
         return ""
-    words = "no finite number" if not np.isfinite(found) else f"{found:.3g} m"
+    words = "not a finite number" if not np.isfinite(found) else f"{found:.3g} m"
     return f"a displacement of {words}, above {RUNAWAY:g} times the body's {size:.3g} m"
 
 

@@ -46,7 +46,7 @@ class Modal:
     propagate: Literal["linear", "constant", RuleName] = quantity(
         "linear", "1", "exact for a force linear or constant in a step, or a rule"
     )
-    static_correction: bool = quantity(True, "1", "modes left out answer at once")
+    static_correction: bool = quantity(True, "1", "omitted modes respond statically")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0, as in `Newmark`")
     rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
 
@@ -66,7 +66,7 @@ class Modal:
     def __post_init__(self) -> None:
         rule_of("average", self.dt, self.rho_inf)
         if self.modes is not None and self.modes < 1:
-            raise SceneError(f"{self.modes} modes: at least 1")
+            raise SceneError(f"{self.modes} modes: expected at least 1")
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for laws at large strain, cavities, damping that couples modes."""

@@ -58,24 +58,29 @@ class NeedleLoop:
         contact=("foundations", "membranes", "needle"),
     )  # fmt: skip
 
-    update: Literal["exact", "proportional"] = quantity("exact", "1", "how the pressure is found")
-    gain: float | None = quantity(None, "Pa", "Kp; none: tuned on the volume's response")
-    tolerance: float = quantity(1e-3, "1", "|1 - V/V0| at which the paper's law stops")
+    update: Literal["exact", "proportional"] = quantity("exact", "1", "method for the pressure")
+    gain: float | None = quantity(None, "Pa", "Kp; none: tuned to the response of the volume")
+    tolerance: float = quantity(1e-3, "1", "|1 - V/V0| at which the law of the paper stops")
     most: int = quantity(20, "1", "updates of the pressure in a tick")
-    at: Literal["point", "node"] = quantity("point", "1", "what of the surface meets the tip")
-    imposes: Literal["all", "axis"] = quantity("all", "1", "local axes along which the tip holds")
-    grip: float | None = quantity(0.0, "N", "pull at which the body lets go; none: never")
-    force: Literal["consistent", "reaction"] = quantity("consistent", "1", "what the hand feels")
-    limit: float = quantity(10.0, "N", "largest force given to the hand")
+    at: Literal["point", "node"] = quantity(
+        "point", "1", "part of the surface that touches the tip"
+    )
+    imposes: Literal["all", "axis"] = quantity(
+        "all", "1", "local axes along which the tip is attached"
+    )
+    grip: float | None = quantity(0.0, "N", "pulling force at which contact ends; none: never")
+    force: Literal["consistent", "reaction"] = quantity("consistent", "1", "force on the hand")
+    limit: float = quantity(10.0, "N", "largest force on the hand")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.limit) and self.limit > 0):
-            raise SceneError(f"force limit {self.limit:g} N: a finite number above 0")
+            raise SceneError(f"force limit {self.limit:g} N: expected a finite number above 0")
         if not (self.grip is None or self.grip >= 0):
-            raise SceneError(f"grip {self.grip:g} N: 0 or above, or none")
+            raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
         if self.gain is not None and not 0 < self.gain < np.inf:
             raise SceneError(
-                f"gain {self.gain:g} Pa: a gain below zero drives the volume away, 0 does nothing"
+                f"gain {self.gain:g} Pa: expected a gain above 0; a negative gain diverges and "
+                "0 has no effect"
             )
 
     def prepare(self, system: System) -> Stepper:
@@ -85,11 +90,14 @@ class NeedleLoop:
         require_handled(scene, self)
         if len(scene.tools) != 1 or len(scene.cavities) > 1:
             raise SceneError(
-                f"{len(scene.tools)} needles and {len(scene.cavities)} cavities: NeedleLoop takes "
-                "one needle and at most one cavity"
+                f"{len(scene.tools)} needles and {len(scene.cavities)} cavities: NeedleLoop "
+                "needs one needle and at most one cavity"
             )
         if scene.drives:
-            raise SceneError(f"{len(scene.drives)} drives beside a needle: NeedleLoop takes none")
+            raise SceneError(
+                f"{len(scene.drives)} drives together with a needle: NeedleLoop "
+                "accepts no drives; remove them"
+            )
         tool = scene.tools[0]
         _require_outside(scene, tool)
         facets = facets_of(scene.mesh, tool.facets)
@@ -342,7 +350,7 @@ class NeedleStepper:
             found += [tick.P, root.volume / V0 if root else 1.0]
         failure: tuple[Ending, str] | None = None
         if root is not None and root.failed:
-            why = f"needle '{name}': no pressure keeps the volume: {root.failed}"
+            why = f"needle '{name}': no pressure keeps the volume constant: {root.failed}"
             failure = ("not_converged", why)
         numbers = dict(zip(self.units, found, strict=True))
         return State(k, tick, failure, root.updates if root else 0, numbers)

@@ -54,15 +54,17 @@ class Newmark:
     handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
     dt: float = quantity(0.002, "s", "time step")
-    rule: RuleName = quantity("average", "1", "how v and a follow u within a step")
+    rule: RuleName = quantity("average", "1", "how v and a are derived from u within a step")
     a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
-    solver: SolverName = quantity("prefactored", "1", "of the one linear system a step")
+    solver: SolverName = quantity("prefactored", "1", "solver of the linear system of a step")
     mass: MassName = quantity("consistent", "1", "mass matrix")
     rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
     drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
     damping_terms: DampingTerms = quantity("full", "1", "alpha M + beta K, or alpha M alone")
     update: UpdateName = quantity("newmark", "1", "of u: Newmark's, or as paper 002 prints it")
-    tolerance: float = quantity(TOLERANCE, "1", "iterative solvers: residual, of the right side")
+    tolerance: float = quantity(
+        TOLERANCE, "1", "iterative solvers: residual relative to the right-hand side"
+    )
 
     @staticmethod
     def steppings() -> tuple[Stepping, ...]:
@@ -116,9 +118,14 @@ class Newmark:
     def __post_init__(self) -> None:
         rule_of(self.rule, self.dt, self.rho_inf)
         if self.update == "misprinted" and self.rule != "average":
-            raise SceneError(f"the misprinted update is paper 002's average rule, not {self.rule}")
+            raise SceneError(
+                "the misprinted update belongs to the average rule of paper 002, "
+                f"not to {self.rule}"
+            )
         if not 0 < self.tolerance < 1:
-            raise SceneError(f"tolerance {self.tolerance:g} of the residual: a number in 0..1")
+            raise SceneError(
+                f"tolerance {self.tolerance:g} of the residual: expected a number in 0..1"
+            )
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` for a law at large strain, cavities, or missing densities."""

@@ -57,9 +57,11 @@ class Rule:
 def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
     """The rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside 0..1."""
     if not (np.isfinite(dt) and dt > 0):
-        raise SceneError(f"time step {dt:g} s: it must be positive")
+        raise SceneError(f"time step {dt:g} s: expected a positive number")
     if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
-        raise SceneError(f"time step {dt:g} s: its square is beyond a double; take at least 1e-150")
+        raise SceneError(
+            f"time step {dt:g} s: its square underflows in double precision; take at least 1e-150"
+        )
     if not 0 <= rho_inf <= 1:
         raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
     if name == "average":
@@ -162,8 +164,9 @@ def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerm
     fastest = (C.diagonal()[free] / mass_of(system, mass).diagonal()[free]).max()
     if rule.am != rule.af and fastest * rule.h > 1:
         raise SceneError(
-            f"generalised alpha from a0 = equilibrium: damping is over in 1/{fastest * rule.h:.3g} "
-            "of a step and would leave an offset; use a0 = zero, a smaller dt or average"
+            "generalised alpha from a0 = equilibrium: damping acts within "
+            f"1/{fastest * rule.h:.3g} of a step and would leave an offset; use a0 = zero, a "
+            "smaller dt or rule average"
         )
 
 

@@ -47,13 +47,19 @@ class StaticNewton:
 
     handles: ClassVar[Handles] = LARGE_STATICS
 
-    fluid: Literal["exact", "none"] = quantity("exact", "1", "keeps its volume, or is not there")
+    fluid: Literal["exact", "none"] = quantity(
+        "exact", "1", "fluid of constant volume, or no fluid"
+    )
     volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
-    tolerance: float = quantity(1e-9, "1", "residual, of the forces that act")
-    max_iterations: int = quantity(25, "1", "of Newton in a load step")
-    max_cuts: int = quantity(6, "1", "times that a load step without equilibrium is halved")
-    contraction: float = quantity(0.2, "1", "of the error, that keeps a factorisation")
-    watch: float = quantity(0.01, "1", "motion between looks at the inertia, of the body's size")
+    tolerance: float = quantity(1e-9, "1", "residual relative to the acting forces")
+    max_iterations: int = quantity(25, "1", "Newton iterations in a load step")
+    max_cuts: int = quantity(6, "1", "number of halvings of a load step without equilibrium")
+    contraction: float = quantity(
+        0.2, "1", "ratio of successive errors up to which a factorisation is kept"
+    )
+    watch: float = quantity(
+        0.01, "1", "motion between checks of the inertia, relative to the body's size"
+    )
 
     @staticmethod
     def candidates(asked: Asked) -> tuple[Rival, ...]:
@@ -66,7 +72,9 @@ class StaticNewton:
 
     def __post_init__(self) -> None:
         if not self.volume_ratio > 0:
-            raise SceneError(f"volume ratio {self.volume_ratio:g}: a fluid volume must be positive")
+            raise SceneError(
+                f"volume ratio {self.volume_ratio:g}: expected a positive fluid volume"
+            )
         if not (self.tolerance > 0 and self.max_iterations >= 1 and self.max_cuts >= 0):
             raise SceneError(
                 f"Newton with tolerance {self.tolerance:g}, {self.max_iterations} iterations, "
@@ -78,7 +86,7 @@ class StaticNewton:
         scene = system.scene
         require_handled(scene, self)
         if not (scene.cavities or scene.inputs):
-            raise SceneError("scene without drive, load and cavity: nothing moves")
+            raise SceneError("scene without drive, load and cavity: nothing moves; add one")
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
         rest = _rest(problem)
         return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
@@ -321,11 +329,13 @@ def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:
     """The outcome of a step whose smallest load step failed, with the last good load."""
     reached = f"{load} ({100 * done:.3g} % of the step)"
     if "validity" in failed.why:
-        return failed.ending, f"{failed.why}; last good load {reached}; take a law for such strains"
+        return failed.ending, (
+            f"{failed.why}; last good load {reached}; use a law that is valid for such strains"
+        )
     if failed.negative:
         words = f"tangent not positive definite ({failed.negative} negative pivots)"
         why = f"no static solution was found beyond {reached}: {words}; {failed.why}"
-        return "not_converged", f"{why}; if the body snaps there, go on with NewtonDynamics"
+        return "not_converged", f"{why}; if the body snaps through there, use NewtonDynamics"
     helps = "more cuts or smaller steps"
     if failed.ending == "invalid":
         helps += ", or a finer mesh there"

@@ -74,7 +74,7 @@ def _cubic_root(terms: Floats, ratio: float, V0: float) -> float:
         p for p in _real_roots(shifted) if not ((turns > min(p, 0.0)) & (turns < max(p, 0.0))).any()
     ]
     if ratio <= 0 or not roots:
-        raise SceneError(f"no pressure gives V/V0 = {ratio:g}; ask for a ratio nearer to 1")
+        raise SceneError(f"no pressure gives V/V0 = {ratio:g}; use a ratio nearer to 1")
     return float(min(roots, key=abs))
 
 
@@ -120,9 +120,15 @@ def root_of(
     if not abs(error) <= 1e-9 * scale:
         failed = f"error {error / scale:.2%} after {updates} Newton steps"
     elif softness < 0 and not rises(-a, -b, -c, P):
-        failed = f"P = {P:.4g} Pa is unstable: it grows faster with the volume than the body's own"
+        failed = (
+            f"P = {P:.4g} Pa is unstable: it rises faster with the volume than the "
+            "pressure of the body"
+        )
     elif softness >= 0 and not rises(a, b, c, P):
-        failed = f"P = {P:.4g} Pa is a spurious root: volume falls as pressure grows before it"
+        failed = (
+            f"P = {P:.4g} Pa is a spurious root: at lower pressures the volume falls as "
+            "pressure rises"
+        )
     return Root(P, updates, ((a * P + b) * P + own) * P + V, failed)
 
 

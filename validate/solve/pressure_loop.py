@@ -53,13 +53,13 @@ class PressureLoop:
 
     handles: ClassVar[Handles] = FLUID
 
-    gain: float | None = quantity(None, "Pa", "Kp; none: tuned on the volume's response")
+    gain: float | None = quantity(None, "Pa", "Kp; none: tuned to the response of the volume")
     tolerance: float = quantity(0.01, "1", "|1 - V/V0| at which it stops")
     max_updates: int = quantity(100, "1", "of the pressure in a step")
-    warm_start: bool = quantity(True, "1", "begin at the last step's pressure")
-    update: UpdateName = quantity("proportional", "1", "how the next pressure is found")
+    warm_start: bool = quantity(True, "1", "start from the pressure of the last step")
+    update: UpdateName = quantity("proportional", "1", "method for the next pressure")
     gains: Literal["own", "common", "matrix"] = quantity(
-        "own", "1", "of several cavities: each its own, their mean, or coupled"
+        "own", "1", "several cavities: one gain each, their mean, or coupled"
     )
 
     @staticmethod
@@ -79,7 +79,7 @@ class PressureLoop:
         count = len(responses.volumes)
         if self.update in ("golden", "piecewise") and count > 1:
             raise SceneError(
-                f"update '{self.update}' knows one cavity, the scene has {count}; use newton"
+                f"update '{self.update}' supports one cavity, the scene has {count}; use newton"
             )
         curve = pressure_at_volume(responses, RATIOS) if self.update == "piecewise" else RATIOS
         gains = gain_matrix(responses, self)

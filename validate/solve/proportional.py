@@ -35,7 +35,7 @@ class Proportional:
         ("linear", *LARGE), inertia=False, cavities=False, loads=False, contact=()
     )
 
-    inner: Scheme = part(QuasiStatic(), "the static scheme, of drives alone")
+    inner: Scheme = part(QuasiStatic(), "the static scheme, for drives only")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         """Raises `SceneError` for a scene with more than one material or anything that pushes back
@@ -43,9 +43,9 @@ class Proportional:
         more = (scene.loads, scene.cavities, scene.foundations, scene.membranes, scene.regions)
         if any(more) or scene.tracked:
             raise SceneError(
-                "forces are in proportion to the modulus where one body is moved by drives alone: "
-                "drop loads, cavities, foundations, membranes, regions and tracked sets, or run "
-                "the inner scheme"
+                "forces are proportional to the modulus only if one body is moved by drives "
+                "alone; remove loads, cavities, foundations, membranes, regions and tracked "
+                "sets, or run the inner scheme"
             )
         E = scene.material.E
         unit = replace(scene, material=in_proportion(scene.material, 1 / E))

@@ -45,8 +45,9 @@ class PulsePressure:
         numbers = (self.low, self.high, self.rate, self.dt)
         if not all(map(math.isfinite, numbers)) or self.rate < 0 or not self.dt > 0:
             raise SceneError(
-                f"pulse of {self.low:g}..{self.high:g} Pa, {self.rate:g} a second, dt {self.dt:g} "
-                "s: finite numbers, a rate of 0 or more and a positive step are needed"
+                f"pulse of {self.low:g}..{self.high:g} Pa, {self.rate:g} a second, dt "
+                f"{self.dt:g} s: expected finite numbers, a rate of 0 or more and a positive "
+                "step"
             )
 
     def at(self, t: float) -> float:

@@ -24,7 +24,7 @@ class QuasiStatic:
     @staticmethod
     def steppings() -> tuple[Stepping, ...]:
         """One map that remembers nothing."""
-        words = "statics: no memory of the last step"
+        words = "statics: independent of the last step"
         return (Stepping("quasi_static", words, "consistent", _still, order=0.0),)
 
     @staticmethod

@@ -23,8 +23,8 @@ def require_one_probe(system: System) -> None:
     scene = system.scene
     if len(scene.tools) != 1 or scene.drives:
         raise SceneError(
-            f"{len(scene.tools)} probes and {len(scene.drives)} drives: a touched body takes one "
-            "probe and no drive"
+            f"{len(scene.tools)} probes and {len(scene.drives)} drives: a touched body needs "
+            "one probe and no drive"
         )
     require_held(scene, system.held)
 
@@ -48,8 +48,8 @@ class RegionBody:
         scene, free = system.scene, system.free
         if any(m.stiffness_damping for m in scene.materials):
             raise SceneError(
-                "touched bodies are solved with each node's own damping, C = alpha M (paper "
-                "004, eq 5); drop stiffness_damping, or take Newmark"
+                "touched bodies are solved with nodal damping, C = alpha M (paper 004, eq 5); "
+                "remove stiffness_damping, or use Newmark"
             )
         d = scene.mesh.dimension
         nodes = np.unique(free // d)
@@ -192,5 +192,5 @@ class RegionPlan:
         count = int(layer[found.of == 0].max()) + 1
         words = found.words
         if self.law is not None and not isinstance(zones[0].solver, PrimarySolver):
-            words += (f"a primary region of {count} layers has no whole cell and stays linear",)
+            words += (f"a primary region of {count} layers has no complete cell and stays linear",)
         return Regions(coupled, count, words)

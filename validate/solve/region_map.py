@@ -36,8 +36,8 @@ def layers_from(graph: sparse.csr_array, contact: Ints) -> Ints:
     lost = int(np.isinf(away).sum())
     if lost:
         raise SceneError(
-            f"{lost} of {len(away)} free nodes are linked to no node of the contact: the body is "
-            "in parts, or what is held splits it; simulate the touched part alone"
+            f"{lost} of {len(away)} free nodes are not connected to the contact: the body has "
+            "separate parts, or held nodes split it; simulate only the touched part"
         )
     return np.asarray(away, dtype=np.int64)
 
@@ -61,7 +61,7 @@ def split(layer: Ints, layers: tuple[int, ...], graph: sparse.csr_array) -> Node
     Raises `SceneError` for a region without a layer: it would be empty.
     """
     if any(count < 1 for count in layers):
-        raise SceneError(f"regions of {layers} layers: at least 1 each, or the region is empty")
+        raise SceneError(f"regions of {layers} layers: expected at least 1 for each region")
     of = np.searchsorted(np.cumsum(layers), layer, side="right").astype(np.int64)
     words = []
     left = len(layers) - int(of.max())
@@ -69,13 +69,16 @@ def split(layer: Ints, layers: tuple[int, ...], graph: sparse.csr_array) -> Node
         depth = int(layer.max()) + 1
         words.append(
             f"{left} of {len(layers) + 1} regions lie beyond the body's {depth} layers and are "
-            "left out"
+            "omitted"
         )
     for region in range(int(of.max()) + 1):
         inside = np.flatnonzero(of == region)
         parts = connected_components(graph[inside][:, inside], directed=False)[0]
         if parts > 1:
-            words.append(f"region {region + 1} is {parts} parts that only others link")
+            words.append(
+                f"region {region + 1} is {parts} parts that are connected only "
+                "through other regions"
+            )
     return NodeSplit(of, tuple(words))
 
 
@@ -96,8 +99,8 @@ def ratios(rates: tuple[float, ...], dt: float) -> tuple[tuple[int, ...], tuple[
     for rate in rates:
         if not (np.isfinite(rate) and rate > 0) or rate * dt > 1 + _WHOLE:
             raise SceneError(
-                f"a region at {rate:g} Hz beside a primary one at {1 / dt:g} Hz: above 0, and at "
-                "most the primary rate; shorten dt for a faster one"
+                f"a region at {rate:g} Hz with a primary one at {1 / dt:g} Hz: expected a rate "
+                "above 0 and at most the primary rate; reduce dt for a faster one"
             )
         exact = 1 / (rate * dt)
         ticks = round(exact)

@@ -216,7 +216,9 @@ def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) 
 def period_map(coupled: Coupled, forces: Callable[[Floats], Floats] | None = None) -> Floats:
     """The map (s, s) of the state over a common period; `forces` gives f (m, q) from `visible`."""
     if any(isinstance(z.solver, PrimarySolver) for z in coupled.zones):
-        raise SceneError("the map of a primary region with a law of its own has no spectral radius")
+        raise SceneError(
+            "the step map of a primary region with a separate law has no spectral radius"
+        )
     size = len(_packed(coupled, coupled.rest()))
     motion = _unpacked(coupled, np.eye(size))
     for _ in range(coupled.common):

@@ -178,13 +178,13 @@ class PrimaryLaw:
     def __post_init__(self) -> None:
         if self.scene.dilatation == "nodal_mean":
             raise SceneError(
-                "nodal mean dilatation reaches across the border of a primary region with a law of "
-                "its own; take pointwise or mixed dilatation"
+                "nodal mean dilatation couples across the border of a primary region with a "
+                "separate law; use pointwise or mixed dilatation"
             )
         if self.law == "linear" and self.scene.plane == "stress":
             raise SceneError(
-                "in plane stress no stiffness is of the volume alone, so none relaxes without it; "
-                "take plane strain or a body in 3-D"
+                "in plane stress volumetric and isochoric stiffness cannot be separated, so "
+                "relaxation is not possible; use plane strain or a body in 3-D"
             )
         if self.law != "linear" and self.prony.g and self.scene.mesh.dimension == 2:
             raise SceneError(
@@ -304,7 +304,9 @@ class PrimarySolver:
                 return new
             factor = self._factor(law, new, anew=size > _CONTRACTION * last)
             new, last = self._corrected(new, factor.solve(residual), law), size
-        raise UnsettledError(f"no balance of the primary region after {_MOST} iterations of Newton")
+        raise UnsettledError(
+            f"no equilibrium of the primary region after {_MOST} Newton iterations"
+        )
 
     def _factor(self, law: Response, u: Floats, *, anew: bool) -> Factor | Fronts:
         """The last factorisation, as long as it shrinks the residual (Shamanskii 1967)."""
@@ -318,7 +320,9 @@ class PrimarySolver:
             new = u - step / 2**halved
             if not law.inverted(new):
                 return np.asarray(new)
-        raise UnsettledError(f"a correction inverts cells even at 1/{2**_HALVINGS} of its size")
+        raise UnsettledError(
+            f"a Newton correction inverts cells even at 1/{2**_HALVINGS} of its size"
+        )
 
 
 def primary_solver(

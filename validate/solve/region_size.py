@@ -33,12 +33,13 @@ class PrimarySize:
     def __post_init__(self) -> None:
         if not 1 <= self.least <= self.most:
             raise SceneError(
-                f"primary region of {self.least} to {self.most} layers: at least 1, and rising"
+                f"primary region of {self.least} to {self.most} layers: expected at least 1, "
+                "and increasing"
             )
         if not (self.slope > 0 and self.moved > 0):
             raise SceneError(
-                f"slope {self.slope:g} and threshold {self.moved:g} m of the primary region: above "
-                "0, or it never grows"
+                f"slope {self.slope:g} and threshold {self.moved:g} m of the primary region: "
+                "expected values above 0, otherwise it never grows"
             )
 
     def layers(self, deformation: float, moved: Floats, layer: Ints) -> int:

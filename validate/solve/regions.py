@@ -63,63 +63,72 @@ class AsyncRegions:
     dt: float = quantity(1e-3, "s", "time step of the primary region: a tick")
     layers: tuple[int, ...] = quantity((5,), "1", "layers of nodes from the contact, by region")
     rates: tuple[float, ...] = quantity((50.0,), "Hz", "of the regions after the primary one")
-    solvers: tuple[SolverName, ...] = quantity(("semi_implicit",), "1", "for all, or one each")
-    border: BorderName = quantity("delayed", "1", "what regions show between their solves")
-    overlap: int = quantity(0, "1", "layers of the neighbours that a region also solves")
+    solvers: tuple[SolverName, ...] = quantity(("semi_implicit",), "1", "for all, or one for each")
+    border: BorderName = quantity("delayed", "1", "displacements of regions between their solves")
+    overlap: int = quantity(0, "1", "layers of neighbouring regions that a region also solves")
     adapt: SizeName = quantity("fixed", "1", "how the primary region follows the deformation")
-    most: int = quantity(30, "1", "layers of the primary region, at most; it begins with layers[0]")
-    slope: float = quantity(4.0, "1", "length of the primary region over the deformation's")
-    moved: float = quantity(1e-4, "m", "displacement from which a node belongs to it (threshold)")
+    most: int = quantity(
+        30, "1", "largest number of layers of the primary region; it starts with layers[0]"
+    )
+    slope: float = quantity(4.0, "1", "length of the primary region over that of the deformation")
+    moved: float = quantity(1e-4, "m", "displacement above which a node belongs to it (threshold)")
     spring: float = quantity(1000.0, "N/m", "between probe and contact; 0: no force")
-    reach: float = quantity(1e-3, "m", "distance at which the probe takes hold")
-    pad: float = quantity(0.0, "m", "surface nodes that near to the contact share the spring")
-    grip: float | None = quantity(None, "N", "pull at which the body lets go; none: never")
+    reach: float = quantity(1e-3, "m", "distance at which the probe makes contact")
+    pad: float = quantity(
+        0.0, "m", "distance from the contact within which surface nodes share the spring"
+    )
+    grip: float | None = quantity(None, "N", "pulling force at which contact ends; none: never")
     slides: bool = quantity(False, "1", "the contact moves to the node nearest to the probe")
-    beyond_limit: Literal["refuse", "run"] = quantity("refuse", "1", "a period above the critical")
+    beyond_limit: Literal["refuse", "run"] = quantity(
+        "refuse", "1", "a period above the critical step"
+    )
     law: LawName = quantity("linear", "1", "of the primary region; the rest is linear")
-    prony: Prony = part(Prony(), "how the primary region's isochoric stress relaxes")
+    prony: Prony = part(Prony(), "relaxation of the isochoric stress of the primary region")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.dt) and self.dt > 0):
-            raise SceneError(f"tick of {self.dt:g} s: a finite number above 0")
+            raise SceneError(f"tick of {self.dt:g} s: expected a finite number above 0")
         if len(self.layers) != len(self.rates):
             raise SceneError(
-                f"{len(self.layers)} layer counts and {len(self.rates)} rates: one each for every "
-                "border between two regions"
+                f"{len(self.layers)} layer counts and {len(self.rates)} rates: expected one of "
+                "each for every border between two regions"
             )
         if len(self.solvers) not in (1, len(self.layers) + 1):
             raise SceneError(
-                f"{len(self.solvers)} solvers for {len(self.layers) + 1} regions: one, or one each"
+                f"{len(self.solvers)} solvers for {len(self.layers) + 1} regions: expected "
+                "one, or one for each"
             )
         ratios(self.rates, self.dt)
         if any(count < 1 for count in self.layers):
             raise SceneError(
-                f"regions of {self.layers} layers: at least 1 each, or the region is empty"
+                f"regions of {self.layers} layers: expected at least 1 for each region"
             )
         if self.layers and self.adapt != "fixed" and self.most < self.layers[0]:
             raise SceneError(
-                f"a primary region of {self.layers[0]} layers that grows to {self.most} at most: "
-                "raise most, or take adapt fixed"
+                f"a primary region of {self.layers[0]} layers that grows to {self.most} at "
+                "most: increase most, or use adapt fixed"
             )
         if self.overlap < 0 or not (self.spring >= 0 and self.reach > 0 and self.pad >= 0):
             raise SceneError(
-                f"overlap {self.overlap}, spring {self.spring:g} N/m, reach {self.reach:g} m, pad "
-                f"{self.pad:g} m: none below 0, and a reach above it"
+                f"overlap {self.overlap}, spring {self.spring:g} N/m, reach {self.reach:g} m, "
+                f"pad {self.pad:g} m: expected no value below 0, and a reach above 0"
             )
         if self.border == "joint" and (self.overlap or set(self.solvers) & set(EXPLICIT)):
-            raise SceneError("joint borders solve one system: no overlap, no explicit solvers")
+            raise SceneError(
+                "joint borders solve one system: remove the overlap and explicit solvers"
+            )
         if self.of_its_own and (self.border == "joint" or self.overlap):
             raise SceneError(
-                "a primary region with a law of its own is solved by itself: no joint borders, no "
-                "overlap"
+                "a primary region with a separate law is solved separately: use neither joint "
+                "borders nor overlap"
             )
         if self.prony.g and (self.adapt != "fixed" or self.slides or self.grip is not None):
             raise SceneError(
-                "a primary region that remembers its stress stays where it is: adapt fixed, slides "
-                "false, grip none"
+                "a viscoelastic primary region cannot move: set adapt fixed, slides false, "
+                "grip none"
             )
         if not (self.grip is None or self.grip >= 0):
-            raise SceneError(f"grip {self.grip:g} N: 0 or above, or none")
+            raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
 
     @property
     def of_its_own(self) -> bool:

@@ -29,7 +29,7 @@ class RigidMotion:
         """
         if not isinstance(scene, RigidBody) or inputs.shape[1:] != (POSE,):
             raise SceneError(
-                f"RigidMotion places a RigidBody by poses (nt, {POSE}), it was given "
+                f"RigidMotion places a RigidBody by poses (nt, {POSE}), but it received "
                 f"{type(scene).__name__} and {inputs.shape}; use QuasiStatic or StaticNewton"
             )
         R = Rotation.from_rotvec(inputs[:, :3]).as_matrix()

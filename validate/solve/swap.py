@@ -42,8 +42,8 @@ class Swapped:
         least = _VANISHES * (own if not self.driven[unknown] else 1 / own if own else np.inf)
         if not pivot > least:
             raise SceneError(
-                f"unknown {unknown} cannot be driven: its compliance is {pivot:.1e} m/N beside "
-                f"what is driven already, {own:.1e} m/N alone"
+                f"unknown {unknown} cannot be driven: its compliance is {pivot:.1e} m/N "
+                f"together with the driven unknowns, {own:.1e} m/N alone"
             )
         _pivot(self.T, unknown)
         self.driven[unknown] = not self.driven[unknown]

@@ -33,7 +33,7 @@ class Tabulated:
     handles: ClassVar[Handles] = LARGE_STATICS
 
     inner: Scheme
-    step: float = quantity(1e-3, "m", "between the loads that are solved")
+    step: float = quantity(1e-3, "m", "spacing of the solved loads")
 
     @staticmethod
     def candidates(asked: Asked) -> tuple[Rival, ...]:
@@ -49,12 +49,12 @@ class Tabulated:
 
     def __post_init__(self) -> None:
         if not self.step > 0:
-            raise SceneError(f"load grid of {self.step:g} m: it must be positive")
+            raise SceneError(f"load grid of {self.step:g} m: expected a positive number")
 
     def prepare(self, system: System) -> Stepper:
         """Raises `SceneError` unless the scene has exactly one drive."""
         if len(system.scene.drives) != 1:
-            raise SceneError(f"{len(system.scene.drives)} drives: a load grid is for one")
+            raise SceneError(f"{len(system.scene.drives)} drives: a load grid supports one")
         inner = self.inner.prepare(system)
         return TabulatedStepper(inner, self.step, _Table(inner.rest()))
 

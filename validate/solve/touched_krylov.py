@@ -43,16 +43,21 @@ class TouchedKrylov:
     dt: float = quantity(1e-3, "s", "time step: a tick")
     vectors: int = quantity(4, "1", "Krylov vectors for each direction of the force")
     spring: float = quantity(1000.0, "N/m", "between probe and contact; 0: no force")
-    reach: float = quantity(1e-3, "m", "distance at which the probe takes hold, for good")
-    pad: float = quantity(0.0, "m", "surface nodes that near to the contact share the spring")
+    reach: float = quantity(1e-3, "m", "distance at which the probe makes permanent contact")
+    pad: float = quantity(
+        0.0, "m", "distance from the contact within which surface nodes share the spring"
+    )
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.dt) and self.dt > 0 and self.vectors >= 1):
-            raise SceneError(f"tick of {self.dt:g} s, {self.vectors} vectors: above 0, at least 1")
+            raise SceneError(
+                f"tick of {self.dt:g} s, {self.vectors} vectors: expected a tick "
+                "above 0 and at least 1 vector"
+            )
         if not (self.spring >= 0 and self.reach > 0 and self.pad >= 0):
             raise SceneError(
-                f"spring {self.spring:g} N/m, reach {self.reach:g} m, pad {self.pad:g} m: none "
-                "below 0, and a reach above it"
+                f"spring {self.spring:g} N/m, reach {self.reach:g} m, pad {self.pad:g} m: "
+                "expected no value below 0, and a reach above 0"
             )
 
     def prepare(self, system: System) -> Stepper:

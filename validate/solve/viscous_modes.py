@@ -43,7 +43,7 @@ class ViscousModes:
 
     def __post_init__(self) -> None:
         if self.modes < 1:
-            raise SceneError(f"{self.modes} modes: at least 1")
+            raise SceneError(f"{self.modes} modes: expected at least 1")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         """At t (nt,) s under inputs (nt, l) that stay as they are; ended as the equilibrium was

@@ -109,8 +109,8 @@ def _require_independent(coupling: Floats) -> None:
     sizes = np.linalg.eigvalsh(coupling / np.outer(own, own)) if own.all() else np.zeros(1)
     if not sizes[0] > _DEPENDENT:
         raise SceneError(
-            f"what is imposed along one of {len(coupling)} axes follows from the others, or is "
-            f"held: {sizes[0]:.1e} of its compliance is left"
+            f"a prescribed motion along one of {len(coupling)} axes follows from the others, "
+            f"or is already held: {sizes[0]:.1e} of its compliance remains"
         )
 
 

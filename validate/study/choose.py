@@ -44,7 +44,7 @@ class Wanted:
     def __post_init__(self) -> None:
         for value, what in ((self.error, "error"), (self.rate, "rate")):
             if not (np.isfinite(value) and value > 0):
-                raise UsageError(f"--{what} {value:g}: a positive number with its unit")
+                raise UsageError(f"--{what} {value:g}: expected a positive number with its unit")
 
 
 @dataclass(frozen=True)
@@ -88,13 +88,15 @@ def wanted(error: str, rate: str) -> Wanted:
     hertz, per = _split(rate, "--rate", "1000Hz")
     factors = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
     if per.lower() not in factors:
-        raise UsageError(f"--rate {rate}: unit '{per}' is none of Hz, kHz, MHz; as in 1000Hz")
+        raise UsageError(
+            f"--rate {rate}: unit '{per}' is not Hz, kHz or MHz; write for example 1000Hz"
+        )
     for si in _UNITS:
         if (factor := in_si(1.0, unit, si)) is not None:
             return Wanted(number * factor, hertz * factors[per.lower()], si)
     raise UsageError(
-        f"--error {error}: '{unit}' is no unit of displacement, force or pressure; as in 0.5mm, "
-        "0.2N, 300Pa"
+        f"--error {error}: '{unit}' is not a unit of displacement, force or pressure; write "
+        "for example 0.5mm, 0.2N, 300Pa"
     )
 
 
@@ -105,7 +107,9 @@ def _split(text: str, option: str, example: str) -> tuple[float, str]:
     except ValueError:
         number = float("nan")
     if found is None or not np.isfinite(number) or not found[2]:
-        raise UsageError(f"{option} {text}: a number with its unit, as in {example}")
+        raise UsageError(
+            f"{option} {text}: expected a number with its unit; write for example {example}"
+        )
     return number, found[2].strip()
 
 
@@ -168,7 +172,9 @@ def choose(
         if found is not None:
             pick, confirmed = found
     if trade is None:
-        raise UsageError("no rung of the ladder has a cell for this scene; see 'study tradeoff'")
+        raise UsageError(
+            "no candidate method of the ladder has a cell for this scene; see 'study tradeoff'"
+        )
     by, rows = _by(trade, declared_law), _judged(trade, declared_law)
     unsolved = left_out(declared_law, trade.law_words)
     ladder = tuple(
@@ -235,7 +241,7 @@ def _refusal(trade: Trade, row: TradeRow, by: str) -> str:
 def left_out(declared_law: bool, reason: str) -> str:
     """Why a rung at large strain has no cell: asked for, or `reason` kept it from being solved."""
     if declared_law:
-        return "left out: --declared-law judges the linear law only"
+        return "left out: --declared-law evaluates the linear law only"
     return f"left out: large strain was not solved ({reason})"
 
 
@@ -294,8 +300,8 @@ def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
     if mine:
         return f"all {len(mine)} cells failed, the first: {mine[0].failed}"
     if dynamic:
-        return "not for this scene: no plate drives it, no cavity is in it, or no probe touches it"
+        return "not for this scene: it needs a plate as drive, a cavity or a touching probe"
     return (
-        "not for this scene: it declares no density, and linear schemes with inertia know no "
-        "fluid in cavities"
+        "not for this scene: it declares no density, or has fluid in cavities, which linear "
+        "schemes with inertia do not support"
     )

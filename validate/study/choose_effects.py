@@ -96,7 +96,9 @@ def effect_words(
     if effects is None:
         return
     if effects.unknown:
-        first = f"run `validate run {experiment.name}` first; no candidate is excluded by them"
+        first = (
+            f"run `validate run {experiment.name}` first; until then effects exclude no candidate"
+        )
         yield "effects in the recording", f"unknown: {effects.unknown}", first
         return
     specs = {s.name: s for s in experiment.effects}
@@ -106,10 +108,16 @@ def effect_words(
             r.name for r in trial.solvers
             if e.name in specs and lacks(r, trial, experiment, specs[e.name])
         ]  # fmt: skip
-        means = "required: every candidate has it as the scene declares it"
+        means = "required: every candidate includes it as the scene declares it"
         if without:
-            means = f"required: candidates without it are not the scene ({'; '.join(without)})"
+            means = (
+                f"required: candidates without it do not solve this scene ({'; '.join(without)})"
+            )
         yield f"effect: {e.name}", value, means
     if effects.not_shown:
         names = ", ".join(effects.not_shown)
-        yield "effects that are not shown", names, f"below {TELLS_APART:g} u: not required by it"
+        yield (
+            "effects that the recording does not show",
+            names,
+            (f"below {TELLS_APART:g} u: not required by it"),
+        )

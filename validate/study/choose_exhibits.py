@@ -18,7 +18,7 @@ def choose_exhibits(choice: Choice) -> tuple[Exhibit, ...]:
     """The verdict and its evidence, then the table that it rests on."""
     return (
         Exhibit("choice", "The choice", tuple(words(choice)), charts=(_chart(choice),)),
-        Exhibit("numbers", "The scene's own numbers", tables=(_facts(choice),)),
+        Exhibit("numbers", "Properties of the scene", tables=(_facts(choice),)),
         Exhibit("ladder", "The ladder", tuple(choice.rejected),
                 tables=(_ladder(choice), *((_excluded(choice),) if choice.excluded else ()))),
         *trade_exhibits(choice.trade),
@@ -30,7 +30,7 @@ def words(choice: Choice) -> Iterator[str]:
     want = choice.wanted
     asked = f"{choice.trade.shown(want.error)} and {want.rate:.4g} Hz"
     if choice.pick is not None:
-        first = f"the fastest cell that does (rung '{choice.pick.solver.rung}')"
+        first = f"the fastest cell that does (candidate '{choice.pick.solver.rung}')"
         yield f"{described(choice.pick, choice)} meets {asked}: {first}."
         yield from _left_out(choice)
         yield from _confirmed(choice)
@@ -43,9 +43,12 @@ def words(choice: Choice) -> Iterator[str]:
     floor = choice.trade.floor
     if want.error < floor:
         off = choice.trade.shown(floor, 2)
-        yield f"The reference is itself off by {off}: no cell can show that."
-    what = "with what the linear law costs" if choice.by == "total" else "within the linear law"
-    yield f"Errors are {what}; the rate is that of median steps with all displacements."
+        yield f"The error of the reference is {off}: a smaller error cannot be verified."
+    what = "with the error of the linear law" if choice.by == "total" else "within the linear law"
+    yield (
+        f"Errors are {what}; the rate is that of the median step, including the "
+        "displacements of all nodes."
+    )
     if choice.trade.unit != "m":
         yield f"An error is the {ERRORS[choice.trade.unit]}."
 
@@ -63,8 +66,8 @@ def _left_out(choice: Choice) -> Iterator[str]:
         n = len(choice.excluded)
         who = "1 candidate was" if n == 1 else f"{n} candidates were"
         yield (
-            f"{who} left out by a bound: the step on the coarsest mesh takes longer than the "
-            "pick's, and finer meshes are slower."
+            f"{who} left out by a bound: on the coarsest mesh their step already takes longer "
+            "than that of the choice."
         )
 
 
@@ -76,7 +79,7 @@ def _confirmed(choice: Choice) -> Iterator[str]:
             f"{described(choice.confirmed, choice)}."
         )
     elif choice.trade.trial.dynamic:
-        yield "Its own step is no longer than a tick of the rate."
+        yield "Its step is not longer than a tick of the rate."
 
 
 def _as_fast(choice: Choice) -> Iterator[str]:
@@ -101,8 +104,8 @@ def _judged(choice: Choice) -> list[TradeRow]:
 def _missed(choice: Choice) -> str:
     wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.trial.dynamic)
     if max(wrong, late) <= 1:
-        return "it meets both at its own step, but not with a new state at every tick"
-    error = f"its error is {wrong:.3g} times the one wanted"
+        return "it meets both at its step, but not with a new state at every tick"
+    error = f"its error is {wrong:.3g} times the required one"
     time = f"it is {late:.3g} times too slow"
     return " and ".join([error] * (wrong > 1) + [time] * (late > 1))
 
@@ -116,7 +119,7 @@ def _one_sided(choice: Choice) -> Iterator[str]:
         fastest = min(exact, key=lambda r: r.time_s or 0.0)
         yield f"The fastest that meets the error: {described(fastest, choice)}."
     else:
-        yield "No cell meets the error: finer meshes than the ladder's would be needed."
+        yield "No cell meets the error: finer meshes than those of the ladder are needed."
     if quick:
         best = min(quick, key=lambda pair: pair[0])[1]
         yield f"The least error at that rate: {described(best, choice)}."
@@ -126,7 +129,7 @@ def _one_sided(choice: Choice) -> Iterator[str]:
 
 def _facts(choice: Choice) -> NumberTable:
     rows = tuple((f.name, f.value, f.means) for f in choice.facts)
-    return NumberTable("numbers", "The scene's own numbers", ("what", "value", "asks for"), rows)
+    return NumberTable("numbers", "Properties of the scene", ("what", "value", "asks for"), rows)
 
 
 def _ladder(choice: Choice) -> NumberTable:
@@ -151,14 +154,17 @@ def _ladder(choice: Choice) -> NumberTable:
              None if time is None else _US * time,
              None if time is None else 1 / time, rung.evidence)
         )  # fmt: skip
-    title = "Every rung's fastest cell that meets both, else its nearest"
+    title = "Fastest cell of every candidate method that meets both, else its nearest"
     return NumberTable("ladder", title, head, tuple(rows))
 
 
 def _excluded(choice: Choice) -> NumberTable:
     head = ("rung", "candidate", "a step takes at least / us", "pick / us", "why")
     rows = tuple((e.rung, e.candidate, _US * e.bound, _US * e.pick, e.why) for e in choice.excluded)
-    note = f"A bound is the pilot's median step over {SAME_TIME:g}: the clock is noisy."
+    note = (
+        f"A bound is the median step of the pilot run divided by {SAME_TIME:g}, because "
+        "step times are noisy."
+    )
     return NumberTable("excluded", "Candidates left out by a bound", head, rows, note)
 
 
@@ -174,11 +180,11 @@ def _chart(choice: Choice) -> Chart:
     low = 0.5 * min(error_of(r, by) or 1.0 for r in rows)
     x = _US * np.array([min(left, 0.5 / want.rate), 1 / want.rate, 1 / want.rate])
     y = scale * np.array([want.error, want.error, min(low, 0.5 * want.error)])
-    series.append(Series("wanted: left of and below this line", x, y))
+    series.append(Series("required: left of and below this line", x, y))
     shown = choice.pick or choice.nearest
     series.append(_series("the choice" if choice.pick else "the nearest", [shown], by, scale))
     return Chart(
-        "choice", "What is wanted and what there is", "time of a step with its displacements / µs",
+        "choice", "Requirement and all cells", "time of a step with its displacements / µs",
         f"error / {choice.trade.shown_unit}", tuple(series), log="xy",
     )  # fmt: skip
 

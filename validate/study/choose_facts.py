@@ -54,10 +54,15 @@ def _loading(scene: Trial, body: Scene) -> Fact:
     if scene.rise_s == 0:
         return Fact(
             name, f"switched on at once; {f:.3g} Hz, damping ratio {ratio:.2g}{assumed}",
-            "the load has no rise time: inertia and damping are needed until the motion is over",
+            "the load has no rise time: inertia and damping are needed until the motion has "
+            "decayed",
         )  # fmt: skip
     periods = scene.rise_s * f
-    slow = "nearly static: statics may do" if periods > _SLOW else "not static: inertia matters"
+    slow = (
+        "nearly static: a static method may be enough"
+        if periods > _SLOW
+        else ("not static: inertia matters")
+    )
     return Fact(name, f"rises in {scene.rise_s:.3g} s; {f:.3g} Hz{assumed}: {periods:.3g} periods",
                 slow)  # fmt: skip
 
@@ -101,14 +106,16 @@ def principal_strains(mesh: Mesh, u: Floats) -> Floats:
 
 def _poisson(body: Scene) -> Fact:
     nu = body.material.nu
-    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: see P1 beside the other elements"
+    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: compare P1 with the other elements"
     return Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect")
 
 
 def _fluid(body: Scene) -> Fact:
     n = len(body.cavities)
     means = (
-        "condensed columns with the pressure of constant volume" if n else "no pressure code runs"
+        "condensed response columns; the pressure keeps the volume constant"
+        if n
+        else "no pressure is computed"
     )
     return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
 
@@ -116,19 +123,21 @@ def _fluid(body: Scene) -> Fact:
 def _noise(trade: Trade, error: float) -> Fact:
     scene = trade.trial
     if scene.noise is None:
-        return Fact("noise", "no recording", "nothing to say")
+        return Fact("noise", "no recording", "no statement")
     sd, where = scene.noise
     if trade.unit != "m":
-        means = f"nothing to say of an error in {trade.shown_unit}"
+        means = f"no statement about an error in {trade.shown_unit}"
         return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
-    means = "a recording can tell such an error" if sd < error else (
-        "a recording could not tell such an error at a single point"
+    means = "a recording can detect such an error" if sd < error else (
+        "a recording cannot detect such an error at a single point"
     )  # fmt: skip
     return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
 
 
 def _mesh(trade: Trade) -> Fact:
     return Fact(
-        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its own error "
-        f"about {trade.shown(trade.floor, 2)} (Richardson)", "errors below it say nothing",
+        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its error "
+                     f"about {trade.shown(trade.floor, 2)} (Richardson)",
+
+        "smaller errors cannot be distinguished",
     )  # fmt: skip

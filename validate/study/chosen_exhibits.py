@@ -22,11 +22,16 @@ def chosen_exhibits(study: FilterStudy) -> Iterator[Exhibit]:
         unit = shown_unit(_unit(study))[1]
         table = NumberTable(
             "nested",
-            "Chosen on some blocks and markers, reported on the others",
+            "Setting chosen on some blocks and markers, error reported on the others",
             ("condition", "what", f"error / {unit}", f"± 95 % / {unit}", "times chosen"),
             tuple(rows),
         )
-        yield Exhibit("nested", "What the choice is worth", tuple(_nested_words(study)), (table,))
+        yield Exhibit(
+            "nested",
+            "Error of the chosen setting on other data",
+            tuple(_nested_words(study)),
+            (table,),
+        )
     if picks := study.picks:
         yield _agreement(picks)
 
@@ -68,18 +73,23 @@ def chosen_line(nested: Nested, study: FilterStudy) -> str:
 
 def _nested_words(study: FilterStudy) -> Iterator[str]:
     yield (
-        "The best of many settings looks better on the data that chose it than it is. Here each "
-        "block of time is left out in turn: the setting of least error on the other blocks is "
-        "chosen, and its error on the block that was left out is reported."
+        "The error of the best of many settings is too small on the data that chose it. Here "
+        "each block of time is left out in turn. The setting of least error on the other "
+        "blocks is chosen; its error on the left-out block is reported."
     )
     nested = next(r.nested for r in study.rankings if r.nested)
     if study.by == LOG_LOSS:
-        yield "The likelihood of all measured components chooses and reports, in other blocks."
+        yield (
+            "The likelihood of all measured components is used to choose and to report, in "
+            "different blocks."
+        )
     else:
         yield (
-            "Half of the markers choose, the other half reports, and the other way round."
+            "One half of the markers is used to choose and the other to report; then the "
+            "halves change places."
             if nested.split
-            else "There is one marker to score: the same one chooses and reports, in other blocks."
+            else "There is one marker to score: it is used to choose and to report, in "
+            "different blocks."
         )
     for ranking in study.rankings:
         if ranking.nested and ranking.blocks and not ranking.blocks.sure:
@@ -101,5 +111,5 @@ def _agreement(picks: tuple[TruthPick, ...]) -> Exhibit:
         f"Where the truth is known: the filter setting of least {WITHHELD} has a true error within "
         f"{100 * (NEAR - 1):.0f} % of the least in {near} of {len(picks)} recordings.",
     )
-    table = NumberTable("agreement", "The two rankings, recording by recording", head, rows)
-    return Exhibit("agreement", "With and without truth", words, (table,))
+    table = NumberTable("agreement", "The two rankings for each recording", head, rows)
+    return Exhibit("agreement", "Ranking with and without truth", words, (table,))

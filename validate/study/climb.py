@@ -159,7 +159,7 @@ def require_judged(trial: Trial, unit: ErrorUnit) -> None:
     if not has[unit]:
         names = "; ".join(f"{u}: {', '.join(has[u])}" for u in ERRORS if has[u])
         raise UsageError(
-            f"--error in {unit}: nothing of this scene is judged in it; it has {names}"
+            f"--error in {unit}: this scene has no quantity in that unit; it has {names}"
         )
 
 

@@ -109,8 +109,8 @@ def _until_it_is_gone(client: Any, address: str) -> Iterator[None]:
         if client.status == "running" and not isinstance(error, _LOST):
             raise
         raise UsageError(
-            f"the scheduler at {address} went away ({type(error).__name__}); finished cells are "
-            "kept, and the same command with one that runs goes on from there"
+            f"the scheduler at {address} was lost ({type(error).__name__}); finished cells are "
+            "kept; start a scheduler and run the same command again to continue"
         ) from error
 
 
@@ -218,7 +218,8 @@ class _Drain:
         trusted = [worker for worker in there if worker in self._proven]
         if there and not trusted and self._refused.issuperset(there):
             raise UsageError(
-                f"all {len(there)} workers are refused; give them the study's own installation"
+                f"all {len(there)} workers are refused; install the same version of validate "
+                "on them as in the study"
             )
         return trusted
 
@@ -294,5 +295,5 @@ class _Drain:
             if self._deaths[cell.key] < _DEATHS:
                 self._waiting.append((cell,))
                 continue
-            why = f"its worker died {_DEATHS} times: out of memory?"
+            why = f"its worker process died {_DEATHS} times: out of memory?"
             self._done(cell, Record(cell.key, failed=why, lasting=False))

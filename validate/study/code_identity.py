@@ -74,7 +74,7 @@ def require_same(here: Identity, there: Identity, who: str) -> None:
             f"{name} {here[name][:_SHORT]}, there {there.get(name, 'not known')[:24]}"
             for name in odd
         )
-        raise OtherCodeError(f"{who} is refused: its code is not that of the study ({parts})")
+        raise OtherCodeError(f"{who} is refused: its code differs from that of the study ({parts})")
 
 
 def _hash(files: Any) -> str:

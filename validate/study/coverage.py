@@ -93,7 +93,10 @@ def coverage(
         if m in bench.road.methods and m not in bench.road.refused
     ]
     if not accepted or not bench.road.experiment.accept:
-        raise ComparisonError(f"{found.name} accepts no method or no quantity: nothing is judged")
+        raise ComparisonError(
+            f"{found.name} accepts no method or no quantity: there is "
+            "nothing to check; declare both"
+        )
     folder = study_folder(found, KIND, out) / CELLS
     study = Study(job, folder, where, report, bench, opening, opened, draws, seed, noise)
     parts = [_of_method(study, method) for method in accepted]
@@ -139,8 +142,8 @@ def _of_method(study: Study, method: str) -> _Part:
     records = [r.value for r in done.records.values() if r.value is not None]
     if missing := [r.why for r in done.records.values() if r.value is None]:
         raise ComparisonError(
-            f"{method}: {len(missing)} of {len(done.records)} blocks of {BLOCK} draws could not be "
-            f"judged: {missing[0]}"
+            f"{method}: {len(missing)} of {len(done.records)} blocks of {BLOCK} draws could "
+            f"not be checked: {missing[0]}"
         )
     return _Part(
         tuple(quantity(given, s, records, whole) for s in stated),

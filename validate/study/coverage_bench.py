@@ -62,7 +62,9 @@ def _at(left: Floats, t: Floats, other: Floats, other_t: Floats) -> Floats:
     if left.shape == other.shape:
         return left
     if len(left) != len(t):
-        raise ComparisonError(f"{len(left)} numbers are measured there, {len(other)} as judged")
+        raise ComparisonError(
+            f"{len(left)} numbers are measured in the drawn recording, {len(other)} as judged"
+        )
     return np.interp(other_t, t, left)
 
 
@@ -154,7 +156,7 @@ def _judged(job: Job) -> tuple[Experiment, Options]:
 def drawable(o: Observation) -> Drawable:
     if not isinstance(o, Drawable):
         raise ComparisonError(
-            f"{o.name}: {type(o).__name__} cannot be drawn anew; give it `left` and `anew`"
+            f"{o.name}: {type(o).__name__} cannot be drawn again; give it `left` and `anew`"
         )
     return o
 
@@ -186,7 +188,7 @@ def run_terms(bench: CoverageBench, cell: TermsCell) -> AllStated:
     ]
     if not found:
         ends = "; ".join(f"{r.outcome.state} {r.outcome.why}".strip() for r in mine.runs)
-        raise ComparisonError(f"{cell.method}: nothing that is accepted was compared ({ends})")
+        raise ComparisonError(f"{cell.method}: no accepted quantity was compared ({ends})")
     return AllStated(tuple(found))
 
 

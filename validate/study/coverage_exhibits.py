@@ -57,15 +57,16 @@ def _shares(study: Coverage) -> Exhibit:
          TableCell(100 * t.share.value, text=percent(t.share)), interval(t.share),
          None, None, None, None, None, None,
          TableCell("holds" if t.holds else "too narrow", emphasis="good" if t.holds else "bad"),
-         "at most 7 %: the correction keeps it below its level")
+         "at most 7 %: the correction keeps the rate below its level")
         for t in study.together
     ]  # fmt: skip
     head = (*HEAD[:-1], "rms of E", "u_val", "finding", "which term")
-    table = NumberTable("coverage", "How often a perfect model differs", head, tuple(rows),
-                        "At the limit: models whose error is the limit; at most 5 % may be called "
-                        "either. No rms and no u_val of all checks together: no common unit.",
+    table = NumberTable("coverage", "Rate at which a perfect model differs", head, tuple(rows),
+                        "At the limit: models whose error equals the limit; at most 5 % may "
+                        "get either verdict. All checks together have no rms and no u_val, "
+                        "because they have no common unit.",
                         below="which term")  # fmt: skip
-    return Exhibit("coverage", "A perfect model under our own verdicts", tuple(_told(study)),
+    return Exhibit("coverage", "Verdicts on a perfect model", tuple(_told(study)),
                    (table,))  # fmt: skip
 
 
@@ -78,41 +79,44 @@ def _cell(share: Share | None) -> TableCell:
 
 def _told(study: Coverage) -> Iterator[str]:
     yield (
-        f"{study.draws} recordings were drawn in which the judged model itself is the truth: its "
-        "inputs uniform within their declared ranges, what was identified by its normal "
-        "covariance, noise, registration and clocks as declared, read where and when the real "
-        "recording was. Each was judged as a recording is. E normal "
-        "with u_val differs in 4.6 %; 2 to 7 % holds. More is too narrow: false alarms. Fewer is "
-        "too wide where a term claims more than it should, and blunt where none does: a uniform "
-        "range by itself never reaches 2 u, and a model judged by itself shows nothing of its own "
-        "mesh. A blunt check raises no false alarm and notices less."
+        f"{study.draws} recordings were drawn in which the checked model itself is the truth. "
+        "Inputs are uniform within their declared ranges; identified parameters follow their "
+        "normal covariance; noise, registration and clocks are as declared. Places and times "
+        "are those of the real recording, and each draw is checked like a recording. If E is "
+        "normal with u_val, 4.6 % of the draws differ; 2 to 7 % is accepted. More: u_val is "
+        "too narrow and gives false alarms. Fewer: u_val is too wide if a term claims too "
+        "much, otherwise the check is blunt. A check can be blunt for two reasons: a uniform "
+        "range alone never reaches 2 u, and the model has the mesh error of the truth. A "
+        "blunt check gives no false alarm and detects less."
     )
     if study.noise != 1:
-        yield f"The noise drawn is {study.noise:g} times the declared one."
+        yield f"The drawn noise is {study.noise:g} times the declared one."
     if any(q.off is not None for q in study.quantities):
         yield (
-            "Inputs act linearly here, by straight lines through one standard uncertainty to both "
-            f"sides: a solution a draw would take too long. {CHECKS} draws were solved whole; the "
-            "table of terms says how far the lines lay off."
+            "Inputs act linearly here, by straight lines through one standard uncertainty to "
+            f"both sides, because one solution for every draw would take too long. {CHECKS} "
+            "draws were solved in full; the table of terms gives the error of the lines."
         )
     yield from study.notes
     if study.still:
-        yield f"Moves nothing that is judged: {', '.join(study.still)}."
+        yield f"Without effect on any check: {', '.join(study.still)}."
 
 
 def _terms(study: Coverage) -> Exhibit:
     rows = tuple(row for q in study.quantities for row in _term_rows(q))
-    head = ("method", "check", "term", "claimed", "shown", "shown over claimed / 1", "rms of E",
-            "line off by")  # fmt: skip
+    head = ("method", "check", "term", "claimed", "observed", "observed over claimed / 1",
+        "rms of E",
+            "error of the line")  # fmt: skip
     words = (
-        "Claimed: the term's part of u_val. Shown: half of the |E| that 4.6 % of the draws exceed "
-        "when only this term is drawn, which for a normal law is its standard deviation; a uniform "
-        "range shows .83. The judged model has its own mesh, so nothing of u_num is ever shown.",
+        "Claimed: the term's part of u_val. Observed: half of the |E| that 4.6 % of the draws "
+        "exceed when only this term is drawn. For a normal law this is the standard "
+        "deviation; for a uniform range it is 0.83 of it. Model and truth have the same mesh, "
+        "so u_num is never observed.",
     )
     table = NumberTable("terms", "Terms of u_val against the draws", head, rows,
-                        "No ratio: nothing is claimed. No line: solved whole, or no input.",
+                        "No ratio: nothing is claimed. No line: solved in full, or not an input.",
                         folded=len(rows) > 20)  # fmt: skip
-    return Exhibit("terms", "Which term is too wide or too narrow", words, (table,))
+    return Exhibit("terms", "Terms that are too wide or too narrow", words, (table,))
 
 
 def _term_rows(q: Quantity) -> Iterator[tuple[float | str | TableCell | None, ...]]:
@@ -132,13 +136,19 @@ def _power(study: Coverage) -> Exhibit:
             "why none")  # fmt: skip
     rows = tuple(_power_row(study, *key) for key in keys)
     words = (
-        "Share of draws in which the model differs though one of its parameters is smaller than "
-        "the true one by so much. What stays at the share of a perfect model, this recording "
-        "cannot tell.",
+        "Share of draws in which the model differs when one parameter is smaller than the "
+        "true one by the given percentage. If the share stays at that of a perfect model, "
+        "this recording cannot detect the error.",
     )
-    table = NumberTable("power", "How often a wrong model differs", head, rows,
+    table = NumberTable("power", "Rate at which a wrong model differs", head, rows,
                         folded=len(rows) > 30)  # fmt: skip
-    return Exhibit("power", "What would be noticed", words, (table,), tuple(_charts(study)))
+    return Exhibit(
+        "power",
+        "Errors of parameters that would be detected",
+        words,
+        (table,),
+        tuple(_charts(study)),
+    )
 
 
 def _power_row(

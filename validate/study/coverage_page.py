@@ -12,9 +12,13 @@ from validate.study.study_page import CellsTable, Findings
 
 
 def told(study: Coverage) -> Findings:
-    band = ("good", "Verdicts hold") if study.passed else ("bad", "Verdicts are off")
+    band = (
+        ("good", "Verdicts hold")
+        if study.passed
+        else ("bad", "Verdicts deviate from their nominal rate")
+    )
     return Findings(
-        f"Coverage of our own verdicts: {study.experiment.title}", sentence(study),
+        f"Coverage of the verdicts: {study.experiment.title}", sentence(study),
         coverage_exhibits(study), document(study), draws_table(study), study.quick,
         passed=study.passed, band=band,
     )  # fmt: skip

@@ -99,7 +99,10 @@ def true_method(experiment: Experiment, name: str) -> str:
     for other in wanted:
         if other in methods and not methods[other].markers and methods[other].steps is None:
             return other
-    raise ComparisonError(f"{experiment.name}: no method without markers could be the truth")
+    raise ComparisonError(
+        f"{experiment.name}: every method uses markers, so none can be the "
+        "truth; declare one without markers"
+    )
 
 
 def reading_cells(job: Job, method: str, worlds: Sequence[World]) -> tuple[ReadingCell, ...]:

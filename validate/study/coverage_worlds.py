@@ -119,7 +119,7 @@ class _Truth:
     def notes(self) -> tuple[str, ...]:
         if self.by == self.method:
             return ()
-        return (f"{self.method}: other worlds by differences of {self.by}, which stands in for it",)
+        return (f"{self.method}: other truths by differences of {self.by}, its surrogate",)
 
     def in_worlds(self, worlds: tuple[World, ...], seconds: float) -> Records:
         """`seconds` that one takes, where that is known."""
@@ -185,7 +185,9 @@ def _mistaken(
     lines = {
         w: _scaled(found[wrong[p, middle]], by / middle, truth.read) for (p, by), w in wrong.items()
     }
-    alone = f"wrong parameters were solved at {100 * middle:g} % alone, straight lines else"
+    alone = (
+        f"wrong parameters were solved at {100 * middle:g} % only, with straight lines elsewhere"
+    )
     return wrong, lines, (f"{truth.method}: {alone}",)
 
 
@@ -227,7 +229,7 @@ def kept(bench: T, job: Job) -> T:
 def _needed(record: Record[ExactReading], method: str) -> ExactReading:
     """Raises `ComparisonError` for a truth that could not be run."""
     if record.value is None:
-        raise ComparisonError(f"{method}: its own truth could not be run: {record.why}")
+        raise ComparisonError(f"{method}: its truth could not be run: {record.why}")
     return record.value
 
 
@@ -251,7 +253,7 @@ def _unsolved(method: str, why: list[str]) -> tuple[str, ...]:
     """A line where drawn inputs leave the truth without a solution: those draws are linear."""
     if not why:
         return ()
-    return (f"{method}: {len(why)} drawn truths have no solution, straight lines there: {why[0]}",)
+    return (f"{method}: {len(why)} drawn truths have no solution and use straight lines: {why[0]}",)
 
 
 def _still(path: str, known: Mapping[str, ExactReading], moved: Mapping[str, ExactReading]) -> bool:

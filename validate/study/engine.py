@@ -70,7 +70,7 @@ def finish(
             report(done, total, f"{done} of {total} cells; {what}")
 
     left = [c for c in plan.cells if c.key not in records]
-    tell("starts the workers" if left else "all were finished before")
+    tell("starts the workers" if left else "all cells were already finished")
     said = _run(plan, left, where, done, tell, here)
     return Finished(records, reused, perf_counter() - start, said)
 
@@ -81,7 +81,7 @@ def _run(
     """Side by side, then those that are timed one by one; on this machine, in this process."""
     beside, timed = [c for c in left if not c.timed], [c for c in left if c.timed]
     if where.workers is not None and where.workers < 0:
-        raise UsageError(f"--workers {where.workers}: 0 (in this process) or more")
+        raise UsageError(f"--workers {where.workers}: expected 0 (in this process) or more")
     if where.scheduler or (beside and where.workers != 0):
         from validate.study.cluster import run_beside, run_in_turn  # Dask takes a second
 

@@ -231,7 +231,8 @@ class Bench:
         ).probes
         if not motions:
             raise ComparisonError(
-                "the truth of the twin has no probes: 0 compared; give it those of the scene"
+                "the truth of the twin has no probes, so nothing can be compared; give it "
+                "those of the scene"
             )
         return motions
 

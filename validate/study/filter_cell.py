@@ -126,7 +126,10 @@ def _left(
     """The markers that a method keeps. Raises `UsageError` for names that do not move."""
     absent = [n for n in held_out if n not in moving]
     if absent:
-        raise UsageError(f"--hold-out {absent[0]}: no marker that moves; there are {list(moving)}")
+        raise UsageError(
+            f"--hold-out {absent[0]}: no moving marker has that name; moving "
+            f"markers are {list(moving)}"
+        )
     left = tuple(n for n in given if n not in held_out)
     if given and not left:
         raise UsageError(

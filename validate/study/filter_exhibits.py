@@ -18,22 +18,23 @@ _SHOWN = 25  # places shown of one ranking; tables/cells.csv has them all
 _SHOWN_OF_MANY = 8  # places of each where there are many conditions
 _FULL = 12  # conditions whose rankings and charts are shown
 _SAME_MODEL = (
-    "The twin is the models' own model, so trusting the model most wins: that is no evidence for a "
-    "body that differs. Change the twin with --set or sweep it, and look for settings that hold."
+    "Twin and methods share one model, so the setting that trusts the model most wins. That "
+    "is no evidence for a different body. Change the twin with --set or sweep it, and find "
+    "settings that stay good."
 )
 _PAIRS = (
-    "All cells of a condition see the same seeds, so differences from the first place are taken "
-    "seed by seed (paired): 'not distinguishable' means that their 95 % interval holds zero. "
-    "Intervals that overlap may still differ in pairs. Nothing is corrected for the number of "
-    "cells: the winner of many is a little better here than it is."
+    "All cells of a condition use the same seeds, and differences from the first place are "
+    "paired by seed. 'Not distinguishable' means that their 95 % interval contains zero. "
+    "Overlapping intervals may still differ in pairs. No correction is made for the number of "
+    "cells: the best of many cells seems slightly better than it is."
 )
 _BLOCKS = (
-    "± is half of Student's 95 % interval over blocks of time; differences from the first place "
-    "are taken block by block. A setting whose innovations stay correlated longer than a block has "
-    "no interval. Measured samples have noise: it is in every score alike."
+    "± is half of Student's 95 % interval over blocks of time; differences from the first "
+    "place are paired by block. A setting whose innovations are correlated for longer than a "
+    "block has no interval. Measured samples contain noise, which is the same in every score."
 )
 _NIS = (
-    "A filter whose NIS lies outside its 95 % band does not know its error: the interval that it "
+    "A filter whose NIS is outside its 95 % band has a wrong covariance: the interval that it "
     "claims is not used."
 )
 _NAMED = 3  # overlapping places that are named
@@ -152,8 +153,8 @@ def _ranking_words(study: FilterStudy) -> Iterator[str]:
         yield study.plan.single_words
     yield _NIS
     yield (
-        "Times are the median and the 99 % quantile of one step in this study's workers, one "
-        "thread each, side by side."
+        "Times are the median and the 99 % quantile of one step. The workers of the study run "
+        "in parallel with one thread each."
     )
     if study.plan.experiment.same_model:
         yield _SAME_MODEL
@@ -238,8 +239,8 @@ def _dominated(ranking: Ranking) -> Iterator[str]:
     beaten = [m for m in methods if m not in front]
     if beaten:
         yield (
-            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times that "
-            f"differ by less than {SAME_TIME:g} times count as equal: that is noise of the clock."
+            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times "
+            f"within a factor of {SAME_TIME:g} count as equal, because step times are noisy."
         )
 
 

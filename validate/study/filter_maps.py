@@ -24,16 +24,17 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
         fixed = _fixed(study, method, axes[2:])
         cells = [c for c in _cells_of(study, method) if fixed.items() <= c.values.items()]
         if fixed:
-            words.append(f"{method}: the other axes are held at {named(fixed)}, its best cell.")
+            words.append(f"{method}: the other axes are fixed at {named(fixed)}, its best cell.")
         if len(axes) == 1:
             charts += _curves(study, method, axes[0], cells)
         else:
             heats += _heats(study, method, axes[0], axes[1], cells)
     if charts or heats:
         yield Exhibit(
-            "axes", "Over the swept values",
-            ("NIS per degree of freedom is 1 for a filter that knows its error; above it is "
-             "over-confident, below under-confident. It is of measured components only.", *words),
+            "axes", "Maps over the swept values",
+            ("NIS per degree of freedom is 1 for a filter with a correct covariance. Above 1 "
+             "the filter is over-confident, below 1 under-confident. Only measured components "
+             "count.", *words),
             charts=tuple(charts), heats=tuple(heats),
         )  # fmt: skip
 

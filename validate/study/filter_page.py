@@ -37,8 +37,8 @@ def sentence(study: FilterStudy) -> str:
     spread = "" if half is None else f" ± {factor * half:.2g}"
     near = sum(p.near for p in study.picks)
     truth = (
-        f" Without truth the pick is within 10 % of the best in {near} of {len(study.picks)} "
-        "recordings."
+        f" Chosen without truth, the setting is within 10 % of the best in {near} of "
+        f"{len(study.picks)} recordings."
         if study.picks
         else ""
     )

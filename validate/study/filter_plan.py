@@ -90,7 +90,9 @@ class FilterPlan:
         if not self.single:
             return ""
         given = ", ".join(f"{m} ({self.experiment.methods[m].markers[0]})" for m in self.single)
-        return f"Given one marker, which is scored by its next sample only: {given}."
+        return (
+            f"These methods are given one marker only and are scored by its next sample: {given}."
+        )
 
 
 def plan(
@@ -110,8 +112,8 @@ def plan(
     filters = [n for n, m in experiment.methods.items() if m.markers]
     if not filters:
         raise UsageError(
-            f"'{experiment.name}' has no filter: none of {', '.join(experiment.methods)} is given "
-            'markers; declare one, as Method("...", KfFem(), markers=("A",)), in its file'
+            f"'{experiment.name}' has no filter: no method of {', '.join(experiment.methods)} "
+            'is given markers; declare one, as Method("...", KfFem(), markers=("A",)), in its file'
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
     methods = _methods(experiment, options.methods, axes)
@@ -198,8 +200,8 @@ def _methods(
     short = [n for n in chosen if n not in whole]
     if short:
         raise UsageError(
-            f"method '{short[0]}' runs {known[short[0]].steps} steps only, to be timed: it has no "
-            "error; leave it out"
+            f"method '{short[0]}' runs {known[short[0]].steps} steps only, for timing, so it "
+            "has no error; leave it out"
         )
     swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
     return chosen or tuple(n for n in whole if n in swept) or usual
@@ -241,7 +243,9 @@ def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tup
         return (0,)
     if isinstance(seeds, tuple):
         if len(set(seeds)) < count:
-            raise UsageError("a seed is given twice: each seed is one sample; name different seeds")
+            raise UsageError(
+                "a seed is given twice, but each seed is one sample; give different seeds"
+            )
         return seeds
     first = {p.path: p.default for p in describe(parameters)}[seed_path]
     return tuple(range(int(first), int(first) + count))
@@ -260,7 +264,9 @@ def _require(
             _require_cases(experiment, a)
             continue
         if a.path == seed_path:
-            raise UsageError(f"'{a.path}' is not swept: --seeds N repeats every cell N times")
+            raise UsageError(
+                f"'{a.path}' cannot be swept; use --seeds N, which repeats every cell N times"
+            )
         if not a.path.startswith(METHODS):
             _require_values(parameters, a.path, a)
             continue
@@ -277,8 +283,8 @@ def _require_cases(experiment: Experiment, axis: Axis) -> None:
     for value in axis.values:
         if value != RECORDED and not experiment.repeats:
             raise UsageError(
-                f"no case '{value}' of {experiment.name}: its recording is measured; a case needs "
-                "a twin"
+                f"no case '{value}' of {experiment.name}: its recording is measured, and only "
+                "a twin has cases"
             )
         require_case(experiment, value)
 

@@ -183,7 +183,7 @@ def endings_exhibit(endings: FilterEndings) -> Exhibit:
         ),
         below="why",
     )
-    return Exhibit("filters", "Filters at their extremes", (sentence(endings),), (table,))
+    return Exhibit("filters", "Filters at extreme settings", (sentence(endings),), (table,))
 
 
 def sentence(endings: FilterEndings) -> str:

@@ -47,17 +47,19 @@ class Best:
         """Reasons not to take it as it is; "" for none."""
         reasons = [f"place {self.ranked.place}: {self.better} is first"] if self.better else []
         if self.ranked.score.half is None:
-            reasons.append("without an interval no two settings can be distinguished")
+            reasons.append("without an interval, settings cannot be distinguished")
         elif self.ties:
             others = "1 other" if self.ties == 1 else f"{self.ties} others"
             reasons.append(f"{others} not distinguishable from it")
         if self.edges:
-            reasons.append(f"at the end of the sweep of {', '.join(self.edges)}: widen it")
+            reasons.append(
+                f"the best value lies at the end of the sweep of {', '.join(self.edges)}: widen it"
+            )
         consistency = self.ranked.result.consistency
         if consistency is not None and not consistency.band_95.holds(consistency.mean):
             reasons.append(
-                f"NIS {consistency.mean:.3g} is outside its 95 % band: the interval that it claims "
-                "is not used"
+                f"NIS {consistency.mean:.3g} is outside its 95 % band: its claimed interval is "
+                "not used"
             )
         return "; ".join(reasons)
 

@@ -142,7 +142,7 @@ def _predicted(columns: Responses, drives: Floats) -> float:
     stepper = ExactPressure().on(columns)
     state = stepper.step(stepper.rest(), drives)
     if state.failure:
-        raise ComparisonError(f"no pressure keeps the volume: {state.failure[1]}")
+        raise ComparisonError(f"no pressure keeps the volume constant: {state.failure[1]}")
     k = columns.drives
     pressures = [state.numbers[f"{c.name}.pressure"] for c in columns.scene.cavities]
     z = np.concatenate([[1.0], drives, pressures])

@@ -10,8 +10,8 @@ from scipy.sparse.linalg import SuperLU
 
 _OF_A_FACTOR = 12  # bytes of an entry of L or U: a number and its row
 DEFINITION = (
-    "bytes of all arrays, sparse matrices and factors that the prepared solver keeps, with its "
-    "scene, mesh and system; what set-up used in between is not in it"
+    "bytes of all arrays, sparse matrices and factors of the prepared solver, its scene, mesh "
+    "and system; temporary memory of the set-up is not included"
 )
 
 

@@ -39,8 +39,9 @@ def end(value: float, is_open: bool) -> str:
 def _values(study: IdentifyStudy) -> Exhibit:
     rows = [_row(c, e) for c in study.calibrated for e in c.found.estimates]
     table = NumberTable(
-        "parameters", "What was identified", HEAD, tuple(rows), below="verdict",
-        note="95 %: where chi-square has risen by 3.84 with all other parameters fitted again.",
+        "parameters", "Identified parameters", HEAD, tuple(rows), below="verdict",
+        note="95 %: the interval in which chi-square rises by less than 3.84, with all other "
+             "parameters fitted again.",
     )  # fmt: skip
     words = tuple(line for c in study.calibrated for line in lines(c))
     return Exhibit("identified", "Identified parameters", words, (table,))
@@ -61,8 +62,8 @@ def _of(study: IdentifyStudy, one: Calibrated) -> Iterator[Exhibit]:
     charts = tuple(_profile(one, e) for e in one.found.estimates)
     yield Exhibit(
         f"profiles_{method}", f"Profiles, {method}",
-        ("How chi-square rises when one parameter is moved and the others are fitted again; "
-         "points were computed, the line goes through them.",),
+        ("Rise of chi-square when one parameter is changed and the others are fitted again. "
+         "Points are computed; the line joins them.",),
         charts=charts, heats=tuple(_correlations(one)), tables=(_starts(one),),
     )  # fmt: skip
 
@@ -108,7 +109,7 @@ def _starts(one: Calibrated) -> NumberTable:
         for i, f in enumerate(found.fits)
     )  # fmt: skip
     name = f"starts_{one.problem.calibration.method}"
-    return NumberTable(name, "Where every start ended", head, rows, below="ended", folded=True)
+    return NumberTable(name, "Result of every start", head, rows, below="ended", folded=True)
 
 
 def _si(one: Calibrated) -> list[str]:

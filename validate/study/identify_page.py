@@ -12,7 +12,11 @@ from validate.study.study_page import CellsTable, Findings
 
 
 def told(study: IdentifyStudy) -> Findings:
-    band = ("good", "Identified") if study.identified else ("open", "Not all is identifiable")
+    band = (
+        ("good", "Identified")
+        if study.identified
+        else ("open", "Some parameters are not identifiable")
+    )
     return Findings(
         f"Identification: {study.experiment.title}", sentence(study), exhibits(study),
         document(study), _cells(study), study.quick,

@@ -59,7 +59,7 @@ class Job:
         path = Path(self.path)
         if file_sha256(path) != self.sha256:
             raise UsageError(
-                f"{path.name} is not the file that the study began with; start it again"
+                f"{path.name} has changed since the study started; start the study again"
             )
         return load_file(path)
 

@@ -38,7 +38,7 @@ def _require_fitting(option: str, patterns: Sequence[str], names: set[str]) -> N
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
             hint = nearest_names(pattern, names)
-            raise UsageError(f"{option} {pattern} fits none of {len(names)} names; {hint}")
+            raise UsageError(f"{option} {pattern} matches none of {len(names)} names; {hint}")
 
 
 def _fits(name: str, patterns: Sequence[str]) -> bool:

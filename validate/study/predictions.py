@@ -87,13 +87,13 @@ def _unfit(content: Json) -> str:
     if content["kind"] == "same model":
         return "recording and model are the same model"
     if content.get("warnings"):
-        return f"doubtful: {content['warnings'][0]}"
+        return f"warning: {content['warnings'][0]}"
     if "--anyway" in content.get("made", {}).get("command", "").split():
-        return "predicted with parameters that are not identifiable (--anyway)"
+        return "predicted with parameters that are not identifiable (option --anyway)"
     if "domain" not in content:
-        return "stored before sizes were; run it again"
+        return "stored by an older version, without sizes; run it again"
     if not any(m.get("accepted") for m in content["methods"]):
-        return "no method of it is accepted"
+        return "it accepts no method"
     return ""
 
 
@@ -103,11 +103,11 @@ def _once(runs: Sequence[Seen]) -> tuple[Seen, ...]:
     fit = sorted((run for run in runs if not run.why), key=_recorded)
     for _, group in groupby(fit, key=_recorded):
         first, *others = sorted(group, key=_standing)
-        instead = f"the same recordings as {first.folder}, which is taken: "
+        instead = f"the same recordings as {first.folder}, which is used because "
         found.append(first)
         for other in others:
             fewer = len(_changed(other.content)) > len(_changed(first.content))
-            reason = "fewer of its settings are changed" if fewer else "it is newer"
+            reason = "it has fewer changed settings" if fewer else "it is newer"
             found.append(Seen(other.folder, other.content, instead + reason))
     return tuple(sorted(found, key=lambda run: run.folder))
 
@@ -140,7 +140,7 @@ def predictions(runs: Iterable[Seen]) -> tuple[tuple[Foretold, ...], dict[str, i
             continue
         method = next(m for m in run.content["methods"] if m.get("accepted"))
         others = sum(len(m["checks"]) for m in run.content["methods"]) - len(method["checks"])
-        _count(left, "of a further method on the same data", others)
+        _count(left, "from another method on the same data", others)
         for check in method["checks"]:
             if why := _no_evidence(check):
                 _count(left, why, 1)
@@ -159,17 +159,17 @@ def _count(left: dict[str, int], why: str, number: int) -> None:
 def _no_evidence(check: Json) -> str:
     """Why a check counts for nothing here."""
     if "validation" not in check:
-        return "stored before there were two answers a check; run it again"
+        return "stored by an older version, with one answer for each check; run it again"
     if check["verdict"] in NO_EVIDENCE or check["validation"] not in _EVIDENCE:
         return str(check["verdict"])
     if not check["count"]:
         return "compared nothing"
     if check["u_num"] is None:
-        return "nothing bounds the numerical error"
+        return "the numerical error has no bound"
     if not check.get("kind") or not check.get("size"):
-        return "of nothing that has a size (a distance, a ratio)"
+        return "the quantity has no size to compare with (a distance, a ratio)"
     if check["size"]["u"] > _ROUGH * check["size"]["measured"]:
-        return f"measured to no better than {100 * _ROUGH:g} %"
+        return f"measured with an uncertainty above {100 * _ROUGH:g} %"
     return ""
 
 

@@ -134,7 +134,7 @@ def _why_not(value: FilterScores, by: str, names: frozenset[str], most: frozense
     if by == LOG_LOSS or (by not in value.scores and not most):
         return f"no innovations, so no {by}"
     return (
-        f"scored on {', '.join(sorted(names)) or 'nothing'}, the others on "
+        f"scored on {', '.join(sorted(names)) or 'nothing'}, other cells on "
         f"{', '.join(sorted(most))}: give it two markers or more, or name --hold-out"
     )
 

@@ -19,9 +19,9 @@ AHEAD = "ahead.rmse"  # of markers that were given: each sample from those befor
 LOG_LOSS = "log_loss"  # minus log-likelihood of a measured component, its density in metres
 WORDS = {
     POOLED: "rms error against the truth of the twin along one axis, over its probes and all steps",
-    WITHHELD: "rms distance from what was measured and not given: markers that were held out, and "
-    "the next sample of those that were given (noise included)",
-    HELD_OUT: "rms distance from what was measured of markers that were held out (noise included)",
+    WITHHELD: "rms distance from measurements that the filter was not given: held-out "
+    "markers, and the next sample of given markers (noise included)",
+    HELD_OUT: "rms distance from the measurements of held-out markers (noise included)",
     AHEAD: "rms distance of a given marker's next sample from its prediction (noise included)",
     LOG_LOSS: "minus log-likelihood of the innovations per measured component, densities in "
     "metres; without innovations, of a Gaussian with the error variance of the other blocks",

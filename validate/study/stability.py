@@ -195,7 +195,7 @@ def _drift(ran: tuple[Stepped, ...]) -> Prediction:
     changes = [abs(d.double - 1) for d in kept if d.double is not None]
     worst = max(changes, default=None)
     holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE
-    why = "energy of schemes that conserve it, over 1e5 undamped steps in float64"
+    why = "energy of conservative schemes over 1e5 undamped steps in float64"
     return Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)
 
 
@@ -207,5 +207,5 @@ def _refusals(study: Stability) -> Prediction:
         if bool(refused) != bool(cell.expected) or cell.expected not in refused:
             wrong.append(f"{cell.variant}: '{refused}'")
     count = sum(1 for c in study.cells if c.expected)
-    why = wrong[0] if wrong else "refused where it must be, for its reason, and nowhere else"
+    why = wrong[0] if wrong else "refused exactly where required, for the right reason"
     return Prediction("refusals", len(wrong), 0, count, not wrong and count > 0, why)

@@ -79,7 +79,9 @@ def open_bench(job: Job) -> StabilityBench:
     """Raises `ComparisonError` for an experiment that has nothing to be stepped."""
     body = body_of(job.experiment())
     if body is None:
-        raise ComparisonError("the experiment declares no density: nothing steps in time")
+        raise ComparisonError(
+            "the experiment declares no density, so no scheme can step in time; set material.rho"
+        )
     return StabilityBench(body)
 
 

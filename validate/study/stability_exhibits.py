@@ -37,7 +37,7 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
     return (
         _claims(study),
         *((_papers(study),) if study.base.papers else ()),
-        Exhibit("maps", "Where every scheme is stable", tuple(_map_words(study)), regimes=maps),
+        Exhibit("maps", "Stability limits of all schemes", tuple(_map_words(study)), regimes=maps),
         _limits(study),
         _conditions(study),
         _drifts(study),
@@ -55,13 +55,14 @@ def _claims(study: Stability) -> Exhibit:
         for p in study.predictions
     )
     head = ("claim", "worst / 1", "limit / 1", "count", "verdict", "what")
-    table = NumberTable("predictions", "Predictions against what was measured", head, rows)
+    table = NumberTable("predictions", "Predicted and measured limits", head, rows)
     words = (
-        "Measured: the spectral radius of the step map over all modes of the body, and for limits "
-        "the step at which it passes 1 (bisection). Predicted: the schemes' own formulas with the "
-        "highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one step map.",
-        "Large strain schemes (central, newton_dynamics) are judged at rest, where they are "
-        "linear; their limit moves as a body deforms.",
+        "Measured: the spectral radius of the step map over all modes of the body; a limit is "
+        "the step at which it passes 1 (bisection). Predicted: the formula of each scheme "
+        "with the highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one "
+        "step map.",
+        "Large strain schemes (central, newton_dynamics) are evaluated at rest, where they "
+        "are linear; their limit changes as the body deforms.",
     )
     return Exhibit("predictions", "Predictions", words, tables=(table,))
 
@@ -70,9 +71,9 @@ def _papers(study: Stability) -> Exhibit:
     rows = [row for p in study.base.papers for row in _paper_rows(study, p)]
     head = ("setting", "source", "h / ms", "scheme", "regime", "radius / 1", "h over limit / 1",
             "why")  # fmt: skip
-    note = "Refused: nothing runs with that material; no radius."
-    table = NumberTable("papers", "The papers' own settings", head, tuple(rows), note)
-    return Exhibit("papers", "The papers' own settings", (), tables=(table,))
+    note = "Refused: the scheme does not run with that material, so there is no radius."
+    table = NumberTable("papers", "Settings of the papers", head, tuple(rows), note)
+    return Exhibit("papers", "Settings of the papers", (), tables=(table,))
 
 
 def _paper_rows(study: Stability, paper: PaperSetting) -> Iterator[tuple[Entry, ...]]:
@@ -101,8 +102,8 @@ def _map_words(study: Stability) -> Iterator[str]:
         "time here; pairs are in tables/cells.csv."
     )
     yield (
-        "Stable says that nothing grows, not that the motion is right: 'too large to resolve' are "
-        "steps with fewer than ten in the slowest period."
+        "Stable means that nothing grows, not that the motion is accurate. 'Too large to "
+        "resolve' means fewer than ten steps in the slowest period."
     )
 
 
@@ -132,8 +133,8 @@ def _map(study: Stability, name: str) -> RegimeMap | None:
 
 def _caption(marks: tuple[Mark, ...]) -> str:
     hollow = any(not m.on_map for m in marks)
-    more = " Hollow: differs from the base in more than this; see the table." if hollow else ""
-    return f"Line: predicted limit. Marks: the papers' own settings.{more}"
+    more = " Hollow: differs from the base in further quantities; see the table." if hollow else ""
+    return f"Line: predicted limit. Marks: settings of the papers.{more}"
 
 
 def _rows(study: Stability, name: str) -> tuple[Turned, ...]:
@@ -212,8 +213,16 @@ def _limits(study: Stability) -> Exhibit:
                 row = (*variant_row(cell.variant), s.predicted, s.measured, error)
                 rows.append((s.scheme, *row))
     rows.sort(key=lambda r: -abs(float(r[-1])) if isinstance(r[-1], float) else -np.inf)
-    head = ("scheme", *VARIANT, "predicted limit / s", "measured limit / s", "apart / 1")
-    title = f"Predicted and measured limits: the {min(_WORST, len(rows))} furthest apart"
+    head = (
+        "scheme",
+        *VARIANT,
+        "predicted limit / s",
+        "measured limit / s",
+        "relative difference / 1",
+    )
+    title = (
+        f"Predicted and measured limits: the {min(_WORST, len(rows))} with the largest difference"
+    )
     table = NumberTable("limits", f"{title} of {len(rows)}", head, tuple(rows[:_WORST]))
     return Exhibit("limits", "Limits", (), tables=(table,))
 
@@ -230,14 +239,17 @@ def _conditions(study: Stability) -> Exhibit:
             "float32 static / 1", f"float32 {STEPS} steps, positions / 1",
             f"float32 {STEPS} steps, velocities / 1", "warning")  # fmt: skip
     words = (
-        "Locking factor: compliance under the static load over that of mixed Taylor-Hood elements "
-        "on the same mesh (1: no locking, .1: ten times too stiff). It holds the mesh error, too.",
+        "Locking factor: compliance under the static load over that of mixed Taylor-Hood "
+        "elements on the same mesh (1: no locking; 0.1: ten times too stiff). It includes the "
+        "mesh error.",
         "float32: largest difference from float64 over the largest displacement, of a direct "
         f"static solution and of {STEPS} explicit steps at 2 % of the limit. J is that of average "
         "acceleration at the paper's step; M is consistent.",
     )
     table = NumberTable("conditions", "Conditioning, locking, single precision", head, tuple(rows))
-    return Exhibit("conditions", "What the cells cost", words, tables=(table,))
+    return Exhibit(
+        "conditions", "Conditioning, locking and precision of the cells", words, tables=(table,)
+    )
 
 
 def _cost(r: Stepped) -> tuple[Entry, ...]:
@@ -263,11 +275,14 @@ def _drifts(study: Stability) -> Exhibit:
     head = ("scheme", "h / ms", "keeps energy", "energy left, float64 / 1",
             "energy left, float32 / 1")  # fmt: skip
     words = (
-        f"Undamped, {_described(drift_variant(study.base))}: all modes stepped {DRIFT_STEPS:g} "
-        "times by their step maps from the same strain energy; explicit schemes at half their "
-        "limit, implicit ones at the paper's step. Explicit schemes keep an energy of half steps.",
+        f"Undamped, {_described(drift_variant(study.base))}: all modes are advanced "
+        f"{DRIFT_STEPS:g} times by their step maps from the same strain energy. Explicit "
+        "schemes use half their limit, implicit ones the paper's step. Explicit schemes "
+        "conserve an energy of half steps.",
     )
-    table = NumberTable("drift", "Energy after 1e5 steps over that at the start", head, tuple(rows))
+    table = NumberTable(
+        "drift", "Energy after 1e5 steps over the initial energy", head, tuple(rows)
+    )
     return Exhibit("drift", "Drift", words, tables=(table,))
 
 
@@ -277,5 +292,5 @@ def _refused(study: Stability) -> Exhibit:
         for c in study.cells
         if (why := study.done.records[c.key].why)
     ]
-    table = NumberTable("refused", "Refused, and why", (*VARIANT, "why"), tuple(rows))
+    table = NumberTable("refused", "Refused schemes and reasons", (*VARIANT, "why"), tuple(rows))
     return Exhibit("refused", "Refused", (), tables=(table,))

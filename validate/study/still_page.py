@@ -11,15 +11,15 @@ from validate.study.study_page import CellsTable, Findings
 
 _REGIMES = ("settles", "never settles")
 _NOTHING = (
-    "{name} declares no density and no fluid: no scheme of it marches in time, and none of its "
-    "statics is a loop; there is no stability to be mapped."
+    "{name} declares no density and no fluid. It has no scheme that marches in time and no "
+    "pressure loop, so there is no stability to map."
 )
 
 
 def told_nothing(experiment: Experiment, quick: bool) -> Findings:
     """A page that says so."""
     said = _NOTHING.format(name=experiment.name)
-    words = Exhibit("stability", "Nothing steps in time", (said,))
+    words = Exhibit("stability", "No scheme steps in time", (said,))
     document = {"kind": "stability", "points": 0}
     return Findings(f"Stability map: {experiment.title}", said, (words,), document, ((), ()), quick)
 
@@ -44,18 +44,19 @@ def sentence(found: GainMap) -> str:
     errors = [abs(v.error) for _, v in found.limits if v.error is not None]
     limits = [v.measured for _, v in found.limits if v.measured is not None]
     if not limits:
-        return "Nothing steps in time; no limit of the pressure loop's gain was found."
+        return "No scheme steps in time; no limit of the pressure loop's gain was found."
     tuned = found.limits[0][1].tuned
     return (
-        "Nothing steps in time; the loop that keeps the fluid's volume settles up to gains of "
-        f"{min(limits):.4g} to {max(limits):.4g} Pa (tuned: {tuned:.4g} Pa), at most "
+        "No scheme steps in time; the loop that keeps the fluid's volume settles up to gains "
+        f"of {min(limits):.4g} to {max(limits):.4g} Pa (tuned: {tuned:.4g} Pa), at most "
         f"{100 * max(errors):.2g} % from the predicted ones, {100 * TOLERANCE:g} % allowed."
     )
 
 
 def _exhibit(found: GainMap) -> Exhibit:
     head = ("share of the largest load / 1", "predicted limit / Pa", "measured limit / Pa",
-            "apart / 1", "tuned gain / Pa", "updates at the nearest gain")  # fmt: skip
+            "relative difference / 1", "tuned gain / Pa",
+                "updates at the nearest gain")  # fmt: skip
     rows = []
     for cell, v in found.limits:
         nearest = int(np.argmin(np.abs(np.log(np.array(v.gains) / v.tuned))))

@@ -78,13 +78,20 @@ def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) ->
         try:
             record = _record(read_sealed(path)["record"], kind)
         except (RecordingError, ValueError, TypeError, KeyError, AttributeError) as error:
-            why = str(error) if isinstance(error, RecordingError) else f"{path.name}: no record"
+            why = (
+                str(error)
+                if isinstance(error, RecordingError)
+                else (f"{path.name}: it contains no record")
+            )
             doubts.append(f"{why}; the cell is computed again")
             continue
         if record.key == key and record.code == code:
             found[key] = record
         else:
-            doubts.append(f"{path.name}: made by other code; the cell is computed again")
+            doubts.append(
+                f"{path.name}: computed by a different version of the code; the cell "
+                "is computed again"
+            )
     return StoredRecords(found, tuple(doubts))
 
 

@@ -99,7 +99,7 @@ def read_as(path: Path, make: Callable[[Any], T]) -> T:
 
         raise UsageError(told_apart(file) or f"{error}; run it again") from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{file} is no results.json of validate: {error!r:.80}") from error
+        raise UsageError(f"{file} is not a results.json of validate: {error!r:.80}") from error
 
 
 def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
@@ -108,7 +108,7 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
     Raises `UsageError` for fewer than two runs, `ComparisonError` when no score is shared.
     """
     if len(runs) < 2:
-        raise UsageError(f"{len(runs)} run to compare: name two or more report folders")
+        raise UsageError(f"{len(runs)} run to compare; give two or more report folders")
     runs = tuple(runs)
     names = _distinct([r.name for r in runs])
     columns, found = _by_method(runs, names)

@@ -93,7 +93,7 @@ def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
         first = turned[0]
         why = (
             f"{len(turned)} of {len(points)} predictions have the wrong sign "
-            f"({first.experiment}: {first.check}): there is no ratio"
+            f"({first.experiment}: {first.check}): a ratio is not possible"
         )
         return OfKind(kind, tuple(points), None, covered, why)
     stated = statement(

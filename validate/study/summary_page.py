@@ -19,21 +19,21 @@ _PERCENT = 100.0
 STATED = ("quantity", "bias / %", "scatter / %", "measurement / %", "predictions", "specimens")
 COVERED = ("size", "strain / %", "rate / 1/s", "body / mm")
 _WORDS = (
-    "Bias: predicted over true, less one. Scatter: relative standard deviation of the predictions, "
-    "with that of the measurements (its own column) removed; what is not known of moduli, geometry "
-    "and friction stays in it. Both with 95 % intervals over specimens (McGrattan and Toman 2011; "
-    "NUREG-1824).",
-    "Repeats of one specimen under one load count once, and specimens weigh the same however many "
-    "loads they had. What cannot be decided counts; what was fitted never does, and neither do "
-    "quick or doubtful runs. Of each run the first accepted method counts.",
-    "Outside the sizes, strains, rates and bodies that a row names it says nothing.",
+    "Bias: predicted over true, less one. Scatter: relative standard deviation of the "
+    "predictions, without that of the measurements (a separate column). Unknown moduli, "
+    "geometry and friction are included in it. Both with 95 % intervals over specimens "
+    "(McGrattan and Toman 2011; NUREG-1824).",
+    "Repeats of one specimen under one load count once. All specimens have the same weight, "
+    "whatever the number of their loads. Undecided checks count. Fitted checks, quick runs "
+    "and runs with warnings do not. The first accepted method of each run counts.",
+    "A row is valid only for the sizes, strains, rates and bodies that it names.",
 )
 
 
 def write_summary(found: Summary, folder: Path) -> Path:
     """Replaces `folder`; returns the path of report.html. Raises what `replace_folder` does."""
     told = (
-        "summary", "What is predicted, over all stored runs", f"{len(found.taken)} stored runs",
+        "summary", "Prediction errors over all stored runs", f"{len(found.taken)} stored runs",
         sentence(found),
     )  # fmt: skip
     exhibits = (
@@ -42,7 +42,7 @@ def write_summary(found: Summary, folder: Path) -> Path:
         *_twins(found),
         Exhibit("predictions", "Every prediction that counts",
                 tables=(_points("predictions", found.kinds),)),
-        Exhibit("runs", "Runs that count and runs that do not", tuple(_left(found)),
+        Exhibit("runs", "Counted and excluded runs", tuple(_left(found)),
                 (_runs(found),)),
     )  # fmt: skip
     return write_loose(told, exhibits, document(found), folder, "Summary")
@@ -51,7 +51,7 @@ def write_summary(found: Summary, folder: Path) -> Path:
 def sentence(found: Summary) -> str:
     """The statement over measured recordings in one sentence."""
     if not found.kinds:
-        return "No stored run of a measured recording counts; twins are in a table of their own."
+        return "No stored run of a measured recording counts; twins are in a separate table."
     points = sum(len(k.points) for k in found.kinds)
     specimens = len({p.specimen for k in found.kinds for p in k.points})
     parts = "; ".join(f"{k.kind} {_short(k)}" for k in found.kinds)
@@ -118,7 +118,7 @@ def _table(name: str, kinds: tuple[OfKind, ...]) -> NumberTable:
     rows = tuple((*row(kind), kind.why) for kind in kinds)
     note = "" if rows else "No stored run counts."
     return NumberTable(
-        name, "By what was measured.", (*STATED, *COVERED, "why"), rows, note, below="why"
+        name, "Grouped by measured quantity.", (*STATED, *COVERED, "why"), rows, note, below="why"
     )
 
 
@@ -135,9 +135,9 @@ def _pictures(name: str, kinds: tuple[OfKind, ...]) -> tuple[Picture, ...]:
         for k in kinds
     ]  # fmt: skip
     caption = (
-        "Predicted against measured size of everything that counts, on logarithmic axes. Grey: "
-        "two standard deviations of the measurements; blue: bias of the models and two of their "
-        "scatter."
+        "Predicted against measured size of all counted checks, on logarithmic axes. Grey: "
+        "two standard deviations of the measurements. Blue: bias of the models and two "
+        "standard deviations of their scatter."
     )
     return (against(name, caption, panels),) if panels else ()
 
@@ -146,7 +146,7 @@ def _twins(found: Summary) -> tuple[Exhibit, ...]:
     """What twins say, in tables of their own; nothing without one."""
     if not found.twins:
         return ()
-    words = ("Models of ours, finer than the ones judged: no measurement.",)
+    words = ("Recordings made by our finer models; they are not measurements.",)
     tables = (_table("twins", found.twins), _points("twin_predictions", found.twins))
     return (Exhibit("twins", "Twins", words, tables),)
 
@@ -158,8 +158,8 @@ def _points(name: str, kinds: tuple[OfKind, ...]) -> NumberTable:
     )  # fmt: skip
     rows = tuple(_point(p) for k in kinds for p in k.points)
     words = (
-        "Sizes along what was measured; E, u_val and verdict are the check's own. Area: between "
-        "the distributions of prediction and measurement, in the unit of E."
+        "Sizes are along the measured direction; E, u_val and verdict are those of the check. "
+        "Area: between the distributions of prediction and measurement, in the unit of E."
     )
     return NumberTable(name, words, head, rows, "" if rows else "None.", below="runs")
 

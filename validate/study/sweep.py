@@ -46,7 +46,7 @@ def axis(text: str) -> Axis:
     found = _spaced(text, kind, values) if spaced else _listed(text, values)
     twice = [v for i, v in enumerate(found) if v in found[:i]]
     if twice:
-        raise UsageError(f"--sweep {text}: '{twice[0]}' stands twice; each value once")
+        raise UsageError(f"--sweep {text}: '{twice[0]}' is given twice; give each value once")
     return Axis(path, found)
 
 
@@ -90,7 +90,10 @@ def _number(text: str, unit: str) -> float | None:
 def _listed(text: str, values: str) -> tuple[str, ...]:
     found = tuple(part.strip() for part in values.split(","))
     if not all(found):
-        raise UsageError(f"--sweep {text}: an empty value between commas")
+        raise UsageError(
+            f"--sweep {text}: there is an empty value between commas; give one "
+            "value between two commas"
+        )
     return found
 
 
@@ -103,7 +106,10 @@ def _spaced(text: str, kind: str, values: str) -> tuple[str, ...]:
     except (IndexError, ValueError):
         raise UsageError(f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT") from None
     if start is None or end is None:
-        raise UsageError(f"--sweep {text}: FIRST and LAST are numbers, bare (SI) or of one unit")
+        raise UsageError(
+            f"--sweep {text}: expected FIRST and LAST as numbers, without a unit "
+            "(SI) or with the same unit"
+        )
     if len(parts) != 4 or not 2 <= count <= LARGEST or not np.isfinite([start, end]).all():
         raise UsageError(
             f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT with 2 to {LARGEST} values"

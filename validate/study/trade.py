@@ -40,10 +40,11 @@ KIND = "tradeoff"
 ErrorUnit = Literal["m", "N", "Pa"]
 ERRORS: Mapping[ErrorUnit, str] = MappingProxyType(
     {
-        "m": "root mean square over the frames and points of the length of u - u_reference, the "
-        "mesh's displacements read at the same points of the body on every mesh",
-        "N": "root mean square over the frames and drives of the force less the reference's",
-        "Pa": "root mean square over the frames and cavities of the pressure less the reference's",
+        "m": "root mean square over frames and points of |u - u_reference|; displacements are "
+        "read at the same points of the body on every mesh",
+        "N": "root mean square over frames and drives of the force minus that of the reference",
+        "Pa": "root mean square over frames and cavities of the pressure minus that of the "
+        "reference",
     }
 )
 _SHOWN: Mapping[ErrorUnit, tuple[float, str]] = MappingProxyType(
@@ -280,7 +281,7 @@ def traded(
     if trial.reference not in answers:
         why = next(r.why for c, r in records if c.part == "best")
         why = why or f"the reference solver has no number in {unit}"
-        raise ComparisonError(f"no reference, 0 compared: {why}")
+        raise ComparisonError(f"no reference, so nothing was compared: {why}")
     gap, words = _law_gap(trial, {c.part: r for c, r in records}, unit)
     solved = [(c, r) for c, r in records if c.part == "solver"]
     rows = tuple(row for c, r in solved for row in _rows(trial, c, r, answers, gap, unit))

@@ -221,7 +221,7 @@ def _stride(
     steps = len(trial.times(dt))
     needed = steps * (tried.step_s.p50 if tried.step_s else 0.0)
     if needed > budget:
-        why = f"timed only: its {steps} steps take {needed:.0f} s, more than {budget:g} s"
+        why = f"only timed: its {steps} steps take {needed:.0f} s, more than {budget:g} s"
         return replace(stride, step=tried.step_s, failed=why)
     run = _march(trial, stepper, dt, setup)
     if not run.finished:

@@ -12,14 +12,14 @@ from validate.study.trade import ERRORS, ParetoFront, Refinement, Trade, TradeRo
 from validate.study.trade_regions import regions_exhibit
 
 _MM, _US, _MB = 1e3, 1e6, 1e-6
-_NAMES = {"error": "error", "total": "error with the law's share"}
+_NAMES = {"error": "error", "total": "error including the law"}
 _EVEN = 2.0  # of two shares neither dominates within this ratio
 _CASE = ("solver", "element", "mesh", "step / ms")
 _TIMES = (
-    "All cells ran one after another in one process, linear algebra on one thread: times of cells "
-    "side by side would be those of their quarrel over memory. A time is the median of a step plus "
-    "that of forming the displacements of all nodes; a busy machine's clock is noisy, so times "
-    f"within {SAME_TIME:g} times count as the same."
+    "All cells ran one after another in one process, with linear algebra on one thread; "
+    "parallel cells would compete for memory. A time is the median of a step plus that of "
+    "forming the displacements of all nodes. Step times are noisy on a busy machine: times "
+    f"within {SAME_TIME:g} times count as equal."
 )
 
 
@@ -62,9 +62,9 @@ def _front_exhibit(trade: Trade) -> Exhibit:
     words = [
         f"Error: {ERRORS[trade.unit]}. {len(scene.points)} points, {len(scene.frames)} frames; "
         f"the reference ({scene.reference[0]} mesh {scene.reference[1]}, no solver error) "
-        f"{'moves' if trade.unit == 'm' else 'has'} {trade.shown(trade.moved, 4)} rms and is "
-        f"itself off by about {trade.shown(trade.floor, 2)} "
-        "(Richardson): smaller errors count as equal.",
+        f"{'moves' if trade.unit == 'm' else 'has'} {trade.shown(trade.moved, 4)} rms and has "
+        f"an error of about {trade.shown(trade.floor, 2)} (Richardson): smaller errors count "
+        "as equal.",
         _law_words(trade),
         _TIMES,
     ]
@@ -81,18 +81,19 @@ def _front_exhibit(trade: Trade) -> Exhibit:
 
 def _law_words(trade: Trade) -> str:
     if trade.law_error is None:
-        return f"What large strain changes is not known: {trade.law_words}."
+        return f"The effect of large strain is not known: {trade.law_words}."
     return (
-        f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes the "
-        f"answer by {trade.shown(trade.law_error)} rms; the second front adds that difference to "
-        "the reference and so holds the linear and the large-strain solvers against one truth."
+        f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes "
+        f"the answer by {trade.shown(trade.law_error)} rms. The second front adds that "
+        "difference to the reference, so linear and large-strain solvers are compared with "
+        "one truth."
     )
 
 
 def _dominated(front: ParetoFront) -> Iterable[str]:
     if front.dominated:
         named = "; ".join(front.dominated)
-        yield f"Dominated by {_NAMES[front.by]}, on every mesh and step tried: {named}."
+        yield f"Dominated by {_NAMES[front.by]}, on all tested meshes and steps: {named}."
 
 
 def _front_table(front: ParetoFront, trade: Trade) -> NumberTable:
@@ -100,7 +101,10 @@ def _front_table(front: ParetoFront, trade: Trade) -> NumberTable:
     head = (*_CASE, "time / us", "rate / Hz", f"{_NAMES[front.by]} / {unit}", f"of the {whole} / %",
             f"mesh's share / {unit}", f"solver's share / {unit}", "dominates")  # fmt: skip
     rows = tuple(_front_row(r, front.by, trade) for r in front.rows)
-    title = f"Pareto front of {_NAMES[front.by]}, fastest first: nothing is less wrong and faster"
+    title = (
+        f"Pareto front of {_NAMES[front.by]}, fastest first: no cell has both less error "
+        "and less time"
+    )
     return NumberTable(f"front_{front.by}", title, head, rows)
 
 
@@ -120,7 +124,7 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
         if mine:
             series.append(Series(rung, *_points(mine, front.by, trade.scale), "points"))
     series.append(Series("Pareto front", *_points(front.rows, front.by, trade.scale)))
-    levels = [("reference's own error", trade.scale * trade.floor)]
+    levels = [("error of the reference", trade.scale * trade.floor)]
     if front.by == "total":
         levels += _law_level(trade)
     return Chart(
@@ -129,7 +133,8 @@ def _front_chart(front: ParetoFront, trade: Trade) -> Chart:
         tuple(series),
         levels=tuple(levels), log="xy",
         caption="A point is one solver on one mesh with one element and one step. Levels: the "
-        "reference's own error" + (", what the linear law costs" if len(levels) > 1 else ""),
+                "error of the reference"
+                + (", the error of the linear law" if len(levels) > 1 else ""),
     )  # fmt: skip
 
 
@@ -162,14 +167,18 @@ def _shares(trade: Trade) -> Exhibit:
         counts[dominant(r, trade)] = counts.get(dominant(r, trade), 0) + 1
     named = ", ".join(f"{k} {v}" for k, v in sorted(counts.items(), key=lambda kv: -kv[1]))
     words = (
-        "The mesh's share is the error of a solver that makes none on that mesh, the solver's "
-        "share (time step, masses, damping, iterations, modes left out) the distance from that "
-        "answer. They are lengths in different directions: they add at most, and may cancel.",
-        f"Of {len(scored)} cells the largest share is that of: {named}.",
+        "The mesh's share is the error of an exact solver on that mesh. The solver's share is "
+        "the distance from that solution (time step, masses, damping, iterations, omitted "
+        "modes). They are lengths in different directions: at most they add, and they may "
+        "cancel.",
+        f"Of {len(scored)} cells, the largest share is that of: {named}.",
     )
-    note = "Of every solver, element and mesh the step with the least error; cells.csv has all."
-    table = NumberTable("shares", "What each error is made of", head, cells, note)
-    return Exhibit("shares", "Mesh error beside solver error", words, tables=(table,),
+    note = (
+        "One row for every solver, element and mesh: the step with the least error. "
+        "cells.csv has all steps."
+    )
+    table = NumberTable("shares", "Components of each error", head, cells, note)
+    return Exhibit("shares", "Mesh error and solver error", words, tables=(table,),
                    charts=(_mesh_chart(trade),))  # fmt: skip
 
 
@@ -195,9 +204,10 @@ def _mesh_chart(trade: Trade) -> Chart:
                 Series(element, x, trade.scale * np.array([found[level] for level in at]))
             )
     return Chart(
-        "mesh_error", "What the mesh costs", "cell size / mm",
+        "mesh_error", "Mesh error against cell size", "cell size / mm",
         f"mesh's share / {trade.shown_unit}", tuple(series),
-        levels=(("reference's own error", trade.scale * trade.floor), *_law_level(trade)), log="xy",
+        levels=(("error of the reference", trade.scale * trade.floor), *_law_level(trade)), log=
+            "xy",
     )  # fmt: skip
 
 
@@ -211,12 +221,13 @@ def _costs(trade: Trade) -> Exhibit:
                 for r in trade.rows if r.step is not None}  # fmt: skip
     cells = tuple(_cost_row(r) for r in shortest.values())
     words = (
-        "Set-up is from the scene to the first step, at the first of the solver's steps. Matrices "
-        "are assembled when first asked for: K stiffness, M mass, C damping, m lumped masses; a "
-        "solver without inertia has made no mass, an explicit one at large strain no K.",
+        "Set-up is from the scene to the first step, at the first of the solver's steps. "
+        "Matrices are assembled at first use: K stiffness, M mass, C damping, m lumped "
+        "masses. A solver without inertia has no mass matrix; an explicit one at large strain "
+        "has no K.",
         f"Memory: {DEFINITION}.",
     )
-    note = "Of every solver, element and mesh one step; cells.csv has all."
+    note = "One step of every solver, element and mesh; cells.csv has all."
     table = NumberTable("costs", "Set-up, time per step, memory", head, cells, note)
     return Exhibit("costs", "Set-up, steps and memory", words, tables=(table,))
 
@@ -240,10 +251,11 @@ def _convergence(trade: Trade) -> Exhibit:
             f"GCI of the {whole} / %")  # fmt: skip
     ladders = tuple(_ladder_row(x, trade) for x in trade.refinements)
     words = (
-        "Of the finest answer of each ladder: the observed order from three answers, Richardson's "
-        "estimate of its error, and the grid convergence index, 1.25 times that where the order is "
-        "observed and plausible, else 3 times (Roache 1994; Celik et al. 2008). Two answers show "
-        "no order: the theoretical one is used. Refinements over steps are on one mesh.",
+        "For the finest solution of each ladder: the observed order from three solutions, "
+        "Richardson's estimate of its error, and the grid convergence index. The index is "
+        "1.25 times that estimate if the observed order is plausible, else 3 times (Roache "
+        "1994; Celik et al. 2008). Two solutions have no observed order: the theoretical one "
+        "is used. Steps are refined on one mesh.",
         _compared(trade),
     )
     table = NumberTable("convergence", "Discretisation error", head, ladders)
@@ -256,12 +268,13 @@ def _compared(trade: Trade) -> str:
     meshes = [x.found.error for x in trade.refinements if x.unit == "m"]
     steps = [x.found.error for x in trade.refinements if x.unit == "s"]
     if not (meshes and steps):
-        return "The scene has no time steps: the meshes are all there is to refine."
+        return "The scene has no time steps: only meshes can be refined."
     first = "mesh" if max(meshes) > max(steps) else "step"
     return (
-        f"At the finest of each ladder meshes leave {trade.shown(min(meshes), 2)} to "
-        f"{trade.shown(max(meshes), 2)}, time steps {trade.shown(min(steps), 2)} to "
-        f"{trade.shown(max(steps), 2)}: refine the {first} first."
+        "At the finest level of each ladder the error of the mesh is "
+        f"{trade.shown(min(meshes), 2)} to {trade.shown(max(meshes), 2)}, that of the time "
+        f"step {trade.shown(min(steps), 2)} to {trade.shown(max(steps), 2)}: refine the "
+        f"{first} first."
     )
 
 
@@ -277,5 +290,5 @@ def _ladder_row(x: Refinement, trade: Trade) -> tuple[Entry, ...]:
 def _failures(rows: Sequence[TradeRow]) -> Exhibit:
     cells = tuple((*case(r), r.failed) for r in rows)
     table = NumberTable("unscored", "Cells without an error", (*_CASE, "why"), cells)
-    words = (f"{len(rows)} cells were refused, ended early or were timed only; none is hidden.",)
+    words = (f"{len(rows)} cells were refused, ended early or were only timed. All are listed.",)
     return Exhibit("unscored", "Cells without an error", words, tables=(table,))

@@ -22,8 +22,12 @@ def regions_exhibit(trade: Trade) -> Exhibit | None:
          _MS * r.step.max, None if r.error is None else trade.scale * r.error)
         for r in rows if r.step
     )  # fmt: skip
-    table = NumberTable("regions", "Times of a step by size, displacements not formed", head, shown)
-    return Exhibit("regions", "At which size regions pay", tuple(pays(trade)), tables=(table,))
+    table = NumberTable(
+        "regions", "Times of a step by body size, without forming displacements", head, shown
+    )
+    return Exhibit(
+        "regions", "Body size from which regions are faster", tuple(pays(trade)), tables=(table,)
+    )
 
 
 def pays(trade: Trade) -> Iterator[str]:
@@ -35,10 +39,10 @@ def pays(trade: Trade) -> Iterator[str]:
         if words := _of_size(list(mine)):
             yield words
     yield (
-        "The slow steps of regions are those in which far regions are due, too: a deadline must "
-        "hold them (a busy machine lengthens slow steps of all). A reduced model holds for a "
-        "linear body whose contact stays; regions pay where matrices change at every step, or "
-        "where the far region is solved elsewhere."
+        "Regions are slow in the steps in which far regions are also solved; a deadline must "
+        "allow for them. (A busy machine lengthens the slow steps of every method.) A reduced "
+        "model is valid for a linear body whose contact does not move. Regions are useful "
+        "where matrices change at every step, or where another machine solves the far region."
     )
 
 

@@ -73,12 +73,12 @@ class Camera:
         if not (self.sd >= 0 and self.every >= 1 and 0 <= self.missing < 1 and self.still >= 1):
             raise RecordingError(
                 f"camera with sd {self.sd:g} m, every {self.every}, missing {self.missing:g}, "
-                f"still {self.still}: sd >= 0, every and still >= 1, 0 <= missing < 1"
+                f"still {self.still}: expected sd >= 0, every and still >= 1, 0 <= missing < 1"
             )
         if not (0 <= self.outliers < 1 and self.astray > 0 and self.late >= 0):
             raise RecordingError(
                 f"camera with outliers {self.outliers:g}, astray {self.astray:g} m, late "
-                f"{self.late:g} s: 0 <= outliers < 1, astray > 0, late >= 0"
+                f"{self.late:g} s: expected 0 <= outliers < 1, astray > 0, late >= 0"
             )
 
     @property
@@ -124,7 +124,8 @@ def require_noise(variance: float) -> None:
     """Raises `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
     if not variance > 0:
         raise UsageError(
-            f"twin.noise = {variance:g} m2: a variance above 0; 1e-16 is a tracker without noise"
+            f"twin.noise = {variance:g} m2: expected a variance above 0; for a tracker without "
+            "noise use 1e-16"
         )
 
 
@@ -180,13 +181,13 @@ def record_tracked(
     """
     clash = sorted(set(points.names) & set(fiducials))
     if clash:
-        raise RecordingError(f"markers {clash} are both tracked points and fiducials: rename")
+        raise RecordingError(f"markers {clash} are both tracked points and fiducials; rename them")
     lead = 1 if points.t[0] > 0 else 0
     seen = _with_fiducials(points, fiducials, lead)
     if np.abs(seen.u[0]).max() > _AT_REST:
         raise RecordingError(
-            f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm off their rest at t = 0 s: the "
-            "registration needs the rest first"
+            f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
+            "at t = 0 s: the registration needs the body at rest first"
         )
     seeds = streams(origin.seed, ("markers", "missing", *readings, "odd"))
     clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}

@@ -40,14 +40,14 @@ def damping_exhibit(
     two = {n: e.at("E_n", 2.0) or 0.0 for n, e in errors.items()}
     numbers = {"damping.papers": two[PAPERS], "damping.matched": two[MATCHED]}
     table = instants_table(
-        "diagonal_damping", "Implicit, consistent mass, C diagonal, against the whole C.",
+        "diagonal_damping", "Implicit, consistent mass, C diagonal, against the full C.",
         errors, _METRICS, units_in(scene.mesh.dimension),
     )  # fmt: skip
     chart = Chart(
         "damping_ratios", "Damping of the modes by the form of C", "frequency / (1/s)",
         "damping ratio / 1", tuple(Series(n, modes.omega, xi) for n, xi in ratios.items()),
         levels=(("critical", 1.0),), log="xy",
-        caption="βK damps fast modes most, αM slow ones; a diagonal C cannot do both.",
+        caption="βK damps fast modes most and αM slow ones; a diagonal C cannot do both.",
     )  # fmt: skip
     shown = Exhibit("damping", "A diagonal damping matrix", _words(modes, ratios, two),
                     (_by_mode(modes, ratios), table), (chart,))  # fmt: skip
@@ -96,17 +96,17 @@ def _by_mode(modes: Modes, ratios: Mapping[str, Floats]) -> NumberTable:
         (k + 1, float(modes.omega[k]), *(float(xi[k]) for xi in ratios.values())) for k in shown
     ]
     heads = ("mode", "frequency / (1/s)", *ratios)
-    return NumberTable("damping_ratios", "Damping ratio of the modes by the form of C (1: no swing "
-                       "is left).", heads, tuple(rows))  # fmt: skip
+    return NumberTable("damping_ratios", "Damping ratio of the modes by the form of C (1: "
+                                         "critical damping).", heads, tuple(rows))  # fmt: skip
 
 
 def _words(modes: Modes, ratios: Mapping[str, Floats], two: Mapping[str, float]) -> tuple[str, ...]:
     full, papers, last = ratios[FULL], ratios[PAPERS], ratios[DIAGONAL]
     return (
-        f"αM leaves the first mode {papers[0]:.2g} of critical damping instead of {full[0]:.2g}, "
-        f"and the last of {len(full)} {papers[-1]:.2g} instead of {full[-1]:.2g}: what βK kept "
-        "from ringing rings.",
-        f"Matched to the first mode, α'M has an E_n of {two[MATCHED]:.2g} at 2 s beside "
-        f"{two[PAPERS]:.2g} of αM; the diagonal of C itself would damp the first mode "
+        f"αM leaves the first mode {papers[0]:.2g} of critical damping instead of "
+        f"{full[0]:.2g}, and the last of {len(full)} {papers[-1]:.2g} instead of "
+        f"{full[-1]:.2g}: high modes that βK damps now ring.",
+        f"Matched to the first mode, α'M has an E_n of {two[MATCHED]:.2g} at 2 s, compared "
+        f"with {two[PAPERS]:.2g} of αM; the diagonal of C itself would damp the first mode "
         f"{last[0] / full[0]:.2g} times too much.",
     )

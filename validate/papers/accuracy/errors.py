@@ -209,10 +209,10 @@ def switches_exhibit(case: Mapping[str, Followed], dimension: int) -> tuple[Exhi
     ratio = restricted / lumped if lumped else 0.0
     words = (
         f"At 2 s the restriction C = αM alone costs {ratio:.1f} times the E_i of lumped masses "
-        "alone: what the paper calls the error of mass lumping is in large part the damping that "
-        "its diagonal form drops.",
+        "alone. A large part of what the paper calls the error of mass lumping is the damping "
+        "that the diagonal form omits.",
     )
-    return Exhibit("switches", "Lumping and the damping it drops", words, (table,)), ratio
+    return Exhibit("switches", "Lumping and the omitted damping", words, (table,)), ratio
 
 
 def mesh_words(finer: Mapping[str, Errors], errors: Mapping[str, Errors]) -> str:
@@ -221,7 +221,7 @@ def mesh_words(finer: Mapping[str, Errors], errors: Mapping[str, Errors]) -> str
     worst = [max(errors[n].at("E_n", t) or 0.0 for n in RIVALS[:-1]) for t in INSTANTS]
     above = sum(m > w for m, w in zip(mesh, worst, strict=True))
     return (
-        f"At {above} of {len(INSTANTS)} instants the mesh's own E_n ({min(mesh):.2g} to "
+        f"At {above} of {len(INSTANTS)} instants the E_n of the mesh ({min(mesh):.2g} to "
         f"{max(mesh):.2g}) exceeds that of every solver but quasi-static ({min(worst):.2g} to "
         f"{max(worst):.2g} for the worst of them)."
     )
@@ -257,14 +257,14 @@ def static_exhibit(
     chart = Chart(
         "static", "Distance to the static solution", "time / s",
         "|u − u_static| / |u_static| / 1", tuple(lines), log="y", scale=1.0,
-        caption="Nodal norm. All solvers reach the one static solution, on ways of their own.",
+        caption="Nodal norm. All solvers reach the same static solution, on different paths.",
     )  # fmt: skip
     ends = [float(s.y[-1]) for s in lines]
     words = (
-        f"At {t[-1]:g} s the {len(lines)} dynamic methods are within {max(ends):.1e} of the static "
-        "solution, which knows no mass and no damping.",
+        f"At {t[-1]:g} s the {len(lines)} dynamic methods are within {max(ends):.1e} of the "
+        "static solution, which contains neither mass nor damping.",
     )
-    return Exhibit("static", "One static solution", words, (), (chart,)), max(ends)
+    return Exhibit("static", "Common static solution", words, (), (chart,)), max(ends)
 
 
 # --- limits --------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from validate.papers.accuracy.stated import NEEDLE_STATED, ROD_STATED
 
 def _trivial(values: Values) -> str:
     part = values["told"]["explicit.over.lumped"]
-    return f"but trivially: the explicit part is {part:.2g} of the other"
+    return f"but this is trivial: the explicit part is {part:.2g} of the other"
 
 
 def _whole(values: Values) -> str:
@@ -81,8 +81,8 @@ NEEDLE_FIGURES = (
     Figure(
         "E_s of quasi-static MP2 over implicit MP1, mean over time", "told:material.mean",
         None, None, "1", "not comparable",
-        "printed in words ('far less error'), which ours is: against implicit MP2 the material "
-        "matters more than the solver",
+        "printed in words ('far less error'), and true for ours: against implicit MP2 the "
+        "material matters more than the solver",
         "section VI.B, Fig. 11", 7.3e-4, 1e-4,
     ),
     Figure(
@@ -105,8 +105,8 @@ NEEDLE_FIGURES = (
     Figure(
         "'2 beta >= gamma >= 1/2 is unconditionally stable': limit of beta .25, gamma .5",
         "told:clash", 0.0, None, "1", "not reproduced",
-        "the rule is that of the usual beta; with the paper's, twice as large, these pass and are "
-        "unstable beyond this w h", "section V.A", 2.828427, 1e-5,
+        "the rule is that of the usual beta; the paper's beta is twice as large, so these "
+        "values pass and are unstable beyond this w h", "section V.A", 2.828427, 1e-5,
     ),
     Figure(
         "printed update of u: limit w h without damping", "told:misprint.0", 0.0, None, "1",
@@ -120,7 +120,7 @@ NEEDLE_FIGURES = (
 
 def _of_the_mesh(values: Values) -> str:
     return (
-        "a number of the mesh, which is not printed: ours is on 6 x 3 x 3 hexahedra, and "
+        "it depends on the mesh, which is not printed: ours is on 6 x 3 x 3 hexahedra, and "
         f"{values['told']['crossing.6']:.2f} s on 12 x 6 x 6"
     )
 
@@ -129,14 +129,14 @@ def _of_the_mesh(values: Values) -> str:
 ROD_FIGURES = (
     *_ways("rod", 4.0, 0.9333, 1.32),
     Figure(
-        "rod passes below its static place", "told:crossing.3", 4.2, None, "s",
+        "rod passes below its static position", "told:crossing.3", 4.2, None, "s",
         "not reproducible as printed", _of_the_mesh, "section VI.A, Fig. 9", 4.261, 2e-3,
     ),
     Figure(
         "quasi-static error nearly 0 there", "told:quasi.dip", 4.2, None, "s",
         "not reproducible as printed",
-        "first minimum of E_i of quasi-static, to 1/6 s; it lies near the tip's crossing and moves "
-        "with the mesh as that does", "section VI.A", 4.3333, 1e-3,
+        "first minimum of E_i of quasi-static, to 1/6 s; it is near the crossing of the tip "
+        "and depends on the mesh in the same way", "section VI.A", 4.3333, 1e-3,
     ),
     *ROD_STATED,
 )  # fmt: skip

@@ -113,13 +113,14 @@ def _block(n: int, material: str, plane: PlaneState) -> System:
 def _words(errors: Mapping[str, Errors]) -> tuple[str, ...]:
     ratio, part = sum_ratio(errors)
     return (
-        "The paper's order in E_i (explicit, then the lumped methods, then quasi-static) holds at "
-        f"{100 * ordered_share(errors, until=_MOVING):.0f} % of the compared times after the first "
-        f"step and up to {_MOVING:g} s; later quasi-static, which has "
-        "arrived, passes below the lumped methods wherever the implicit run swings through rest "
+        "The paper's order in E_i (explicit, then the lumped methods, then quasi-static) "
+        f"holds at {100 * ordered_share(errors, until=_MOVING):.0f} % of the compared times "
+        f"after the first step and up to {_MOVING:g} s; later the quasi-static solver, already "
+        "at rest, is below the lumped methods when the implicit run swings through rest "
         f"({100 * ordered_share(errors):.0f} % of all times).",
-        f"Explicit with lumped masses has {ratio:.2f} times the sum of the two errors it combines "
-        f"(median); but the explicit part is {part:.2g} of the lumped one, so this says little.",
+        f"Explicit with lumped masses has {ratio:.2f} times the sum of the two errors it "
+        f"combines (median); but the explicit part is {part:.2g} of the lumped one, so this "
+        "shows little.",
         "The treatment of the needle matters more than the integrator: here its velocity is the "
         "planned one, its node's coupling terms are kept, and a0 = 0.",
     )
@@ -179,10 +180,10 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     chart = Chart(
         "materials", "E_s against the implicit run with MP2", "time / s", "E_s / 1",
         tuple(e.line("E_s") for e in found.values()), log="y",
-        caption="As figure 11: no solver makes up for a wrong material.",
+        caption="As figure 11: no solver corrects a wrong material.",
     )  # fmt: skip
     table = instants_table(
-        "materials", "MP1's answers, and MP2's own quasi-statics, against implicit MP2.", found,
+        "materials", "The solutions with MP1, and quasi-static MP2, against implicit MP2.", found,
         ("E_n", "E_s", "E_i"), units_in(2),
     )  # fmt: skip
     wrong = errors["implicit"].at("E_s", 10.0) or 0.0
@@ -191,8 +192,8 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     words = (
         _refusals(p),
         f"Mean E_s: quasi-static with MP2 has {mean:.2g} of implicit with MP1.",
-        "'Quasi-static consistently performs worst' is MP1's: the stiff MP2 follows the needle at "
-        "once, and there the lumped methods are worse at most instants.",
+        "'Quasi-static consistently performs worst' is true for MP1. The stiff MP2 follows "
+        "the needle at once, and there the lumped methods are worse at most instants.",
     )
     return (
         Exhibit("materials", "The wrong material", words, (table, _by_scene(p)), (chart,)),
@@ -216,7 +217,7 @@ def _by_scene(p: SolverTest) -> NumberTable:
                 rows.append((f"{material}, plane {plane}", FIVE[name].label, *found, ended))
     t = truth.t[truth.at[frames]]
     return NumberTable(
-        "scenes", "E_n of every method against the implicit run of its own scene.",
+        "scenes", "E_n of every method against the implicit run of the same scene.",
         ("scene", "method", *(f"at {x:g} s" for x in t), "ended"), tuple(rows),
         "Refused: the step of 1/30 s is above the critical one.",
     )  # fmt: skip
@@ -284,8 +285,9 @@ def _iterations() -> tuple[Exhibit, dict[str, float]]:
         tuple(rows),
     )  # fmt: skip
     words = (
-        "'Several thousand' iterations for MP2 are plane strain's; in plane stress, where the "
-        "thickness gives way, a few hundred do. A residual of 1e-6 leaves errors of 1e-5 to 1e-3.",
+        "'Several thousand' iterations for MP2 are those of plane strain; in plane stress, "
+        "where the thickness is free, a few hundred are enough. A residual of 1e-6 leaves "
+        "errors of 1e-5 to 1e-3.",
     )
     return Exhibit("iterations", "Gauss-Seidel iterations", words, (table,)), numbers
 
@@ -336,7 +338,7 @@ def _meshes(cases: Cases, errors: Mapping[str, Errors]) -> tuple[Exhibit, dict[s
         f"{100 * locked['MP2']:.0f} % with MP2.",
     )
     numbers |= {f"locking.{k}": v for k, v in locked.items()}
-    return Exhibit("mesh-error", "What the mesh costs", words, (table, own)), numbers
+    return Exhibit("mesh-error", "Errors of the mesh", words, (table, own)), numbers
 
 
 def _locking(n: int, material: Material) -> float:

@@ -31,7 +31,7 @@ EXACT = 0.4999999  # of the reference: its volume strains are below 1e-6 of its 
 NEARLY = 0.4999  # of elements that do not lock, which need a finite lambda
 _ROUNDING = 1e-8  # of the load: a smaller net force is none
 _HEADS = (
-    "kept incompressible by", "λ / μ", "critical step / ms", "displacement error / %",
+    "method of incompressibility", "λ / μ", "critical step / ms", "displacement error / %",
     "volume strain over strain / %", "compliance over exact / %", "net force over load / %",
     "undamped growth / (1/s)",
 )  # fmt: skip
@@ -189,11 +189,11 @@ def _shown(
 ) -> Exhibit:
     table = NumberTable(
         "penalty",
-        "Statics under the load against the exact constraint (mixed elements, finer mesh), and "
-        "what it costs in the critical step, 2/w_max with lumped masses.",
+        "Statics under the load against the exact constraint (mixed elements, finer mesh), "
+        "and the critical step, 2/w_max with lumped masses.",
         _HEADS, rows,
-        "Net force: the penalty's forces summed over the body, which no support or load asked for. "
-        "Growth: of free motion without damping; where it is not 0 no step is stable without it.",
+        "Net force: sum of the penalty forces over the body, which must be 0. Growth: of free "
+        "motion without damping; where it is not 0, no step is stable without damping.",
     )  # fmt: skip
     charts = tuple(
         Chart(
@@ -208,10 +208,10 @@ def _shown(
 
 
 _CHARTS = (
-    ("error", "Error of the displacement by the step it leaves", "displacement error / %",
-     "To the left the penalty is heavier. Linear simplices lock before they are right."),
-    ("volume", "Volume that is lost or won", "volume strain over strain / %",
-     "The penalty keeps the volume of every cell, and with it the cells from deforming."),
+    ("error", "Displacement error against critical step", "displacement error / %",
+     "The penalty increases to the left. Linear simplices lock before they are accurate."),
+    ("volume", "Change of volume", "volume strain over strain / %",
+     "The penalty keeps the volume of every cell and thereby prevents the cells from deforming."),
 )  # fmt: skip
 
 
@@ -234,11 +234,11 @@ def _said(
         else "they do not add up within a cell, though over this regular mesh they happen to"
     )
     return (
-        "Area-weighted normals are a raised λ, to rounding: against a high Poisson ratio of the "
-        f"same λ/μ they gain no step ({1e3 * area[best].step:.3g} ms to "
-        f"{1e3 * raised[best].step:.3g} ms), and with E kept the shear modulus stays {shear:.2f} "
-        "times that of the incompressible body.",
-        f"No weight is right: the least error is {100 * area[best].error:.0f} % at k = "
+        "Area-weighted normals are a raised λ, to rounding: against a high Poisson ratio of "
+        f"the same λ/μ they do not increase the step ({1e3 * area[best].step:.3g} ms to "
+        f"{1e3 * raised[best].step:.3g} ms), and with E kept the shear modulus stays "
+        f"{shear:.2f} times that of the incompressible body.",
+        f"No weight is accurate: the least error is {100 * area[best].error:.0f} % at k = "
         f"{WEIGHTS[best]:g} μ, and at k = {WEIGHTS[-1]:g} μ the body shows "
         f"{100 * last.compliance:.0f} % of its compliance at a volume strain of "
         f"{100 * last.volume:.2g} %: it locks. {words.capitalize()} are "

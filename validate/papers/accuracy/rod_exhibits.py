@@ -36,7 +36,7 @@ from validate.replay.followed import Cases
 from validate.solve.march import march
 
 _FIGURES = {
-    "E_n": "The paper draws E_i only; E_n beside it.",
+    "E_n": "The paper draws E_i only; E_n is added here.",
     "E_s": "Exact volumes of the symmetric difference of the bodies.",
     "E_i": "As figures 9 and 10: quasi-static dips where the rod swings through its steady state.",
     "E_i_linear": "As figure 9, linear.",
@@ -87,12 +87,14 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 def _words(errors: Mapping[str, Errors]) -> tuple[str, ...]:
     ratio, part = sum_ratio(errors)
     return (
-        "The paper's order in E_i (explicit, then the lumped methods, then quasi-static) holds at "
-        f"{100 * ordered_share(errors, until=_MOVING):.0f} % of the compared times after the first "
-        f"step and up to {_MOVING:g} s, {100 * ordered_share(errors):.0f} % of all: quasi-static "
-        "has arrived and is right whenever the rod swings through rest.",
-        f"Explicit with lumped masses has {ratio:.2f} times the sum of the two errors it combines "
-        f"(median); but the explicit part is {part:.2g} of the lumped one, so this says little.",
+        "The paper's order in E_i (explicit, then the lumped methods, then quasi-static) "
+        f"holds at {100 * ordered_share(errors, until=_MOVING):.0f} % of the compared times "
+        f"after the first step and up to {_MOVING:g} s, {100 * ordered_share(errors):.0f} % of "
+        "all: the quasi-static solver is at rest and is accurate whenever the rod swings "
+        "through rest.",
+        f"Explicit with lumped masses has {ratio:.2f} times the sum of the two errors it "
+        f"combines (median); but the explicit part is {part:.2g} of the lumped one, so this "
+        "shows little.",
     )
 
 
@@ -119,20 +121,21 @@ def _dips() -> tuple[Exhibit, dict[str, float]]:
     rows.append(("Euler-Bernoulli", None, 1e3 * beam(shear=False), None))
     rows.append(("Timoshenko", None, 1e3 * beam(shear=True), None))
     table = NumberTable(
-        "crossing", "First time at which the tip passes below its static place, implicit run.",
+        "crossing", "First time at which the tip passes below its static position, implicit run.",
         ("cells across", "cells", "static tip / mm", "first crossing / s"), tuple(rows),
-        "The tip is the middle of the end face. Beams have one number and no time here.",
+        "The tip is the middle of the end face. Beam theory gives only the static tip, not the "
+        "crossing.",
     )  # fmt: skip
     chart = Chart(
-        "crossing", "The tip above its static place", "time / s", "u_z − static / mm",
+        "crossing", "Tip above its static position", "time / s", "u_z − static / mm",
         tuple(lines), levels=(("static", 0.0),),
-        caption="The crossing moves with the mesh; the paper's 4.2 s is a coarse one's.",
+        caption="The crossing depends on the mesh; the paper's 4.2 s is that of a coarse mesh.",
     )  # fmt: skip
     words = (
-        "The rod is heavily damped (0.70 of critical): a period is no test quantity, the first "
-        "crossing is.",
+        "The rod is heavily damped (0.70 of critical): the first crossing is a test quantity, "
+        "a period is not.",
     )
-    return Exhibit("crossing", "When the rod dips below its static place", words, (table,),
+    return Exhibit("crossing", "First crossing of the static position", words, (table,),
                    (chart,)), numbers  # fmt: skip
 
 
@@ -178,4 +181,4 @@ def _mesh_error(finer: Mapping[str, Errors], said: str) -> Exhibit:
         "mesh_error", "Against the implicit run on a mesh twice as fine.", finer,
         ("E_n", "E_i"), units_in(3),
     )  # fmt: skip
-    return Exhibit("mesh-error", "What the mesh costs", (said,), (table,))
+    return Exhibit("mesh-error", "Errors of the mesh", (said,), (table,))

@@ -76,14 +76,15 @@ def rules_exhibit() -> tuple[Exhibit, dict[str, float]]:
     numbers = {"order": observed_order(), "clash": found[1], "misprint.0": found[2],
                "misprint.1": found[3], "misprint.3": found[4]}  # fmt: skip
     words = (
-        "'2 beta >= gamma >= 1/2' is the rule for the usual beta; the paper's own is twice that, "
-        f"so beta = .25, gamma = .5 passes it and is unstable beyond w h = {found[1]:.3f}.",
-        "The printed update of u has v at the new time where the old one belongs: unstable from "
-        f"w h = {found[2]:.3f} without damping. The benchmarks' own damping hides it (radii below "
-        "1 in the second table), and what is left is a wrong path.",
+        "'2 beta >= gamma >= 1/2' is the rule for the usual beta; the paper's beta is twice "
+        "as large, so beta = .25, gamma = .5 passes it and is unstable beyond w h = "
+        f"{found[1]:.3f}.",
+        "The printed update of u uses v at the new time instead of the old one: unstable from "
+        f"w h = {found[2]:.3f} without damping. The damping of the benchmarks hides this "
+        "(radii below 1 in the second table), and the path is wrong.",
     )
     tables = (table, _misprint_table())
-    return Exhibit("rules", "The rules as printed", words, tables, (chart,)), numbers
+    return Exhibit("rules", "Stability rules as printed", words, tables, (chart,)), numbers
 
 
 def observed_order() -> float:

@@ -160,7 +160,7 @@ def sensitivity_exhibit(bench: TurnedBench) -> Exhibit:
     costs = _costs(bench, off, {n: s.against(own) for n, s in beside.items()}, solvers)
     slopes = _slopes(bench, ends, solvers)
     return Exhibit(
-        "sensitivity", "What material and mesh do to the metrics", _words(bench, off, solvers),
+        "sensitivity", "Influence of material and mesh on the metrics", _words(bench, off, solvers),
         (costs, slopes),
     )  # fmt: skip
 
@@ -189,8 +189,9 @@ def _costs(bench: TurnedBench, off: Mapping[str, Means], beside: Mapping[str, Me
         f"{', '.join(f'{t:g}' for t in AT)} s: implicit runs with one input changed, then other "
         "solvers of the nominal scene.",
         heads, tuple(rows),
-        "Per ln p: the metric over |ln(changed/nominal)|, to first order what an input wrong by a "
-        "factor of e would cost. The distance is one of answers, not a growth of an error.",
+        "Per ln p: the metric over |ln(changed/nominal)|, to first order the change caused by "
+        "an input that is wrong by a factor of e. It is a distance between solutions, not the "
+        "growth of an error.",
     )  # fmt: skip
 
 
@@ -209,8 +210,8 @@ def _slopes(bench: TurnedBench, ends: Mapping[str, tuple[SolvedScene, ...]],
     gone = {f"{t}: {n} is {why}" for t in ends for s in ends[t] for n, why in s.refused.items()}
     return NumberTable(
         "sensitivity_slopes",
-        "d ln E / d ln p of the solvers' errors, each against the implicit run of its own scene "
-        "(1: the error is proportional to the input).",
+        "d ln E / d ln p of the solvers' errors, each against the implicit run of the same "
+        "scene (1: the error is proportional to the input).",
         ("method", "metric", "nominal", *turned), tuple(rows),
         f"Without a value: {'; '.join(sorted(gone))}." if gone else "",
     )  # fmt: skip
@@ -229,8 +230,9 @@ def _words(
     worst = solvers["explicit_lumped"]["E_n"] or 0.0
     above = [f"{words} ({cost:.2g})" for cost, words in costs if cost > worst]
     return (
-        f"Explicit steps with lumped masses have a mean E_n of {worst:.2g}. An input that is off "
-        f"costs more: {', '.join(above)}; the others less."
+        f"Explicit steps with lumped masses have a mean E_n of {worst:.2g}. A wrong input has "
+        f"a larger effect: {', '.join(above)}; the other inputs have a smaller one."
         if above
-        else f"No input costs as much as explicit steps with lumped masses, E_n {worst:.2g}.",
+        else "No input has an effect as large as explicit steps with lumped masses, E_n "
+        f"{worst:.2g}.",
     )

@@ -30,7 +30,7 @@ NEEDLE_STATED = (
     said("Fig. 1: symmetric difference of two shapes", None, "1", "section III.B, Fig. 1",
          "a sketch; E_s is exact, and 'Deformed shapes' draws the areas it counts"),
     said("Fig. 2: block and needle", None, "1", "section IV.A, Fig. 2",
-         "a picture without numbers: 'Deformed shapes' draws ours"),
+         "a figure without numbers: 'Deformed shapes' draws ours"),
     *_material("MP1", MP1, (200.0, 0.47, 2000.0, 1.0, 0.1), "section IV.A, Table 1"),
     *_material("MP2", MP2, (60e3, 0.495, 1140.0, 1.0, 0.1), "section IV.A, Table 2"),
     taken("height and width of the block", 1.0, _SIDE, "m", "section IV.A, Tables 1 and 2"),
@@ -61,15 +61,16 @@ NEEDLE_STATED = (
     said("Poisson ratio of the incompressible", 0.5, "1", "section VI.B",
          "refused by displacement elements with the reason; mixed ones run to .4999999"),
     drawn("Picinbono's penalty: least displacement error over its weights", "told:penalty.best",
-          "1", "sections VI.B and VII", "left to the future there; against the exact constraint, "
-          "beside a high Poisson ratio of the same critical step"),
+          "1", "sections VI.B and VII", "future work in the paper; against the exact "
+                                        "constraint, compared with a high Poisson ratio of "
+                                        "the same critical step"),
     drawn("diagonal damping: E_n at 2 s of C = αM", "told:damping.papers", "1", "section VII",
-          "left to the future there; consistent mass, so the damping alone"),
+          "future work in the paper; consistent mass, so the damping alone"),
 )  # fmt: skip
 
 ROD_STATED = (
     said("Fig. 3: the bending rod", None, "1", "section IV.B, Fig. 3",
-         "a picture without numbers: 'Deformed shapes' draws ours"),
+         "a figure without numbers: 'Deformed shapes' draws ours"),
     *_material("MP3", MP3, (7000.0, 0.2, 10_000.0, 1.0, 0.1), "section IV.B, Table 3"),
     taken("width of the rod", 0.5, SIZE[0], "m", "section IV.B, Table 3", "an input; its length"),
     taken("depth of the rod", 0.25, SIZE[1], "m", "section IV.B, Table 3"),
@@ -82,10 +83,10 @@ ROD_STATED = (
           "section VI.A, Fig. 10", _CURVE),
     drawn("Picinbono's penalty on the rod: least displacement error over its weights",
           "told:penalty.best", "1", "sections VI.B and VII",
-          "left to the future there; the lightest weight, for linear tetrahedra lock"),
+          "future work in the paper; the smallest weight, because linear tetrahedra lock"),
     drawn("Picinbono's penalty on the rod: net force of unit normals over the weight",
           "told:penalty.net", "1", "sections VI.B and VII",
           "'no formal methods are given to justify the realism of this artificial force'"),
     drawn("diagonal damping of the rod: E_n at 2 s of C = αM", "told:damping.papers", "1",
-          "section VII", "left to the future there; consistent mass, so the damping alone"),
+          "section VII", "future work in the paper; consistent mass, so the damping alone"),
 )  # fmt: skip

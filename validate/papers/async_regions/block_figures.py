@@ -12,13 +12,13 @@ from validate.solve.region_map import layers_from, node_graph, split
 _WIDE = 12  # cells of Fig. 2's square: its rows of the list are 13 nodes apart
 _NEAR = 2  # layers of the red region there: 3 by 3 nodes
 _NONE = (
-    "no force, size or time is printed in 2-D or 3-D: 'a one dimensional model is used' (section "
-    "6); Figs 1 and 2 show how regions lie"
+    "no force, size or time is printed in 2-D or 3-D: 'a one dimensional model is used' "
+    "(section 6); Figs 1 and 2 show the arrangement of regions"
 )
 _LIST = (
-    "the list of Fig. 2(b) begins (42,48), its other rows at 54, 67, 80 and 93, 13 apart: the "
-    "first must be 41 to 47; and a ring 7 nodes wide and 5 high around 3 by 3 is no whole number "
-    "of layers. By distance in the mesh one layer has 16 nodes, two have 40"
+    "the list of Fig. 2(b) starts at (42,48), its other rows at 54, 67, 80 and 93, in steps "
+    "of 13: the first must be 41 to 47. A ring 7 nodes wide and 5 high around 3 by 3 is not a "
+    "whole number of layers. By distance in the mesh, one layer has 16 nodes and two have 40"
 )
 
 

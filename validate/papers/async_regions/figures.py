@@ -23,15 +23,15 @@ _GAINS = {"n30_f500": 29.7, "n30_f50": 46.3, "n5_f500": 66.3, "n5_f5": 90.3}
 
 def _wall(values: Values) -> str:
     return (
-        f"the described algorithm gives {values['told']['peak.n5_f5']:.2f} N; 2.86 N is the static "
-        "limit of a bar of 20 nodes in front of a fixed wall"
+        f"the described algorithm gives {values['told']['peak.n5_f5']:.2f} N; 2.86 N is the "
+        "static limit of a bar of 20 nodes with a fixed end"
     )
 
 
 def _peak(row: str) -> Figure:
     return Figure(
         f"peak force near 20 s, {_LABEL[row]}", f"told:peak.{row}", ROWS[row], 0.02, "N",
-        "reproduced", "row label by reason", _TABLE_1, _OURS[row], 0.005,
+        "reproduced", "row label inferred", _TABLE_1, _OURS[row], 0.005,
     )  # fmt: skip
 
 
@@ -48,12 +48,12 @@ TABLE_1 = (
     ),
     Figure(
         "force error, N = 30, f = 50 Hz", "told:error.n30_f50", 6.6, 0.66, "%", "not reproduced",
-        "1.76 over 1.65 is 6.7 %; how long the chirp lasts is not printed and moves the peak",
+        "1.76 over 1.65 is 6.7 %; the duration of the chirp is not printed and changes the peak",
         _TABLE_1, 7.43, 0.2,
     ),
     Figure(
         "force error, N = 5, f = 500 Hz", "told:error.n5_f500", 2.7, 0.27, "%", "reproduced",
-        "row label by reason", _TABLE_1, 2.71, 0.1,
+        "row label inferred", _TABLE_1, 2.71, 0.1,
     ),
     Figure(
         "force error, N = 5, f = 5 Hz", "told:error.n5_f5", 73.0, None, "%",

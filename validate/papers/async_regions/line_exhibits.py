@@ -38,14 +38,15 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     maps = _stability(p)
     words = (
         "Row labels of Table 1 are lost in the text; they follow from its sentences.",
-        "A peak hides phase, and a mean the slow frame: rms and the worst tick stand beside.",
-        "Every variant has the exact static limit; borders damp, like a dashpot of the slow "
-        "region's stiffness times its period.",
+        "A peak hides the phase and a mean hides slow ticks, so the tables also give rms and "
+        "the worst tick.",
+        "Every variant has the exact static limit. Borders damp like a dashpot: stiffness of "
+        "the slow region times its period.",
     )
     tables = Exhibit("tables", "Tables 1 and 2", words, (first, second))
     bounds = Exhibit(
         "borders",
-        "What borders do",
+        "Effects of borders",
         (*_BORDERS, *spring_words(p)),
         (_impedances(p, main), energy),
         heats=(maps,),
@@ -55,8 +56,8 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 
 _BORDERS = (
     ENERGY,
-    "Growth is the spectral radius over a common period, per tick, with the probe held: above 1 "
-    "some motion grows without bound.",
+    "Growth is the spectral radius over a common period, per tick, with the probe held: above "
+    "1 a motion grows without bound.",
 )
 
 

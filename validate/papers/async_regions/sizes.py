@@ -52,9 +52,9 @@ def size_rows(
 def size_table(rows: tuple[tuple[Entry, ...], ...]) -> NumberTable:
     return NumberTable(
         "sizes",
-        "Ticks by size, CPU time, one run of this machine. The worst tick of regions is one in "
-        "which all of them are due: it meets no deadline that the whole solve misses, unless the "
-        "far region is solved elsewhere.",
+        "Ticks by size, CPU time, one run of this machine. The worst tick of regions is one "
+        "in which all of them are solved. It meets no deadline that the full solve misses, "
+        "unless another machine solves the far region.",
         HEADS,
         rows,
     )

@@ -60,11 +60,11 @@ def sliding_exhibit(
     chart = Chart("sliding", "Force across the face while the probe is drawn along it",
                   "time / s", "force on the hand / N", tuple(series))  # fmt: skip
     words = (
-        "The regions of every contact are made once, at the first tick that needs them; a node "
-        "that another region takes over stands where it is seen.",
+        "The regions of every contact are computed once, at the first tick that needs them. A "
+        "node that moves to another region keeps the displacement that was shown.",
         ENERGY,
     )
     energies = replace(energy_table("Energy of the same run.", scene, slide, path),
                        name="sliding_energy")  # fmt: skip
     table = NumberTable("sliding", title, heads, tuple(rows))
-    return Exhibit("sliding", "A contact that slides", words, (table, energies), charts=(chart,))
+    return Exhibit("sliding", "Sliding contact", words, (table, energies), charts=(chart,))

@@ -15,9 +15,9 @@ _SET = "section 6"
 def _contradicts(values: Values) -> str:
     told = values["told"]
     return (
-        f"'the size has a more significant effect than the frequency': (5, 500) is "
+        "'the size has a more significant effect than the frequency': (5, 500) is "
         f"{told['error.n5_f500']:.1f} % off, (30, 50) {told['error.n30_f50']:.1f} %, and the "
-        "printed 2.7 and 6.6 % say the same; true of the speed alone"
+        "printed 2.7 and 6.6 % say the same; true of the speed only"
     )
 
 
@@ -39,7 +39,7 @@ STATED = (
          "a sketch; `n5_f5` interpolates and `n5_f5_held` does not"),
     said("Fig. 5: primary region by deformation", None, "1", "section 5.5, Fig. 5",
          "a sketch; Table 2's adaptable row follows it"),
-    *(said(f"modulus of soft tissue by others, number {i}", E, "Pa", _SET, CITED)
+    *(said(f"modulus of soft tissue in other work, number {i}", E, "Pa", _SET, CITED)
       for i, E in enumerate((5e3, 35e3, 6e3, 11e3, 0.0, 3.5e3, 9.3e3), 1)),
     taken("softest bar", 5e3, _P.body.E, "Pa", _SET),
     taken("stiffest bar", 25e3, STIFF, "Pa", _SET),
@@ -55,11 +55,11 @@ STATED = (
     taken("time at which Table 1's peaks are read", 20.0, _P.probe.seconds / 2, "s", _SET,
           "'approximately'; ours is the middle of a chirp whose length is not printed"),
     drawn("Fig. 6a: peak with N = 30, f = 500 Hz", "told:peak.n30_f500", "N", "section 6, Fig. 6",
-          f"{_SHOWN}; its labels are lost, so which of a to d it is goes by Table 1"),
+          f"{_SHOWN}; its labels are lost, so Table 1 decides which of a to d it is"),
     drawn("Fig. 6b: peak with N = 30, f = 50 Hz", "told:peak.n30_f50", "N", "section 6, Fig. 6",
-          f"{_SHOWN}; its labels are lost, so which of a to d it is goes by Table 1"),
+          f"{_SHOWN}; its labels are lost, so Table 1 decides which of a to d it is"),
     drawn("Fig. 6d: peak with N = 5, f = 500 Hz", "told:peak.n5_f500", "N", "section 6, Fig. 6",
-          f"{_SHOWN}; its labels are lost, so which of a to d it is goes by Table 1"),
+          f"{_SHOWN}; its labels are lost, so Table 1 decides which of a to d it is"),
     said("Fig. 6c: force that rises with the frequency", None, "N", "section 6, Fig. 6",
          "'slightly' in words: the table of impedances gives the peak by frequency"),
     drawn("Fig. 7a: peak of the whole solve, 5 kPa", "told:peak.whole", "N", "section 6, Fig. 7",
@@ -73,7 +73,7 @@ STATED = (
     Figure(
         "the softer the tissue, the larger the error: 25 kPa's over 5 kPa's",
         "told:stiff.over.soft", None, None, "1", "not comparable",
-        "printed in words, which ours agree with: below 1", "section 6, Fig. 7", 0.28, 0.02,
+        "printed in words, and ours agree: below 1", "section 6, Fig. 7", 0.28, 0.02,
     ),
     Figure(
         "error of the smaller region over that of the slower one", "told:size.over.rate", None,

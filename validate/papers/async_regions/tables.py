@@ -15,9 +15,10 @@ from validate.solve.types import Run
 FORCE = f"{PROBE}.force.x"
 _UNTIMED = 20  # ticks: regions are made and caches settle
 ENERGY = (
-    "Made energy is what body and spring have beyond what the hand put in and damping took, lost "
-    "energy what they lack. The whole solve's own share is the spring's, whose force is that of "
-    "the tick's begin, and that of its steps; the rest is made or taken by borders."
+    "Created energy is the energy of body and spring minus the work of the hand plus the "
+    "dissipation; lost energy is its negative part. The full solve creates energy because the "
+    "spring uses the force at the start of a tick, and by its time steps. The borders create "
+    "or remove the rest."
 )
 
 

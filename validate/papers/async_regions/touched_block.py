@@ -34,8 +34,8 @@ SIZES = ((2, 18), (2, 26), (3, 6), (3, 8), (3, 12))  # 343, 729 and 2197 nodes i
 _TICKS, _HZ, _DEEP = 400, 2.5, 5e-3
 _VECTORS = 4
 _TICK_WORDS = (
-    "Ticks are those of the runs above, by the wall's clock. A mean hides the slow tick: of "
-    "regions it is the one in which the far region is due, once in its period.",
+    "Ticks are those of the runs above, in wall time. A mean hides slow ticks: with regions, "
+    "the tick in which the far region is solved, once in its period.",
 )
 _PUSH = HapticProbe(depth=5e-3, lowest=0.5, highest=1.5, seconds=4.0)
 _CELL = LoadCell(every=20)
@@ -73,7 +73,7 @@ def record(p: TouchedBlock, progress: Progress) -> Recording:
     force = pushed(build(None, p, None), whole, depth[1:]).force
     still = np.zeros((len(t), p.body.dimension - 1))
     path = np.hstack([-depth[:, None], still])
-    law = "linear, the whole body at every tick, the models' own mesh"
+    law = "linear, the full body at every tick, the mesh of the models"
     return probed("async_block", t, path, np.append(0.0, force), p.twin, same=True, law=law)
 
 
@@ -99,9 +99,9 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     near = AsyncRegions(p.dt, (4,), (50.0,), overlap=2, spring=p.probe.spring)
     sizes = size_table(size_rows(SIZES, near, p.body.E, depth, _VECTORS, progress))
     words = (
-        "A Krylov model holds for a linear body whose contact stays; the whole prefactored solve "
-        "for a linear one. Regions pay where matrices change at every tick, or where the far "
-        "region is solved elsewhere.",
+        "A Krylov model is valid for a linear body with a fixed contact, the full prefactored "
+        "solve for any linear body. Regions are useful where matrices change at every tick, "
+        "or where another machine solves the far region.",
     )
     progress("energy of borders, sliding contact")
     given = sets(p, main["whole"].registered[0])
@@ -111,10 +111,10 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     energies = energy_table(f"Energy at {p.probe.highest:g} Hz.", scene, rivals, swing)
     return Told(
         (
-            Exhibit("ticks", "What regions cost", _TICK_WORDS, (forces,)),
-            Exhibit("energy", "What borders make and lose", (ENERGY,), (energies,)),
+            Exhibit("ticks", "Time and error of regions", _TICK_WORDS, (forces,)),
+            Exhibit("energy", "Energy of borders", (ENERGY,), (energies,)),
             sliding_exhibit(scene, rivals, main["whole"].label),
-            Exhibit("sizes", "At which size regions pay", words, (sizes,)),
+            Exhibit("sizes", "Body size from which regions are faster", words, (sizes,)),
         ),
         numbers | ring_nodes(),
     )

@@ -34,7 +34,10 @@ class Disk:
 
     def __post_init__(self) -> None:
         if not 0 < self.diameter < 1:
-            raise UsageError(f"disk.diameter = {self.diameter:g} m: above 0, below 1 m; as 20mm")
+            raise UsageError(
+                f"disk.diameter = {self.diameter:g} m: expected a size above 0 and below 1 m, "
+                "for example 20mm"
+            )
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,9 @@ class ImageCard:
     m_per_px: float | None = quantity(
         None, "m", "side of a pixel; none: the file's, 0.1 mm where its format states none"
     )
-    rate: float = quantity(1.0, "Hz", "images a second, where it does not; nothing follows from it")
+    rate: float = quantity(
+        1.0, "Hz", "images a second, if the file has none; no result depends on it"
+    )
     topic: str | None = quantity(None, "1", "the images among several; none: the only ones")
     bright: bool = quantity(True, "1", "whether the disk is brighter than what surrounds it")
     scale: float = quantity(1.0, "1", "true lengths over those of the images")
@@ -78,7 +83,7 @@ def load(parameters: ImagedDisk, folder: Path) -> tuple[Recording, ...]:
     if len(outlines) < _FEWEST * len(frames.images):
         raise RecordingError(
             f"{recording.name}: the disk is found in {len(outlines)} of {len(frames.images)} "
-            f"images; first refusal: {next(iter(refused.values()))}; it was taken to be "
+            f"images; first refusal: {next(iter(refused.values()))}; the disk was assumed to be "
             f"{'bright' if p.image.bright else 'dark'}: --set image.bright={not p.image.bright}"
         )
     at = np.array(sorted(outlines))

@@ -34,10 +34,10 @@ def identified(
         Score("diameter.mean", mean, "m", count, "images", "mean over the images"),
         Score("diameter.sd", seen.scatter, "m", count, "images", "sd of one image's diameter"),
         Score("diameter.sd_wall", seen.wall, "m", count, "images",
-              "what the wall's own uncertainty makes of every diameter"),
+              "sd of every diameter caused by the uncertainty of the wall"),
         Score("diameter.confidence", 2 * sd_mean, "m", count, "images", "two sd of the mean"),
         Score("scale.factor", factor, "1", count, "nominal diameter",
-              "true lengths over the images', were the diameter the nominal one"),
+              "true lengths over those of the images, if the diameter is nominal"),
         Score("scale.confidence", 2 * sd_factor, "1", count, "nominal diameter", "two sd of it"),
     )  # fmt: skip
     refused = {k: v for k, v in recordings[0].record(FOUND).items() if k.startswith("image ")}
@@ -47,9 +47,9 @@ def identified(
         f"over {count} images, and ± {200 * p.ranges.scale:.1f} % of the images' scale"
     )
     notes = (
-        f"Were the disk as nominal, lengths of the images would be true times {factor:.4f} ± "
-        f"{2 * sd_factor:.4f} (two sd): the speed of sound that the scanner assumed is not off by "
-        "more.",
+        "If the disk has its nominal diameter, true lengths are those of the images times "
+        f"{factor:.4f} ± {2 * sd_factor:.4f} (two sd). The error of the speed of sound that "
+        "the scanner assumed is not larger.",
         f"{len(refused)} of {len(refused) + count} images show no outline"
         + "".join(f"; {k}: {v}" for k, v in list(refused.items())[:5])
         + ".",
@@ -64,7 +64,7 @@ def exhibits(p: ImagedDisk, cases: Cases, tell: Progress) -> Told:
         Exhibit(
             "disk",
             "The disk in every image",
-            ("Nothing of an outline is fitted to the nominal diameter.",),
+            ("The nominal diameter is not used to fit an outline.",),
             tables=(_table(seen),),
             charts=(_chart(seen, p),),
             pictures=(_picture(seen),),

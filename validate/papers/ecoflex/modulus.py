@@ -74,7 +74,7 @@ def identified(
     headline = (
         f"{apart.words}. The modulus lies between "
         f"{_span(moduli['bonded'], found, factors['bonded'])} (bonded plates) and "
-        f"{_span(moduli['slip'], found, factors['slip'])} (slipping): force alone cannot say which"
+        f"{_span(moduli['slip'], found, factors['slip'])} (slipping); force alone cannot decide"
     )
     squat = replace(p, specimen=replace(p.specimen, height=size.height / 2))
     half = stiffening(squat, methods["bonded"].scene) / factors["bonded"][0]
@@ -217,8 +217,8 @@ def _notes(
     return (
         f"Whether the plates slipped was not recorded. The material's modulus lies between "
         f"{moduli['bonded'] / 1e3:.1f} kPa (bonded) and {moduli['slip'] / 1e3:.1f} kPa (slipping).",
-        f"Force alone cannot tell the two apart. A cylinder of {500 * height:.0f} mm height would: "
-        f"its apparent modulus would be {half:.2f} times this one's with bonded plates "
+        f"Force alone cannot distinguish the two. A cylinder of {500 * height:.0f} mm height "
+        f"can: its apparent modulus would be {half:.2f} times this one's with bonded plates "
         "and the same with slipping ones.",
         f"Load cell offsets of {min(offsets):.3f}..{max(offsets):.3f} N and toes of "
         f"{min(toes):.3f}..{max(toes):.3f} mm (seating of the plate: where the fitted line reaches "

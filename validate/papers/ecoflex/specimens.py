@@ -71,13 +71,15 @@ def split(recordings: Sequence[Recording], judged: str | None) -> HeldOut:
     materials = sorted({material_of(r) for r in recordings})
     if len(materials) > 1:
         raise RecordingError(
-            f"logs of {len(materials)} materials ({', '.join(materials[:4])}): their moduli have "
-            f"nothing to do with each other; choose one, as --set logs='{materials[0]}_*.csv'"
+            f"logs of {len(materials)} materials ({', '.join(materials[:4])}): their moduli "
+            f"are unrelated; choose one material, for example --set logs='{materials[0]}_*.csv'"
         )
     every = tuple(dict.fromkeys(specimen_of(r) for r in recordings))
     chosen = [s for s in every if judged in (s, s.removeprefix(f"{materials[0]}_"))]
     if judged and not chosen:
-        raise UsageError(f"judged = {judged}: no such specimen; {', '.join(every)}")
+        raise UsageError(
+            f"judged = {judged}: no specimen has that name; expected one of {', '.join(every)}"
+        )
     out = chosen[0] if chosen else every[-1]
     return HeldOut(out, tuple(s for s in every if s != out) or every)
 
@@ -97,7 +99,7 @@ def left_out(values: Sequence[float], specimens: Sequence[str]) -> tuple[Score, 
         others = [E for other, E in means.items() if other != name]
         if others:
             off = float(np.mean(others)) / own - 1
-            words = f"modulus of the other {len(others)} less that of {name}, over the latter"
+            words = f"modulus of the other {len(others)} minus that of {name}, over the latter"
             found.append(Score(f"left_out.{name}", off, "1", len(others), "measured logs", words))
     return tuple(found)
 
@@ -107,23 +109,23 @@ def apart_notes(apart: HeldOut, own: Votes, scatter: float) -> tuple[str, ...]:
     k = len(own.means)
     if apart.apart:
         first = (
-            f"Fitted on {', '.join(apart.calibrating)}; predicted: {apart.judged}, which was left "
-            "out. Repeats of one specimen have one vote."
+            f"Fitted on {', '.join(apart.calibrating)}; predicted: {apart.judged}, which was "
+            "left out. Repeats of one specimen count once."
         )
     else:
         first = (
             f"All {own.logs} log{'s are' if own.logs > 1 else ' is'} of one specimen, "
-            f"{apart.judged}: what is predicted is an extrapolation in strain of the very logs "
-            "whose first part was fitted. It says nothing of another specimen."
+            f"{apart.judged}. The prediction extrapolates in strain the same logs whose first "
+            "part was fitted. It is no evidence for another specimen."
         )
     if own.between is not None:
         second = (
             f"Scatter between specimens {100 * own.between / own.mean:.2g} %, of the {k} that "
-            "calibrate; it stands in u_D."
+            "calibrate; it is included in u_D."
         )
     else:
         second = (
-            f"The scatter between specimens is unknown: {k} specimen calibrates, and repeats of "
-            f"one understate it. The declared {100 * scatter:.2g} % stands in u_D."
+            f"The scatter between specimens is unknown: {k} specimen calibrates, and repeats "
+            f"of one understate it. The declared {100 * scatter:.2g} % is included in u_D."
         )
     return first, second

@@ -46,7 +46,7 @@ class ShearCard:
     card: Literal["paper", "cylinders_slip", "cylinders_bonded"] = quantity(
         "paper", "1", "shear modulus: 22.081 kPa printed, or real cylinders' 31.2 / 18.5 kPa"
     )
-    scale: float = quantity(1.0, "1", "modulus over the card's")
+    scale: float = quantity(1.0, "1", "modulus over that of the material")
     nu: float = quantity(0.4995, "1", "Poisson ratio of bodies moved by the plate; printed .5")
     nu_explicit: float = quantity(0.49, "1", "Poisson ratio of explicit runs: linear cells lock")
     rho: float = quantity(1060.0, "kg/m3", "density")

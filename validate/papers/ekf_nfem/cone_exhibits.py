@@ -47,7 +47,10 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
         numbers["kinetic_share"] = share
     ranked = (_ranking(main, parameters.twin.force),) if _seen(explicit, "node_A") else ()
     signals = Exhibit(
-        "signal", "Is there anything to see?", _noise_words(cases), (_noise_table(cases), *ranked)
+        "signal",
+        "Motion of the markers against noise",
+        _noise_words(cases),
+        (_noise_table(cases), *ranked),
     )
     elements = Exhibit(
         "elements",
@@ -61,7 +64,7 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
 def _inertia_words(scale: float, share: float | None) -> str:
     taken = f"Explicit runs take the ramp {scale:g} times as fast as it was recorded; "
     if share is None:
-        return f"{taken}this one did not reach its end, so its inertia is not judged."
+        return f"{taken}this run did not reach its end, so its inertia is not checked."
     verdict = "within" if share <= _KINETIC else "beyond"
     return (
         f"{taken}after its first tenth kinetic energy is at most {100 * share:.2f} % of strain "
@@ -113,7 +116,8 @@ def _noise_table(cases: Cases) -> NumberTable:
             rows.append((name or "recorded", probe, _MM * moved, _MM * sd, moved / sd, seen))
     return NumberTable(
         "signal",
-        f"Largest motion of every marker against the noise of one look; seen above {_SEEN:g} sd.",
+        "Largest motion of every marker against the noise of one sample; detectable above "
+        f"{_SEEN:g} sd.",
         ("case", "marker", "largest motion / mm", "noise sd / mm", "ratio / 1", "verdict"),
         tuple(rows),
     )
@@ -136,7 +140,7 @@ def _ranking(main: Mapping[str, Followed], force: float) -> NumberTable:
         f"At {force:g} N, by the error of u_z at node B on the side, which no filter is given.",
         ("rank", "method", "RMSE at B / mm", "RMSE at A / mm"),
         rows,
-        "One recording: neighbours closer than the marker's noise are not told apart.",
+        "One recording: neighbours closer than the marker's noise are not distinguishable.",
     )
 
 
@@ -168,7 +172,7 @@ def _cards(parameters: Any, main: Mapping[str, Followed]) -> NumberTable:
     shear = {
         "paper": (22_081.0, "printed, paper 003"),
         "cylinders_slip": (31_200.0, "real Ecoflex 00-30 cylinders, if their plates slipped"),
-        "cylinders_bonded": (18_500.0, "the same, if their plates held"),
+        "cylinders_bonded": (18_500.0, "the same, if their plates were bonded"),
     }
     followed, used = main["plate_p2"], parameters.material
     end = float(followed.run.traces["plate.force"].y[-1]) if followed.whole else None
@@ -179,8 +183,8 @@ def _cards(parameters: Any, main: Mapping[str, Followed]) -> NumberTable:
     )
     return NumberTable(
         "cards",
-        "Material cards: shear modulus and the force that quadratic elements predict with it at "
-        "the same compression.",
+        "Material parameters: shear modulus and the force that quadratic elements predict "
+        "with it at the same compression.",
         ("card", "shear modulus / kPa", "force at the end / N", "where it comes from"),
         rows,
         "Choose one with --set material.card=NAME.",

@@ -55,7 +55,7 @@ class ConeTwin:
     machine: float = quantity(2e5, "N/m", "stiffness of the machine's frame")
     toe: float = quantity(0.15e-3, "m", "crosshead travel while the plate seats")
     toe_force: float = quantity(0.5, "N", "force at which 63 % of the toe is gone")
-    missing: float = quantity(0.03, "1", "share of looks at which a marker is not seen")
+    missing: float = quantity(0.03, "1", "share of samples in which a marker is not visible")
     seed: int = quantity(20220715, "1", "seed of every sensor's noise")
     sd_force: float = quantity(0.02, "N", "load cell noise")
     sd_stage: float = quantity(2e-6, "m", "crosshead jitter")

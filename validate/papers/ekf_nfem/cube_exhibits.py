@@ -59,7 +59,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
             numbers[f"cells.{name}@{hz:g}Hz"] = np.nan if cells is None else cells
     model = Exhibit(
         "model",
-        "What the printed numbers leave open",
+        "Choices that the printed numbers do not determine",
         ("The printed force, step and element each change the result more than the filter does.",),
         (readings, limits, locked),
     )

@@ -32,7 +32,7 @@ _TABLE_3 = {
 }  # fmt: skip
 
 
-_NEAR = "made as near as it came"
+_NEAR = "nearest count of our generated mesh"
 
 
 def held_errors(
@@ -78,7 +78,7 @@ def given(name: str, theirs: float | None, unit: str, source: str, why: str) -> 
 def noise_left(source: str, sd: float, case: str, said: str) -> Figure:
     """Error at A over the noise sd m of one look: of a filter that removes noise well below 1."""
     return Figure(
-        f"{source.rpartition(', ')[2]} (d, e): error at A over the noise of one look",
+        f"{source.rpartition(', ')[2]} (d, e): error at A over the noise of one sample",
         lambda values: values["ekf_held"][f"node_A.rmse{case}"] / sd, None, None, "1",
         "not reproduced",
         f"'removed', in words; the printed gain is near 1 and leaves it{said}", source,
@@ -88,8 +88,8 @@ def noise_left(source: str, sd: float, case: str, said: str) -> Figure:
 def fields_near(source: str, ours: float, said: str = "") -> Figure:
     """How far the fields of filter and plain run are apart at the end of the ramp, in all nodes."""
     return Figure(
-        f"{source.rpartition(', ')[2]} (b, c): fields apart at the end over the largest "
-        "displacement",
+        f"{source.rpartition(', ')[2]} (b, c): difference of the fields at the end over the "
+        "largest displacement",
         "told:fields_apart", None, None, "1", "not comparable",
         f"'nearly same', in words{said}", source, ours, 0.05 * ours,
     )  # fmt: skip
@@ -101,10 +101,10 @@ def count(
     theirs: float,
     ours: float,
     source: str,
-    why: str = "made as near as it came",
+    why: str = "nearest count of our generated mesh",
 ) -> Figure:
     """A count of a mesh that the paper does not print: held for ours, no reproduction."""
-    said = f"a count of our own mesh, {why}"
+    said = f"a count of our mesh, {why}"
     return Figure(
         name, of, theirs, None, "1", "not comparable", said, source, ours, 0.0, setting=True
     )  # fmt: skip
@@ -128,15 +128,15 @@ def _reached(name: str, hz: int, theirs: float) -> Figure:
 
 _INPUT = "an input, taken as printed"
 _NO_UNIT = "an input without a unit, read as mm2"
-_DEMAND = "a demand of eyes or hands, not a result"
+_DEMAND = "a requirement of display or haptics, not a result"
 _MACHINE = "another machine"
 
 CUBE_FIGURES = (
     *held_errors(
         _TABLE_1, "",
-        "noise unit, mesh and force reading are not printed, and no reading gives these three: the "
-        "printed gain at A is near .99, so the filter follows the noise there, and B is disturbed "
-        "by what the corrections at A set in motion",
+        "noise unit, mesh and force reading are not printed, and no reading gives these "
+        "three: the printed gain at A is near .99, so the filter follows the noise there, and "
+        "the corrections at A disturb B",
         "section 3.1, Table 1",
     ),
     count("nodes of the cube's mesh", "told:nodes", 839.0, 833.0, "section 3.1"),
@@ -147,8 +147,8 @@ CUBE_FIGURES = (
     ),
     Figure(
         "filter rate over the plain one's", _slower, 75 / 3.5, None, "1", "not reproduced",
-        "75 Hz over 3.5 Hz; the filter's step contains the explicit step, and only against an "
-        "assembled implicit solve is it faster", "section 3.3, Fig. 4",
+        "75 Hz over 3.5 Hz; the step of the filter contains the explicit step, so it is "
+        "faster only than an assembled implicit solve", "section 3.3, Fig. 4",
     ),
     rate(3760, "EKF", "ekf_printed", 75.0),
     rate(3760, "NFEM", "nfem_implicit", 3.5),
@@ -202,7 +202,7 @@ CONE_FIGURES = (
     count("tetrahedra of the cone's mesh", "told:cells", 2349.0, 2357.0, "section 3.4"),
     Figure(
         "shear modulus of Ecoflex 0030", None, 22.081e3, None, "Pa", "not comparable",
-        "taken from others and not measured on the cone: its machine's log is not printed",
+        "taken from other work and not measured on the cone: its machine's log is not printed",
         "section 3.4", setting=True,
     ),
     Figure(
@@ -215,8 +215,8 @@ CONE_FIGURES = (
     given("density of Ecoflex 0030", 1060.0, "kg/m3", "section 3.4", _MEASURED),
     given(
         "force on the top face", 0.15, "N", "section 3.4",
-        "an input: as a total it moves this cone by less than the noise, see the force readings; "
-        "the recording has 15 N as well",
+        "an input: as a total it moves this cone by less than the noise (see the force "
+        "readings); the recording has 15 N as well",
     ),
     given("initial displacement of the cone", 0.0, "m", "section 3.4", _INPUT),
     given("initial error covariance of the cone", 1e-3, "1", "section 3.4", _NO_UNIT),
@@ -226,7 +226,7 @@ CONE_FIGURES = (
     ),
     fields_near(
         "section 3.4, Fig. 5", 4.132,
-        "; at the printed 0.15 N the noise at A sets more in motion than the force does",
+        "; at the printed 0.15 N the noise at A causes more motion than the force does",
     ),
     noise_left("section 3.4, Fig. 5", 0.02e-3, "@small", " at 0.15 N"),
 )  # fmt: skip

@@ -65,19 +65,21 @@ class ToolSpring:
     """The coupling of the hand to the body, of every method."""
 
     spring: float = quantity(1000.0, "N/m", "between tool and contact (virtual coupling)")
-    reach: float = quantity(1e-3, "m", "distance at which the tool takes hold")
-    pad: float = quantity(0.02, "m", "surface nodes that near to the contact share the spring")
-    grip: float | None = quantity(0.0, "N", "pull at which the body lets go; none: never")
-    limit: float = quantity(5.0, "N", "largest force given to the hand")
+    reach: float = quantity(1e-3, "m", "distance at which the tool makes contact")
+    pad: float = quantity(
+        0.02, "m", "distance from the contact within which surface nodes share the spring"
+    )
+    grip: float | None = quantity(0.0, "N", "pulling force at which contact ends; none: never")
+    limit: float = quantity(5.0, "N", "largest force on the hand")
 
 
 @dataclass(frozen=True)
 class ToolPath:
-    depth: float = quantity(0.006, "m", "how deep the hand goes below the resting surface")
+    depth: float = quantity(0.006, "m", "depth of the hand below the resting surface")
     rate: float = quantity(HAPTIC_HZ, "1/s", "samples a second")
     tremor: float = quantity(2e-5, "m", "of the hand, rms along every axis")
     seed: int = quantity(3, "1", "seed of the tremor")
-    seconds: float = quantity(STOPS[-1][0], "s", "how much of the path is walked")
+    seconds: float = quantity(STOPS[-1][0], "s", "part of the path that is used")
 
 
 _CELL = LoadCell(seed=35, noise=5e-3, every=5)
@@ -173,7 +175,7 @@ def record(p: TouchedLiver, progress: Progress) -> Recording:
         signals[f"force.{a}"] = signal(t[some], force, "N", p.twin.noise, _FRAME, rng)
     provenance = {
         "kind": "twin", "same_model": "true", "body": p.body.which, "seed": str(p.twin.seed),
-        "law": f"{scene.material.law}, central difference at every tick, the models' own mesh",
+        "law": f"{scene.material.law}, central difference at every tick, the mesh of the models",
         "element": f"P1 tetrahedra, {len(scene.mesh.nodes)} nodes, {len(scene.mesh.cells)} cells",
         "hand": "minimum-jerk moves with tremor, synthetic",
     }  # fmt: skip
@@ -210,13 +212,13 @@ def _walkable(recording: Recording) -> tuple[Floats, Floats, float, tuple[str, .
     seen = np.isfinite(x).all(axis=1)
     if seen.sum() < 2:
         raise RecordingError(
-            f"{recording.name}: {int(seen.sum())} of {len(t)} samples of the tip are seen; at "
-            "least 2 are a path"
+            f"{recording.name}: {int(seen.sum())} of {len(t)} samples of the tip are visible; "
+            "a path needs at least 2"
         )
     steps, findings = np.diff(t[seen]), []
     if not seen.all():
         findings.append(
-            f"the tip of {int((~seen).sum())} of {len(t)} samples is not seen: left out"
+            f"the tip of {int((~seen).sum())} of {len(t)} samples is not visible and is omitted"
         )
     if steps.max() > 1.5 * np.median(steps):
         findings.append(

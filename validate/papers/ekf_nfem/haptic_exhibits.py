@@ -28,7 +28,7 @@ PERIODS = (2, 5, 10, 20, 33, 50)  # ticks between readings
 _LIVE = {
     "every tick, at once": EACH_TICK,
     "every 10th tick, at once, linear": HapticLoop(late=0),
-    "every 10th tick, in a thread of its own, linear": HapticLoop(background=True),
+    "every 10th tick, in a separate thread, linear": HapticLoop(background=True),
 }
 _LIVE_SECONDS = 1.2
 _MILLI, _MICRO, _PERCENT = 1e3, 1e6, 100.0
@@ -110,7 +110,7 @@ def _force_exhibit(felt: Mapping[str, Felt], shape: NodeMap) -> Exhibit:
         _chart("push", "The same, in the push", felt, steady),
         _chart("contact", "The same, where contact begins in the poke", felt, touch),
         Chart(
-            "off", "Distance from the force of every tick", "time / s", "error of the force / N",
+            "off", "Error against the force of every tick", "time / s", "error of the force / N",
             tuple(Series(f.label, f.t, f.held.off) for f in others.values()),
         ),
     )  # fmt: skip
@@ -128,11 +128,11 @@ def _force_exhibit(felt: Mapping[str, Felt], shape: NodeMap) -> Exhibit:
         "forces", f"Forces at 1 kHz against the same simulation at every tick, of {most:.3g} N.",
         ("method", "simulation / Hz", "largest force / N", "peak error / N", "of the largest / %",
          "rms error / N", "largest jump / N", "median jump / N", "jumps"), tuple(rows),
-        "Jumps are what an answer corrects of the force that was foreseen, at the same place.",
+        "A jump is the correction of the extrapolated force by a new answer, at the same place.",
     )  # fmt: skip
     words = (
         "The peak error is that of contact: a simulation that reads the tool every 10 ms and "
-        "answers 10 ms later learns of a touch up to 20 ms late, whatever is extrapolated.",
+        "answers 10 ms later detects a contact up to 20 ms late, whatever is extrapolated.",
     )
     return Exhibit("forces", "Force between answers", words, (table,), charts, (shape,))
 
@@ -179,12 +179,14 @@ def _energy_exhibit(felt: Mapping[str, Felt], reference: Followed) -> Exhibit:
         rows.append((f.label, _MILLI * made, _PERCENT * made / stored, _MILLI * float(h.taken[-1]),
                      _MILLI * least, verdict, h.damper))  # fmt: skip
     table = NumberTable(
-        "energy", "Energy of the force that the device holds from tick to tick, on a closed path.",
+        "energy", "Energy of the force that the device keeps constant between ticks, on a "
+                  "closed path.",
         ("method", "created / mJ", "of the largest stored / %", "taken at the end / mJ",
-         "least taken / mJ", "passive on this path", "damper that eats it / N s/m"), tuple(rows),
-        "Created: given to the hand beyond the work of the true force. Taken: put in by the hand; "
-        "below 0 the device has given more than it ever had. The damper is the hand's or device's "
-        "own that would have eaten what was created.",
+         "least taken / mJ", "passive on this path", "damper that dissipates it / N s/m"),
+        tuple(rows),
+        "Created: energy given to the hand beyond the work of the true force. Taken: work of "
+        "the hand; below 0 the device has given more energy than it received. The damper is "
+        "the damping of hand or device that would dissipate the created energy.",
     )  # fmt: skip
     charts = (
         Chart("created", "Energy created by the extrapolated force", "time / s", "energy / mJ",
@@ -194,13 +196,14 @@ def _energy_exhibit(felt: Mapping[str, Felt], reference: Followed) -> Exhibit:
               levels=(("passive above", 0.0),)),
     )  # fmt: skip
     words = (
-        "A held force lags behind the hand, pushes less on the way in than on the way out and so "
-        "creates energy: k v^2 T/2 a second of a spring k held for T, three times that where the "
-        "answer is a period late. Of a line the lag is of third order, but where contact begins or "
-        "ends no polynomial foresees it. Where a spring's place is extrapolated, the hand's own "
-        "motion is in the force at once, and little is created: the coupling takes the jumps.",
-        "Passive is said of this path alone; every tick's own hold creates energy, too, which the "
-        "body's damping covers here.",
+        "A constant force between answers lags behind the hand and creates energy, because it "
+        "pushes less on the way in than on the way out. A spring k with period T creates k "
+        "v^2 T/2 a second, and three times as much if the answer is a period late. With "
+        "linear extrapolation the lag is of third order, but no polynomial predicts begin and "
+        "end of contact. If the place of the spring is extrapolated, the force contains the "
+        "motion of the hand at once and little energy is created.",
+        "'Passive' applies to this path only. Keeping the force constant within a tick also "
+        "creates energy, which the damping of the body covers here.",
     )
     return Exhibit("energy", "Energy and passivity", words, (table,), charts)
 
@@ -231,7 +234,7 @@ def _periods_exhibit(reference: Felt) -> Exhibit:
         if smooth.any():
             within.append(Series(_NAMES[name], periods, np.array(apart)))
     table = NumberTable(
-        "periods", "Forces of every tick, read seldom: answered at once, or a period late.",
+        "periods", "Forces of every tick, sampled less often: answered at once, or a period late.",
         ("extrapolation", "period / ms", "at once: peak / N", "rms / N", "created / mJ",
          "least taken / mJ", "late: peak / N", "late: rms / N", "late: created / mJ",
          "late: least taken / mJ", "late, within a contact: rms / N"), tuple(rows), folded=True,
@@ -244,9 +247,9 @@ def _periods_exhibit(reference: Felt) -> Exhibit:
         if shown
     )  # fmt: skip
     words = (
-        "Extrapolation alone: no simulation is slower here, only heard more seldom. Within a "
-        "contact a line is worth the more the shorter the period; where the contact changes, the "
-        "order of a smooth force is lost, and a higher order overshoots.",
+        "Extrapolation only: the simulation is the same, but is sampled less often. Within a "
+        "contact, linear extrapolation gains more at shorter periods. Where the contact "
+        "changes, the order of a smooth force is lost and a higher order overshoots.",
     )
     return Exhibit("periods", "Periods", words, (table,), charts)
 
@@ -285,10 +288,13 @@ def _ticks_exhibit(p: TouchedLiver, reference: Followed) -> Exhibit:
         ("loop", "ticks", "missed / %", *(f"late {q} / us" for q in quantiles), "latest / us",
          *(f"work {q} / us" for q in quantiles), "longest work / us"),
         tuple(rows),
-        "Late: from when a tick was due until its force was there; missed: later than the next one "
-        "was due. A recorded path leaves nothing out, so one long tick makes those after it late.",
+        "Late: time from the due time of a tick to its force. Missed: later than the due time "
+        "of the next tick. A recorded path skips no sample, so one long tick delays the next "
+        "ones.",
     )  # fmt: skip
-    return Exhibit("live", "Against the clock", (_pace(scene, reference, given["dt"]),), (table,))
+    return Exhibit(
+        "live", "Timing of the live loop", (_pace(scene, reference, given["dt"]),), (table,)
+    )
 
 
 def _lived_row(name: str, done: Lived, dt: float) -> tuple[Entry, ...]:
@@ -309,10 +315,10 @@ def _pace(scene: Scene, reference: Followed, dt: float) -> str:
         f"A tick of {_MILLI * dt:.3g} ms is {substeps:.0f} explicit steps of "
         f"{_MICRO * times.dt:.3g} us ({times.ratio:.2f} of the critical step) on "
         f"{len(scene.mesh.cells)} tetrahedra and takes {_MILLI * seconds:.2g} ms: "
-        f"{times.factor:.2g} times real time, on today's machine and its load. Below 1 no "
-        "extrapolation helps: the tissue itself falls behind. The median tick of a slower "
-        "simulation is an extrapolation alone. The paper's rates are steps a second without their "
-        "step."
+        f"{times.factor:.2g} times real time, on this machine and its load. Below 1 no "
+        "extrapolation helps, because the simulated tissue is slower than real time. The "
+        "median tick of a slower simulation is only an extrapolation. The paper's rates are "
+        "steps a second without their step."
     )
 
 
@@ -329,12 +335,12 @@ FIGURES = (
     ),
     Figure(
         "reaction force (eq 32)", None, None, None, "N", "not comparable",
-        "no force is printed; ours is the spring's between tool and body, which eq 32's force on "
-        "the touched nodes balances but for their inertia", "section 3.5",
+        "no force is printed; ours is the spring's between tool and body, which balances eq "
+        "32's force on the touched nodes, except for their inertia", "section 3.5",
     ),
     Figure(
         "Fig. 6: the liver before and under the tool", None, None, None, "1", "not comparable",
-        "pictures without numbers: ours is drawn under 'Force between answers'",
+        "figures without numbers: ours is drawn under 'Force between answers'",
         "section 3.5, Fig. 6",
     ),
 )  # fmt: skip

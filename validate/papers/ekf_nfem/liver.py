@@ -40,7 +40,9 @@ _FIDUCIALS = 4
 
 @dataclass(frozen=True)
 class LiverTwin(TrackedTwin):
-    halved: int = quantity(0, "1", "how often its cells are cut in eight: 0 is the models' mesh")
+    halved: int = quantity(
+        0, "1", "number of divisions of its cells into eight; 0 is the mesh of the models"
+    )
     finer: int = quantity(1, "1", "its steps in one of the models'")
 
 

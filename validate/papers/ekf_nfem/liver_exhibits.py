@@ -45,7 +45,7 @@ def tell_liver(parameters: Any, cases: Cases, progress: Progress) -> Told:
     body = _NAMED[parameters.body.which]
     model = Exhibit(
         "model",
-        "What the printed numbers leave open",
+        "Choices that the printed numbers do not determine",
         (_ramp_words(main["nfem"], readings), _sliver_words(scene)),
         (readings, limits, locked),
     )
@@ -67,14 +67,14 @@ def sets_exhibit(scene: Scene, body: str) -> Exhibit:
     words = (
         f"The body: {body}, {len(mesh.nodes)} nodes and {len(mesh.cells)} tetrahedra, "
         f"{1e3 * cell_volumes(mesh).sum():.3g} litres. Paper 003 draws its liver and prints no "
-        "mesh: its counts of nodes are no target.",
-        "Held: faces that look upward in the left three tenths of the length. Loaded: faces that "
-        "look up or down in the right lobe. A is the loaded node nearest to their middle, B the "
-        "free one nearest to the middle of the top.",
+        "mesh, so its counts of nodes are not targets.",
+        "Held: faces with an upward normal in the left three tenths of the length. Loaded: "
+        "faces with an upward or downward normal in the right lobe. A is the loaded node "
+        "nearest to their middle, B the free one nearest to the middle of the top.",
     )
     caption = "Held and loaded nodes, the measured node A and the free node B."
     picture = node_sets_picture("node_sets", caption, mesh, sets, named)
-    return Exhibit("sets", "Held, loaded and watched", words, (_sets_table(scene),),
+    return Exhibit("sets", "Held, loaded and observed nodes", words, (_sets_table(scene),),
                    pictures=(picture,))  # fmt: skip
 
 
@@ -96,10 +96,10 @@ def _ramp_words(plain: Followed, readings: NumberTable) -> str:
     static, end = readings.rows[0][2], float(plain.reference("node_A")[-1, 2])
     share = ""
     if isinstance(static, float):
-        share = f", {_MM * end / static:.2f} of where that force at rest leaves it"
+        share = f", {_MM * end / static:.2f} of its static displacement under that force"
     return (
-        f"The ramp lasts {plain.seen.t[-1]:.3g} s and takes node A to {_MM * end:.3g} mm{share}: "
-        "the nearer that is to 1, the more stiffness decides, and not inertia."
+        f"The ramp lasts {plain.seen.t[-1]:.3g} s and takes node A to {_MM * end:.3g} "
+        f"mm{share}: near 1, stiffness matters more than inertia."
     )
 
 

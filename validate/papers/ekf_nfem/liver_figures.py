@@ -65,8 +65,8 @@ OURS: Mapping[Body, Ours] = {
 def _sound(values: Values) -> str:
     share = PRINTED_LIVER_STEP / values["told"]["critical_step"]
     return (
-        f"the printed 0.1 ms is {share:.2f} of this body's critical step at rest, so it is taken; "
-        "ours is the limit, the paper's depends on its mesh"
+        f"the printed 0.1 ms is {share:.2f} of this body's critical step at rest, so it is "
+        "taken; ours is the limit; the paper's depends on its mesh"
     )
 
 
@@ -104,7 +104,7 @@ def _figures(ours: Ours) -> tuple[Figure, ...]:
         ),
         given(
             "Fig. 3 (a): held and loaded nodes", None, "1", "section 3.2, Fig. 3",
-            "drawn, not printed: ours are rules, and the report draws them",
+            "drawn, not printed: ours follow rules, and the report draws them",
         ),
         fields_near("section 3.2, Fig. 3", ours.apart),
         noise_left(

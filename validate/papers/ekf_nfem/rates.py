@@ -125,8 +125,8 @@ def rates_exhibit(rates: tuple[Rate, ...]) -> Exhibit:
         caption="Paper 003, Figs. 4 and 7, print rates without their steps; the table has both.",
     )  # fmt: skip
     words = (
-        "Real time needs a real-time factor of 1: steps a second times dt. A filter's step holds "
-        "the plain explicit step, so it cannot be faster than that.",
+        "Real time needs a real-time factor of 1: steps a second times dt. The step of a "
+        "filter contains the plain explicit step, so it cannot be faster.",
     )
     return Exhibit("rates", "Rates against the size of the mesh", words, (table,), (chart,))
 

@@ -64,7 +64,7 @@ def steps_table(scene: Scene, printed: float) -> NumberTable:
         f"Time steps of central difference on this mesh, by rule; {limits.limited_by}.",
         ("rule", "step / ms", "over the limit / 1"),
         rows,
-        "Above 1 a run is unstable: eq 16 is no bound.",
+        "Above 1 a run is unstable: eq 16 is not a bound.",
     )
 
 
@@ -79,7 +79,7 @@ def locking_table(scene: Scene, values: tuple[float, ...]) -> NumberTable:
         "Locking: static displacement of linear over quadratic tetrahedra of the same mesh.",
         ("nu / 1", *(f"at {p.name} / 1" for p in probes)),
         tuple(rows),
-        "1: no locking. What misses to 1 is the element's stiffness, not the tissue's.",
+        "1: no locking. A value below 1 is excess stiffness of the element, not of the tissue.",
     )
 
 

@@ -56,7 +56,9 @@ class PlaneBlock:
 @dataclass(frozen=True)
 class PlaneGrid:
     squares: int = quantity(40, "1", "squares across the block, of two triangles each")
-    order: Literal[1, 2] | None = quantity(None, "1", "of every method; none: each method's own")
+    order: Literal[1, 2] | None = quantity(
+        None, "1", "of every method; none: as each method declares"
+    )
 
 
 @dataclass(frozen=True)

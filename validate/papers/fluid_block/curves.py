@@ -120,7 +120,7 @@ def curve_exhibit(curves: Sequence[tuple[str, PressureCurve]]) -> Exhibit:
         "pressure_volume", f"Pressure against volume, {name}", "V/V0 / 1", "pressure / Pa",
         (Series("fixed normals, exact", RATIOS, first.fixed),
          Series("line, whose slope is Kp", RATIOS, line),
-         Series("normals follow the wall", RATIOS, first.follower)),
+         Series("normals turn with the wall", RATIOS, first.follower)),
         caption="Fig. 4a of the paper; its axis reaches 8 kPa.",
     )  # fmt: skip
     rows = tuple(
@@ -135,8 +135,8 @@ def curve_exhibit(curves: Sequence[tuple[str, PressureCurve]]) -> Exhibit:
          "1 - R2 of the line / 1", "largest departure / Pa"), rows,
     )  # fmt: skip
     words = (
-        "With normals that stay as they were V/V0 = 1 + c1 P + c2 P^2 is exact: the line is a fit, "
-        "not a law. Following normals change the pressure by 5 to 9 % at 30 % of volume.",
+        "With fixed normals V/V0 = 1 + c1 P + c2 P^2 is exact: the line is a fit, not a law. "
+        "Following normals change the pressure by 5 to 9 % at 30 % of volume.",
     )
     return Exhibit("curve", "Pressure against volume", words, (table,), (chart,))
 

@@ -24,8 +24,9 @@ def exactness_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[
     swaps, error = _swaps(p)
     progress("condition")
     words = (
-        "A boundary swap gives an unknown's displacement instead of its force: a pivot of the "
-        "dense inverse. The condensed solution is held to the whole body's sparse one.",
+        "A boundary swap prescribes the displacement of an unknown instead of its force: a "
+        "pivot of the dense inverse. The condensed solution is compared with the sparse "
+        "solution of the full body.",
     )
     tables = (swaps, _conditions(p))
     return Exhibit("condensation", "Condensation", words, tables), {"swaps.error": error}
@@ -55,7 +56,7 @@ def _swaps(p: FluidBlock) -> tuple[NumberTable, float]:
         ("driven at the end", int(swapped.driven.sum())),
         ("largest drift of u - A f, relative", swapped.worst_drift),
         ("refactorisations", swapped.refactorisations),
-        ("off the whole body's solution, relative", error),
+        ("difference from the full body's solution, relative", error),
         ("dense form / kB", small.dense_bytes / 1e3),
         ("one column / kB", 8 * small.size / 1e3),
     )
@@ -83,7 +84,8 @@ def _conditions(p: FluidBlock) -> NumberTable:
         worst = small.relative_error(int(small.free[len(small.free) // 2]))
         rows.append((f"{(1 - short) / 2:.10g}", float(np.linalg.cond(A)), worst))
     return NumberTable(
-        "condition", "The kept compliance on the way to incompressibility.",
+        "condition", "The condensed compliance towards incompressibility.",
         ("nu", "condition / 1", "relative error of a column, by refinement"), tuple(rows),
-        "Linear triangles lock on the way (their answers are exact for the mesh, not the body).",
+        "Linear triangles lock in this limit (their solutions are exact for the mesh, not for "
+        "the body).",
     )  # fmt: skip

@@ -41,8 +41,8 @@ def laws_exhibit(p: FluidBlock) -> Exhibit:
         "laws", "The plate at the largest strain.",
         ("law", "pressure / Pa", "V/V0 / 1", "Newton steps", "outcome", "substitutions to 1e-9"),
         tuple(rows),
-        f"Pe = {p.laws.preset:g} Pa. No number of substitutions: it diverges, as it must where B "
-        "exceeds the slope.",
+        f"Pe = {p.laws.preset:g} Pa. No number of substitutions: it diverges, as expected "
+        "where B exceeds the slope.",
     )  # fmt: skip
     pulse, words = _pulse(r, p)
     return Exhibit("laws", "Other pressure laws", words, (table,), (pulse,))

@@ -103,7 +103,7 @@ FIGURES = (
     _drawn("Fig. 4b: pressure at 70 % of volume", "P70", None, "Pa", "section 3.3, Fig. 4b"),
     _drawn("Fig. 4c: pressure at 130 % of volume", "P130", None, "Pa", "section 3.3, Fig. 4c"),
     Figure("Fig. 3a: at rest, without load", None, None, None, "1", "not comparable",
-           "a picture without numbers: the mesh in the report", "section 3.3, Fig. 3a"),
+           "a figure without numbers: the mesh in the report", "section 3.3, Fig. 3a"),
     _drawn("Fig. 3b: volume under load, pressure zero", "ratio.empty", None, "1",
            "section 3.3, Fig. 3b", "drawn: 'decreased'; its load is not printed, ours is 15 %"),
     Figure(

@@ -61,11 +61,12 @@ def updates_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
         tuple(lines), levels=(("the paper's claim", 1.0),),
     )  # fmt: skip
     words = (
-        "Strain is read as the tool's displacement over the block's height; the paper is silent. "
-        "A cold start begins at pressure zero, a warm one at the last state's.",
+        "Strain is taken as the tool's displacement over the block's height; the paper does "
+        "not define it. A cold start begins at pressure zero, a warm start at the pressure of "
+        "the last state.",
         "A needle is one node of the mesh: the volume it displaces shrinks with the mesh.",
-        "exact: the root of the volume's polynomial, in Newton steps on one number; the others "
-        "evaluate the whole wall once an update.",
+        "exact: the root of the volume's polynomial, in Newton steps on one number; the "
+        "others evaluate the full wall once per update.",
     )
     return Exhibit("updates", "Updates of the pressure", words, tuple(tables), (chart,)), numbers
 
@@ -166,11 +167,12 @@ def several_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
         "Spectral radius of I - (dV/dP / V0) G at the solution: above 1 the law diverges.",
     )  # fmt: skip
     words = (
-        "A pressure in one cavity swells the others through a thin wall: scalar gains know nothing "
-        "of that, the matrix of the rest shape does.",
-        "Gains tuned on each cavity beside its neighbours slow down as the septum thins and do not "
-        "diverge: they are Jacobi's iteration on a positive matrix with neighbours only. The gain "
-        "of one cavity alone in the block knows nothing of thin walls and diverges there.",
+        "A pressure in one cavity expands the others through a thin wall. Scalar gains ignore "
+        "this; the matrix of the rest shape includes it.",
+        "Gains tuned on each cavity with its neighbours converge more slowly as the septum "
+        "becomes thinner, but do not diverge: they are Jacobi's iteration on a positive "
+        "matrix. The gain of a single cavity in the block ignores thin walls and diverges "
+        "there.",
     )
     return Exhibit("several", "Several cavities", words, (table,)), numbers
 

@@ -32,7 +32,7 @@ ALL = (
           "length of the meshed inclusion", "assumed"),
     Input("circular sections", _rounder,
           "a swept inclusion from circles to its outlines (harmonics 2 to 6); a capsule stays",
-          "measured: outlines of the sweep beside their circles"),
+          "measured: difference between outlines of the sweep and their circles"),
 )  # fmt: skip
 UNCERTAINTY = Uncertainty(BLOCK_MESHES, ALL, surrogate="md_fluid")
 

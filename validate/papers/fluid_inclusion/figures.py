@@ -22,7 +22,7 @@ from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
 from validate.solve.pressure_loop import PressureLoop
 
 _OTHER = "another phantom: the paper prints neither its block nor its inclusion nor plate contact"
-_SIZED = "a count of our own mesh, of sizes that we assumed so that it comes out"
+_SIZED = "a count of our mesh, whose sizes we chose to match it"
 _LOOP = (
     "neither the needle's path and contact nor the cavity of the planar scene are printed; "
     "`needle_pocket` runs ours"

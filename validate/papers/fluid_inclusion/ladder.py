@@ -56,8 +56,8 @@ def phantom_trial(
         rise_s=rise,
         noise=marker_noise(recording),
         notes=(
-            "Steps are static: a step is a load increment, and no density is declared, so nothing "
-            "with inertia runs here.",
+            "Steps are static: a step is a load increment. No density is declared, so no "
+            "scheme with inertia runs here.",
         ),
     )
 

@@ -72,8 +72,8 @@ class InclusionCard:
         given = [name for name in own if getattr(self, name) is not None]
         if self.shape == "sweep" and given:
             raise UsageError(
-                f"inclusion.{given[0]} is of a capsule; a sweep says where its inclusion lies: set "
-                "inclusion.wider or inclusion.longer"
+                f"inclusion.{given[0]} applies to a capsule; a sweep contains the place of its "
+                "inclusion: set inclusion.wider or inclusion.longer"
             )
 
 
@@ -87,7 +87,7 @@ class WallCard:
 @dataclass(frozen=True)
 class PhantomGrid(BlockGrid):
     order: Literal[1, 2] | None = quantity(
-        None, "1", "1 or 2 for every method; none: each method's own"
+        None, "1", "1 or 2 for every method; none: as each method declares"
     )
 
 
@@ -232,8 +232,9 @@ def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, .
     if off < 0.5e-3 and abs(wide) < 0.5e-3:
         return ()
     return (
-        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its radius "
-        f"{1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and cannot show that.",
+        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
+        f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
+        "show this.",
     )
 
 

@@ -7,7 +7,7 @@ from validate.papers.fluid_inclusion.twin import PROFILE, SCANNER, SLICES, Phant
 from validate.papers.stated import CITED, drawn, said, taken
 
 _RECIPE = "a recipe: it enters by the modulus and Poisson ratio only"
-_SHOWN = "a picture without numbers: the report draws ours"
+_SHOWN = "a figure without numbers: the report draws ours"
 _P = Phantom()
 
 
@@ -15,16 +15,16 @@ STATED = (
     said("strain to which small strain is accurate", 0.01, "1", "section 2.2",
           f"{CITED}; `fluid_phantom_large` measures what a linear model costs at 15 %"),
     said("rate of a haptic simulation", 500.0, "Hz", "sections 2.2 and 3",
-          "a demand; what runs is the rate of the condensed phantom below"),
-    said("rate of a painting simulation by others", 70.0, "Hz", "section 2.3", CITED),
-    said("grid of a painting simulation by others", 64.0, "1", "section 2.3", CITED),
+          "a requirement; the rate of the condensed phantom is given below"),
+    said("rate of a painting simulation in other work", 70.0, "Hz", "section 2.3", CITED),
+    said("grid of a painting simulation in other work", 64.0, "1", "section 2.3", CITED),
     said("Poisson ratio of the incompressible", 0.5, "1", "section 3.1",
           "refused with the reason; `fluid_block` runs to .4999999999"),
     said("Fig. 1: cavities in a body", None, "1", "section 3",
           "a sketch; one to three cavities in `fluid_block`, a pulse as the flow of Fig. 1b"),
     said("Fig. 2: a mesh with its normals", None, "1", "section 3.2",
           "a sketch; the mesh and its deformed shape are drawn in both reports"),
-    said("strain to which gelatin is linear, by others", 0.10, "1", "section 4.1", CITED),
+    said("strain to which gelatin is linear, in other work", 0.10, "1", "section 4.1", CITED),
     said("gelatin in the phantom", 0.13, "1", "section 4.1", _RECIPE),
     said("glycerol in the fluid", 0.10, "1", "section 4.1", "the fluid is incompressible"),
     said("cellulose in the phantom", 0.03, "1", "section 4.1",
@@ -41,10 +41,10 @@ STATED = (
     taken("step of the sweep", 0.002, float(np.diff(SLICES)[0]), "m", "section 4.4"),
     *(taken(f"displacement number {i}", 0.003 * i, PROFILE.loads[i], "m", "section 4.5")
       for i in (1, 2, 3)),
-    taken("error of a marker, placed by hand", 1e-3, float(np.sqrt(3) * PhantomTwin().sd_hand),
-           "m", "section 4.5", "the twin's pen is given as much"),
+    taken("error of a manually placed marker", 1e-3, float(np.sqrt(3) * PhantomTwin().sd_hand),
+           "m", "section 4.5", "the twin's pen has the same error"),
     said("Fig. 7a: contour at rest", None, "m", "section 4.5, Fig. 7a",
-          "a picture without numbers: 0.14 mm rms stands under 'at rest' in the report"),
+          "a figure without numbers: 0.14 mm rms is under 'at rest' in the report"),
     drawn("Fig. 7b: largest contour error at 3 mm", "p1_loop:contour.max@3mm", "m",
            "section 4.5, Fig. 7b", _SHOWN),
     drawn("Fig. 7c: largest contour error at 6 mm", "p1_loop:contour.max@6mm", "m",
@@ -54,7 +54,7 @@ STATED = (
     drawn("Fig. 8: markers in plane at 6 mm", "p1_loop:marker.inplane.rms@6mm", "m",
            "section 4.5, Fig. 8", _SHOWN),
     said("memory of the machine", 512e6, "1", "section 5.3",
-          "bytes of another machine; `benchmarks/fluid_loop.py` states what every form takes"),
+          "bytes of another machine; `benchmarks/fluid_loop.py` gives the memory of every form"),
     said("nodes with the tool's two", 82.0, "1", "section 5.3",
           "which two is not printed; `benchmarks/fluid_loop.py` takes two of the upper side"),
 )  # fmt: skip

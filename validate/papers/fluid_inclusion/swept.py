@@ -37,8 +37,8 @@ def stack_of(recording: Recording, sweep: Contours, stage: Signal) -> Stack:
     moved = np.abs(np.interp(sweep.t[during], stage.t, stage.y[:, 0]) - stage.y[0, 0])
     if moved.size and moved.max() > _STILL:
         raise RegistrationError(
-            f"the stage stood {1e3 * moved.max():.2f} mm off its rest during the sweep; its "
-            "outlines must show the inclusion at rest"
+            f"the stage stood {1e3 * moved.max():.2f} mm away from rest during the sweep; "
+            "record the sweep with the stage at rest"
         )
     position = recording.signal(POSITION, "m")
     return stacked(sweep, position.t, position.y[:, 0])

@@ -62,7 +62,7 @@ class PhantomTwin:
     seed: int = quantity(20040327, "1", "seed of every sensor's noise")
     sd_outline: float = quantity(0.15e-3, "m", "noise of the outline along its normal")
     sd_tip: float = quantity(0.2e-3, "m", "pen tip, per axis")
-    sd_hand: float = quantity(0.577e-3, "m", "placing by hand, per axis (1 mm rms)")
+    sd_hand: float = quantity(0.577e-3, "m", "manual placement, per axis (1 mm rms)")
     sd_force: float = quantity(0.02, "N", "load cell noise")
     sd_pressure: float = quantity(10.0, "Pa", "pressure transducer noise")
     sd_stage: float = quantity(2e-6, "m", "stage encoder noise")

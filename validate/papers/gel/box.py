@@ -43,7 +43,9 @@ _DEEPEST = 0.03  # share of the discs whose middle is the axis
 
 @dataclass(frozen=True)
 class GelMaterial:
-    E: float = quantity(1000.0, "Pa", "modulus; no displacement depends on it: any will do")
+    E: float = quantity(
+        1000.0, "Pa", "modulus; no displacement depends on it, so any value is valid"
+    )
     nu: float | None = quantity(None, "1", "Poisson ratio; none: identified in the lower box")
     coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
     between: float = quantity(
@@ -66,7 +68,9 @@ class GelBoxes:
         None, "m", "between the boxes; none: a spacing above a strain of .06, or half"
     )
     top: float | None = quantity(None, "m", "of the upper one; none: a spacing above .2")
-    clear: float = quantity(1.0, "1", "spacings off the faces from which particles are judged")
+    clear: float = quantity(
+        1.0, "1", "distance from the faces, in spacings, from which particles are compared"
+    )
 
     def ends(self) -> tuple[Floats, Floats]:
         """Corners (3,) m of the box; raises `UsageError` for one without volume."""
@@ -200,7 +204,7 @@ def build(recording: Recording, parameters: GelIndentation, model: GelModel) -> 
     """The box with its lower corner at the origin; all its faces move as the particles there."""
     p = parameters
     if p.material.nu is None:
-        raise UsageError("material.nu is open: identify it, or --set material.nu=0.45")
+        raise UsageError("material.nu is not set: identify it, or --set material.nu=0.45")
     mesh, moved = faces_of(Same(recording), p.box, p.faces, p.mesh, model.order)
     material = Material(
         p.material.E, p.material.nu, model.law,

@@ -52,8 +52,8 @@ def _errors(followed: Followed) -> Floats:
 
 def _inside(judged: GelErrors, which: str, main: Mapping[str, Followed]) -> Exhibit:
     unknown = (
-        "Displacement alone sees the Poisson ratio and no modulus: every force is in a unit that "
-        "nobody stated."
+        "Displacement alone identifies the Poisson ratio and no modulus: every force has an "
+        "unknown unit."
     )
     return Exhibit(
         "inside", f"Errors inside the {which} box", (*judged.words(), unknown),
@@ -79,12 +79,12 @@ def _calibrated(judged: GelErrors, found: Sequence[GelRatio]) -> Exhibit:
         "nu_between_boxes", "The Poisson ratio fitted in other boxes (linear law)",
         ("box", "neighbours (1)", "particles (1)", "nu (1)", "standard deviation (1)",
          "error / floor (1)"), rows,
-        note="The standard deviation is that of noise and misfit in that box, none where the ratio "
-        "ended at a bound; the scatter from row to row is what the input 'box' holds. A coarser "
-        "mesh than the prediction's.",
+        note="The standard deviation is that of noise and misfit in that box; it is absent "
+             "where the ratio ended at a bound. The scatter between rows is the input 'box'. "
+             "A coarser mesh than the prediction's.",
     )  # fmt: skip
     return Exhibit(
-        "lower", "The lower box, and others: fitted, no evidence", judged.words(),
+        "lower", "The lower box and other boxes: fitted, no evidence", judged.words(),
         (judged.over_strain("lower_over_strain", f"The lower box: {_OVER} strain norm"), table),
     )  # fmt: skip
 
@@ -94,7 +94,7 @@ def _linked(whose: Same, p: GelIndentation, home: Path, progress: Progress) -> E
     pair = files(p.data, (p.before, p.after), home)
     table = checked_links(whose.recording, pair, side_of(p.voxel, pair[0]))
     words = (
-        "Linked backward, from after to before, a particle should find the one it was found by. On "
-        "a pair whose links are known every wrong one is counted.",
+        "Linked backward, from after to before, a particle should be linked to the same "
+        "particle as forward. On a pair with known links every wrong link is counted.",
     )
-    return Exhibit("links", "Are the links right?", words, (table,))
+    return Exhibit("links", "Check of the links", words, (table,))

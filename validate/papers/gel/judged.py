@@ -88,15 +88,15 @@ class GelErrors:
         left = float(np.sqrt(max(least**2 - noise_alone**2, 0.0)))
         bias = _UM * self.errors[best].mean(axis=0)
         return (
-            f"{len(self.floor)} linked particles inside, strain norms {self.strain.min():.3f} to "
-            f"{self.strain.max():.3f} (local quadratics of {SMOOTH} neighbours, in the box or "
-            f"not). Noise of a displacement: {', '.join(f'{_UM * s:.3f}' for s in self.sd)} µm "
-            f"along x, y, z (standard deviations), {_UM * noise_alone:.3f} µm in all; about a "
-            f"local quadratic of 20 neighbours {_UM * floor:.3f} µm are left: the floor.",
-            f"Best is '{best}', rms {_UM * least:.3f} µm, {least / floor:.2f} floors. A perfect "
-            f"model would show the noise, {noise_alone / floor:.2f} floors; what is left beyond "
-            f"it is {_UM * left:.3f} µm, of mean {', '.join(f'{b:+.3f}' for b in bias)} µm along "
-            "x, y, z.",
+            f"{len(self.floor)} linked particles inside, strain norms {self.strain.min():.3f} "
+            f"to {self.strain.max():.3f} (local quadratics of {SMOOTH} neighbours, in the box "
+            f"or not). Noise of a displacement: {', '.join(f'{_UM * s:.3f}' for s in self.sd)} "
+            f"µm along x, y, z (standard deviations), {_UM * noise_alone:.3f} µm in all; about "
+            f"a local quadratic of 20 neighbours {_UM * floor:.3f} µm remain: the floor.",
+            f"Best is '{best}', rms {_UM * least:.3f} µm, {least / floor:.2f} floors. A "
+            f"perfect model would show the noise, {noise_alone / floor:.2f} floors; the "
+            f"rest is {_UM * left:.3f} µm, of mean {', '.join(f'{b:+.3f}' for b in bias)} µm "
+            "along x, y, z.",
         )
 
     def map(self, name: str, label: str) -> Heat:

@@ -48,8 +48,9 @@ def checked_links(recording: Recording, files: tuple[Path, Path], voxel: float) 
         ("z (µm)", "particles (1)", "linked (%)", "found backward too (%)",
          "otherwise backward (%)", "known pair: linked (%)", "known pair: wrong (%)"),
         tuple(told),
-        note=f"The known pair: these particles moved as was measured, its noise, {_LOST:.0%} lost "
-        "before and after; a particle of it can be linked where its partner is there.",
+        note="The known pair: these particles moved by the measured motion with its noise, "
+             f"{_LOST:.0%} lost before and after; a particle of it can be linked where its "
+             "partner is there.",
     )  # fmt: skip
 
 

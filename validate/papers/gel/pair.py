@@ -33,8 +33,8 @@ def files(data: str | None, names: tuple[str | None, str | None], home: Path) ->
     given = tuple(folder / n for n in names if n)
     if len(given) == 1 or (not given and len(there) != 2):
         raise RecordingError(
-            f"{folder}: {len(there)} MATLAB files, a pair is needed: say which, --set before=A.mat "
-            "--set after=B.mat"
+            f"{folder}: {len(there)} MATLAB files; a pair is needed: choose it, --set "
+            "before=A.mat --set after=B.mat"
         )
     one, other = given or there
     return one, other
@@ -53,8 +53,7 @@ def side_of(voxel: float | None, before: Path) -> float:
     if any(mark == f.sha256 for f in named(FOLDER).files):
         return _KNOWN
     raise UsageError(
-        f"{before.name} is in pixels and nobody says their size; measure it and pass --set "
-        "voxel=0.4um"
+        f"{before.name} is in pixels of unknown size; measure it and pass --set voxel=0.4um"
     )
 
 

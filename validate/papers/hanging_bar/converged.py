@@ -33,7 +33,7 @@ _MM = 1e3
 def tell(parameters: HangingBar, cases: Cases, progress: Progress) -> Told:
     """The converged drop with its interval on meshes graded in two ways, dolfinx's own meshes."""
     p, main = parameters, cases[MAIN]
-    progress("what it converges to")
+    progress("the converged value")
     found = {g: _converged(replace(p, mesh=replace(p.mesh, grading=g))) for g in _GRADINGS}
     limits = [float(at.extrapolated[0, 0]) for _, at in found.values()]
     value = sum(limits) / len(limits)
@@ -81,7 +81,7 @@ def _other(name: str, theirs: float, reason: str, claim: Claim = "not reproduced
     return Figure(name, "told:drop.converged", theirs, 1e-3 * theirs, "m", claim, reason, SOURCE)
 
 
-_ENGINE = "NVIDIA Newton's own solver: no mesh of the same law comes near"
+_ENGINE = "NVIDIA Newton's solver: no mesh of the same law agrees with it"
 PUBLISHED = (
     _ours("dolfinx, linear tetrahedra", "drop.tetrahedra", 43.2013e-3, 43.20130e-3),
     _ours("dolfinx, 6 x 6 x 16 hexahedra", "drop.hexahedra.6", 43.3963e-3, 43.39635e-3),

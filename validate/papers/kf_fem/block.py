@@ -71,9 +71,9 @@ class LayeredTwin(TrackedTwin):
     contrast: float = quantity(5.0, "1", "modulus of layer or inclusion over the rest")
     finer: int = quantity(1, "1", "its steps in one of the models'")
     springs: float = quantity(0.0, "N/m^3", "of an elastic support below it; 0: held")
-    outliers: float = quantity(0.0, "1", "share of the looks at which a marker is mistaken")
-    astray: float = quantity(1e-3, "m", "how far off it is then, in any direction")
-    late: float = quantity(0.0, "s", "sd of the time of a look, which its clock declares")
+    outliers: float = quantity(0.0, "1", "share of samples in which a marker is an outlier")
+    astray: float = quantity(1e-3, "m", "size of an outlier, in a random direction")
+    late: float = quantity(0.0, "s", "sd of a sample's time stamp, as its clock declares")
 
     @property
     def camera(self) -> Camera:

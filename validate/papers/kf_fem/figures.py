@@ -6,7 +6,7 @@ from validate.compare.published import Figure, Values
 from validate.papers.kf_fem.seeds import SEEDS
 from validate.papers.kf_fem.stated import STATED
 
-_BOXES = "a count of our own mesh: 5 x 5 x 8 nodes, six tetrahedra a box"
+_BOXES = "a count of our mesh: 5 x 5 x 8 nodes, six tetrahedra a box"
 _TABLE = "section 3, Table 1"
 _MACHINE = "another machine (i7-2600)"
 
@@ -14,9 +14,9 @@ _MACHINE = "another machine (i7-2600)"
 def _reading(values: Values) -> str:
     return (
         f"mean of {SEEDS} seeds (95 % interval of the mean ± "
-        f"{values['told']['nrmse.half_interval']:.2g}) with Q = R = P0 = .001 mm2, v and a from "
-        "the prior, normalised by the range: a reading chosen on this twin because it fits, for "
-        "the paper prints none of them"
+        f"{values['told']['nrmse.half_interval']:.2g}) with Q = R = P0 = .001 mm2, v and a "
+        "from the prior, normalised by the range: chosen on this twin because it fits; the "
+        "paper prints none of them"
     )
 
 
@@ -31,7 +31,7 @@ def _ratio(one: str, other: str, score: str) -> Callable[[Values], float]:
 def _faster(values: Values) -> str:
     times = _ratio("kf_dense", "fem", "step.p50")(values)
     return (
-        "only against Gaussian elimination anew at every step; the same FEM factored once is "
+        "only against Gaussian elimination at every step; the same FEM factored once is "
         f"{times:.0f} times faster than the filter"
     )
 
@@ -39,9 +39,10 @@ def _faster(values: Values) -> str:
 def _uncertain(values: Values) -> str:
     return (
         "steps until the claimed sd of the measured node is within 1 % of its last, with the "
-        "setting that gives the printed NRMSE; a start that is uncertain for longer needs a gain "
-        f"that decays (Q = 0), with which NRMSE is {values['told']['nrmse.without_q']:.2g}: the "
-        "paper's two statements do not fit one setting"
+        "setting that gives the printed NRMSE; a start that is uncertain for longer needs a "
+        "gain that decays (Q = 0), with which NRMSE is "
+        f"{values['told']['nrmse.without_q']:.2g}: no setting satisfies both statements of the "
+        "paper"
     )
 
 
@@ -60,7 +61,7 @@ FIGURES = (
         _reading, "section 3", 0.01146, 3e-4,
     ),
     Figure(
-        "share of the measurement noise that is left", _noise_left, 0.0, None, "1",
+        "share of the measurement noise that remains", _noise_left, 0.0, None, "1",
         "not reproduced",
         "'completely filters the measurement noise': with the setting that gives its NRMSE a third "
         "is removed", "section 3, Fig. 4", 0.667, 0.02,
@@ -71,7 +72,7 @@ FIGURES = (
     ),
     Figure(
         "step of FEM", "fem_gauss:step.p50", 0.1735, None, "s", "not comparable",
-        f"{_MACHINE}; Gaussian elimination anew at every step, as printed", "section 3",
+        f"{_MACHINE}; Gaussian elimination at every step, as printed", "section 3",
     ),
     Figure(
         "step of KF-FEM", "kf_dense:step.p50", 0.0158, None, "s", "not comparable",
@@ -87,11 +88,11 @@ FIGURES = (
     ),
     Figure(
         "as accurate as FEM", "kf_printed:node_A.nrmse", 0.0, None, "1", "not reproduced",
-        "the FEM made the measurement: its own error is 0, so the filter is strictly worse",
+        "the measurement is made by the FEM: its error is 0, so the filter is always worse",
         "abstract and section 4", 0.0119, 5e-4,
     ),
     Figure(
-        "share of the error left 2 mm below the measured node, model 20 % too stiff",
+        "share of the error that remains 2 mm below the measured node, model 20 % too stiff",
         _ratio("kf_printed", "fem", "node_B.nrmse@stiff_model"), 0.0, None, "1", "not reproduced",
         "'estimates all other nodes': with white Q one measured node corrects no other; a Q shaped "
         "by the load does", "section 3, Fig. 5", 1.0, 0.01,

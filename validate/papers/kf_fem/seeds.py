@@ -131,7 +131,7 @@ def _ensemble(found: Mapping[tuple[float, str], Floats], raw: Floats) -> Exhibit
         "Normaliser: range of the reference over the run. R = P0 = 0.001 mm2.",
         ("Q / mm2", "v and a from", "mean NRMSE / 1", "95 % half interval / 1", "sd / 1", "seeds"),
         tuple(rows),
-        "The paper prints 0.0116 and neither its Q, its unit, its recursion nor its normaliser.",
+        "The paper prints 0.0116, but not its Q, unit, recursion or normaliser.",
     )
     series = [
         Series(f"v, a from the {r}", np.array(VARIANCES),
@@ -143,19 +143,19 @@ def _ensemble(found: Mapping[tuple[float, str], Floats], raw: Floats) -> Exhibit
         levels=(("measurement itself", _interval(raw)[0]), ("printed 0.0116", 0.0116)), log="x",
     )  # fmt: skip
     words = (
-        "With a perfect model the plain FEM has no error at all and any white Q makes the filter "
-        "worse: Q = 0 is best here. The filter earns its cost where the model is wrong (above).",
+        "With a perfect model the plain FEM has no error and any white Q makes the filter "
+        "worse: Q = 0 is best here. The filter is useful where the model is wrong (above).",
     )
-    return Exhibit("seeds", "The printed error over many noise seeds", words, (table,), (chart,))
+    return Exhibit("seeds", "Printed error over many noise seeds", words, (table,), (chart,))
 
 
 def _oracle() -> Exhibit:
     rows = tuple((r.pair, r.states, r.steps, r.largest) for r in oracle_table())
     table = NumberTable(
         "oracle",
-        "Own filters against filterpy on small systems: largest difference in any entry of state "
-        "or covariance (of order 1).",
+        "Filters of validate against filterpy on small systems: largest difference in any "
+        "entry of state or covariance (of order 1).",
         ("pair", "states", "steps", "largest difference / 1"),
         rows,
     )
-    return Exhibit("oracle", "An independent oracle", (), (table,))
+    return Exhibit("oracle", "Comparison with an independent implementation", (), (table,))

@@ -20,7 +20,7 @@ STATED = (
     taken("analysis time", 1.0, _P.clock.steps * _P.clock.dt, "s", _TABLE),
     taken("time increment", 0.002, _P.clock.dt, "s", _TABLE),
     taken("applied force over its area", 3000.0, _P.loading.traction, "Pa", _TABLE,
-          "an input; read as a consistent traction, for equal nodal forces pull 7 % less"),
+          "an input; taken as a consistent traction, because equal nodal forces pull 7 % less"),
     taken("Rayleigh's alpha 0", 0.0, _P.material.mass_damping, "1/s", _TABLE),
     taken("Rayleigh's alpha 1", 0.1, _P.material.stiffness_damping, "s", _TABLE),
     taken("density", 1068.0, _P.material.rho, "kg/m^3", _TABLE),
@@ -29,7 +29,7 @@ STATED = (
     taken("edge of an element", 1e-3, _P.body.cell, "m", "section 3",
           "an input; the cells' edges, diagonals of the tetrahedra are longer"),
     said("Fig. 2: mesh with the observation point", None, "1", "section 3, Fig. 2",
-         "a picture without numbers: the report draws ours"),
+         "a figure without numbers: the report draws ours"),
     drawn("Fig. 3: noise of the measurement over its range", "told:nrmse.raw", "1",
           "section 3, Fig. 3", "a curve without numbers; mean over the seeds, with the variance "
           "read as .001 mm2"),
@@ -41,9 +41,9 @@ STATED = (
     drawn("Fig. 4: error at evaluation point 1", "kf_printed:node_A.nrmse", "1",
           "section 3, Fig. 4", "a curve without numbers; over the range, on the shipped twin"),
     drawn("Fig. 5: error at evaluation point 2", "kf_printed:node_B.nrmse", "1",
-          "section 3, Fig. 5", "a curve without numbers; over the range: with a perfect model the "
-          "point follows FEM, whose prediction it is"),
+          "section 3, Fig. 5", "a curve without numbers; over the range: with a perfect model "
+                               "the point follows the prediction of FEM"),
     taken("steps of the run", 500.0, float(_P.clock.steps), "1", "section 3"),
     said("'in the first 0.05 seconds'", 0.05, "s", "section 3",
-         "25 steps of 2 ms: judged as steps"),
+         "25 steps of 2 ms: compared as steps"),
 )  # fmt: skip

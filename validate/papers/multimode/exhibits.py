@@ -45,7 +45,7 @@ def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
     ]
     exhibit = Exhibit(
         "laws-by-prediction",
-        "Laws ranked by what they predict",
+        "Laws ranked by prediction",
         (*sentences(found), *left_out(runs.values())),
         tables=(_ranking(found, mode_of(seen[0])),),
         charts=tuple(charts),
@@ -74,7 +74,7 @@ def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
     ]
     said += [
         f"{one.label} as identified loses positive energy at stretch {one.lost.stretch:.3g} "
-        f"({one.lost.mode}), among the stretches that were measured: no simulation should use it."
+        f"({one.lost.mode}), within the measured stretches: do not use it in a simulation."
         for one in found
         if one.lost
     ]
@@ -107,9 +107,9 @@ def _ranking(found: Sequence[RankedLaw], fitted: str) -> NumberTable:
         rows.append((one.label, k + 1, *cells, _stable(one)))
     return NumberTable(
         "laws",
-        "Rms over the rows of simulated less measured stress, relative to the measured one. The "
-        "interval is what another reading of the figures would give, every law identified again "
-        "on it. Rows of all predicted modes count alike in 'all'.",
+        "Rms over the rows of simulated less measured stress, relative to the measured one. "
+        "The interval is the effect of another digitisation of the figures, with every law "
+        "identified again. In 'all', rows of all predicted modes have the same weight.",
         (*headings, "stable where measured"),
         tuple(rows),
     )
@@ -135,7 +135,7 @@ def _mode(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str)
         "stretch / 1",
         f"nominal stress / {unit}",
         (Series("measured", l, factor * stress, "points"), *lines),
-        caption="A line ends where it leaves the measured stresses by 30 %.",
+        caption="A line ends where it exceeds the measured stresses by 30 %.",
     )
 
 
@@ -154,7 +154,7 @@ def _plane(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str
         f"measured / {unit}",
         f"second nominal stress / {unit}",
         tuple(series),
-        caption="Stresses 30 % beyond the largest measured one are left out.",
+        caption="Stresses 30 % above the largest measured one are omitted.",
     )
 
 

@@ -93,7 +93,7 @@ def hysteresis_exhibit(p: NeedlePocket, scene: Scene) -> tuple[Exhibit, dict[str
         ("law", f"largest stored / {unit}", f"taken in a turn / {unit}",
          "of the largest stored / %", f"taken less stored at the end / {unit}",
          f"least taken less stored / {unit}"),
-        tuple(rows), "Below 0: the device gives back more than it took, and is not passive.",
+        tuple(rows), "Below 0: the device returns more energy than it received and is not passive.",
     )  # fmt: skip
     chart = Chart(
         "hysteresis", "Force on the hand around a closed path", "way of the tip down / mm",
@@ -101,7 +101,7 @@ def hysteresis_exhibit(p: NeedlePocket, scene: Scene) -> tuple[Exhibit, dict[str
     )  # fmt: skip
     words = (
         "Down, two turns of an ellipse within the body and back at 512 Hz, linear elements, "
-        "nothing let go: an elastic body gives back exactly what it took.",
+        "nothing let go: an elastic body returns exactly the energy that it received.",
         f"The exact pressure with the force of the energy takes {numbers['turn.exact']:.1e} of the "
         f"largest stored energy in a turn (rounding and the trapezoidal rule), the paper's law to "
         f".1 % {100 * numbers['turn.paper']:.3g} %, of which the reaction on normals that do not "
@@ -138,7 +138,8 @@ def energy_exhibit(
     charts = (
         Chart("energy", "Energy of the P2 body with exact pressure", "time / s",
               f"energy / mJ{per}", both),
-        Chart("passivity", "Taken less stored: a passive device never falls", "time / s",
+        Chart("passivity", "Taken minus stored energy: never falls for a passive device",
+            "time / s",
               f"energy / mJ{per}", tuple(lines)),
     )  # fmt: skip
     table = NumberTable(
@@ -148,8 +149,9 @@ def energy_exhibit(
         tuple(rows),
     )  # fmt: skip
     words = (
-        "Taken less stored rises where the body lets go (what was stored is lost, not given back) "
-        "and stays level in between; where it falls the device gave energy that it did not have.",
+        "Taken minus stored energy rises where contact ends (stored energy is lost, not "
+        "returned) and is constant in between. Where it falls, the device gave energy that it "
+        "did not have.",
     )
     return Exhibit("energy", "Passivity", words, (table,), tuple(c for c in charts if c.series)), (
         numbers

@@ -67,8 +67,12 @@ class PocketRanges(Ranges):
 class HandCard:
     """None: in the plane 20 and 500 N per metre, in 3-D 0.1 and 5 N."""
 
-    grip: float | None = quantity(None, "N", "pull at which the body lets go; none: by space")
-    limit: float | None = quantity(None, "N", "largest force on the hand; none: by space")
+    grip: float | None = quantity(
+        None, "N", "pulling force at which contact ends; none: depends on the dimension"
+    )
+    limit: float | None = quantity(
+        None, "N", "largest force on the hand; none: depends on the dimension"
+    )
 
 
 @dataclass(frozen=True)

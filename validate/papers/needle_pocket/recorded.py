@@ -42,22 +42,23 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
     first = int(np.argmax(near & ~inside)) if (near & ~inside).any() else len(t)
     kept = near & (np.arange(len(t)) >= first)
     findings = [
-        _said(~seen, "is not seen: left out"),
-        _said(seen & ~near, f"lies over {1e3 * _FAR * size:.0f} mm outside the body: left out"),
+        _said(~seen, "is not visible and is omitted"),
+        _said(seen & ~near, f"lies over {1e3 * _FAR * size:.0f} mm outside the body and is "
+                            "omitted"),
         _said(near & (np.arange(len(t)) < first),
-              "lies inside the body before the path was outside it: left out"),
+              "lies inside the body before the path was outside it and is omitted"),
     ]  # fmt: skip
     if kept.sum() < 2:
         what = "; ".join(f for f in findings if f)
         raise RecordingError(
-            f"{recording.name}: {int(kept.sum())} of {len(t)} samples of the tip can be walked: "
+            f"{recording.name}: {int(kept.sum())} of {len(t)} samples of the tip can be used: "
             f"{what}; the path must begin outside the body and lie in its frame"
         )
     deep = x[kept, 1] < high[1] - _LINEAR * (high - low)[1]
     findings += [
         _gaps(t[kept]),
         _touch(x[kept], low, high),
-        _said(deep, f"lies deeper than {100 * _LINEAR:g} % of the body's height: beyond linearity"),
+        _said(deep, f"is deeper than {100 * _LINEAR:g} % of the body's height: beyond linearity"),
         _left(x[kept], low, high),
     ]
     return Walkable(t[kept], x[kept], sd, tuple(f for f in findings if f))
@@ -79,8 +80,8 @@ def _gaps(t: Floats) -> str:
     if not gaps.any():
         return ""
     return (
-        f"{int(gaps.sum())} gaps in the path, the longest {steps.max():.3g} s: the tip is taken to "
-        "have gone straight across"
+        f"{int(gaps.sum())} gaps in the path, the longest {steps.max():.3g} s: the tip is "
+        "assumed to move on a straight line"
     )
 
 
@@ -89,8 +90,8 @@ def _touch(x: Floats, low: Floats, high: Floats) -> str:
         return ""
     least = float(_beyond(x, low, high).min())
     return (
-        f"none of {len(x)} samples of the tip lies in the body, the nearest {1e3 * least:.3g} mm "
-        "off: nothing is touched unless the path crosses the body between two samples"
+        f"none of {len(x)} samples of the tip lies in the body, the nearest {1e3 * least:.3g} "
+        "mm away: there is no contact unless the path crosses the body between two samples"
     )
 
 
@@ -100,4 +101,4 @@ def _left(x: Floats, low: Floats, high: Floats) -> str:
     below = (x[:, 1] < high[1]) & (
         ((x[:, sides] < low[sides]) | (x[:, sides] > high[sides])).any(axis=1) | (x[:, 1] < low[1])
     )
-    return _said(below, "lies below the touched face and beyond another one: it left the mesh")
+    return _said(below, "lies below the touched face and outside another one: it left the mesh")

@@ -50,14 +50,14 @@ def _scope(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
         "iterations", "Updates of the pressure in a tick", "time / s", "updates / 1",
         tuple(Series(f.label, f.run.t, f.run.traces["updates"].y) for f in wet.values()),
         levels=(("the paper's claim", 1.0),),
-        caption="The exact pressure's are Newton steps on one number; the paper's evaluate the "
-        "whole wall.",
+        caption="Updates of the exact pressure are Newton steps on one number; those of the "
+                "paper evaluate the full wall.",
     )  # fmt: skip
     heads = ("method", "largest volume error / %", "rms / %", "ticks", "without update",
              "with one", "with more", "in contact", "changes of contact", "limited")  # fmt: skip
     rows = tuple(_counted(f, off.get(k)) for k, f in main.items())
     table = NumberTable("loop", "Ticks along the recorded path.", heads, rows,
-                        "No volume is held without fluid.")  # fmt: skip
+                        "Without fluid the volume is not kept constant.")  # fmt: skip
     paper = wet.get(_PAPER)
     numbers: dict[str, float] = {}
     if paper is not None and len(off[_PAPER]):
@@ -68,7 +68,7 @@ def _scope(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
             "updates.most": float(made.max()),
         }
     words = (
-        "The paper's law stops within .1 % and leaves what is left for the next tick; the exact "
+        "The paper's law stops within 0.1 % and leaves the rest to the next tick. The exact "
         "pressure is the root of the volume's polynomial.",
     )
     return Exhibit("scope", "Volume and updates", words, (table,), (volume, updates)), numbers
@@ -111,10 +111,11 @@ def _ticks(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
     table = NumberTable("ticks", f"Times of a tick; the deadline is {1e6 * deadline:.0f} us.",
                         heads, tuple(rows))  # fmt: skip
     words = (
-        "A tick is contact search, low-rank change of the condensed body, pressure and force. The "
-        "first changes compile what later ones reuse; `validate live needle_pocket` warms them.",
+        "A tick is contact search, low-rank change of the condensed body, pressure and force. "
+        "The first changes compile code for later ones; `validate live needle_pocket` does "
+        "this before it starts.",
     )
-    return Exhibit("ticks", "Ticks against 512 Hz", words, (table,)), numbers
+    return Exhibit("ticks", "Timing of ticks at 512 Hz", words, (table,)), numbers
 
 
 # --- shapes ---------------------------------------------------------------------------------------
@@ -123,9 +124,9 @@ def _ticks(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
 def _shape_words(p: NeedlePocket) -> tuple[str, ...]:
     spread = "grows as the logarithm of" if p.body.space == "plane" else "falls with"
     return (
-        "The tip is a point: its stiffness is that of the mesh around it, which "
-        f"{spread} the cell size, so that force and pressure under it do not settle with "
-        "finer meshes. The paper's needle is one node of its mesh.",
+        f"The tip is a point: its stiffness is that of the mesh around it, which {spread} the "
+        "cell size, so force and pressure do not converge with finer meshes. The paper's "
+        "needle is one node of its mesh.",
     )
 
 
@@ -183,11 +184,11 @@ def _given(main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
         return ()
     table = NumberTable(
         "given",
-        "The force replayed less the force that was given live.",
+        "Replayed force minus the force of the live loop.",
         ("method", "signal", "ticks", "largest difference / N"),
         tuple(rows),
     )
-    return (Exhibit("given", "What the live loop gave", (), (table,)),)
+    return (Exhibit("given", "Forces of the live loop", (), (table,)),)
 
 
 _ASSUMED = "pocket, needle's speed and boundary are not printed: ours"
@@ -203,12 +204,12 @@ FIGURES = (
     Figure(
         "the median tick within 1/512 s (1: yes)", f"told:median.{_PAPER}", 1.0, 0.0, "1",
         "reproduced",
-        "on today's machine; `validate live needle_pocket` holds it against the clock",
+        "on a current machine; `validate live needle_pocket` measures it in real time",
         "section 5.2",
     ),
     Figure(
         "rate of the 82-node system", None, 3000.0, None, "1/s", "not comparable",
-        "measured by benchmarks/fluid_loop.py on the paper's own system and machine of today",
+        "measured by benchmarks/fluid_loop.py on the paper's system and a current machine",
         "section 5.3",
     ),
 )  # fmt: skip

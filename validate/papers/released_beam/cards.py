@@ -88,7 +88,7 @@ class BeamGrid:
 
 @dataclass(frozen=True)
 class HungMass:
-    mass: float = quantity(0.0, "kg", "hangs at the upper edge of the free end; 0: nothing")
+    mass: float = quantity(0.0, "kg", "mass at the upper edge of the free end; 0: none")
 
     def __post_init__(self) -> None:
         if not 0 <= self.mass < 10:
@@ -107,8 +107,8 @@ class SwingTimes:
         if not (0 < self.dt < self.length / 50 and 0 <= self.ringing < self.length / 2):
             raise UsageError(
                 f"swing.dt = {self.dt:g} s, swing.length = {self.length:g} s, swing.ringing = "
-                f"{self.ringing:g} s: a step below a fiftieth of the length, ringing from before "
-                "its middle"
+                f"{self.ringing:g} s: expected a step below a fiftieth of the length, and "
+                "ringing from before its middle"
             )
 
 
@@ -139,7 +139,7 @@ class ReleasedBeam:
     registration: MarkerFit = MarkerFit(sd=(0.8e-3,))
     recording: str | None = quantity(None, "1", "the recording; none: VALIDATE_SHARED_DATA")
     calibration: str | None = quantity(
-        None, "1", "the recording under gravity alone that calibrates; none: the data set's own"
+        None, "1", "the recording under gravity alone that calibrates; none: that of the data set"
     )
     unit: str | None = quantity(None, "1", "unit of length where the recording states none")
 
@@ -150,8 +150,10 @@ class BeamModel:
 
     law: LawName = quantity("neo_hooke", "1", "law of the material")
     order: int = quantity(2, "1", "of the hexahedra")
-    mixed: bool = quantity(True, "1", "with a pressure of their own, so that they do not lock")
+    mixed: bool = quantity(True, "1", "with independent pressure, which avoids locking")
     along: int | None = quantity(None, "1", "cells along the beam; none: the mesh's")
     across: int | None = quantity(None, "1", "cells across it; none: the mesh's")
-    damping: float = quantity(0.0, "s", "Rayleigh's beta, in place of what relaxes")
-    nu: float | None = quantity(None, "1", "Poisson ratio of cells that lock; none: the card's")
+    damping: float = quantity(0.0, "s", "Rayleigh's beta, instead of relaxation")
+    nu: float | None = quantity(
+        None, "1", "Poisson ratio of cells that lock; none: that of the material"
+    )

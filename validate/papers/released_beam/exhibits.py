@@ -52,7 +52,7 @@ def _ringing(swing: Swing, runs: Mapping[str, Followed]) -> NumberTable:
         found[_SHOWN[name]] = (release, swing.rung(shown))
     return NumberTable(
         "ringing",
-        "How it rings: the damped oscillation fitted to the mean vertical motion, in the same way; "
+        "Ringing: the damped oscillation fitted to the mean vertical motion, in the same way; "
         "standard deviations are of that fit. The release is from the last sample at rest.",
         ("", "frequency / Hz", "sd / Hz", "damping ratio / 1", "sd / 1", "periods", "release / ms"),
         tuple((label, *_numbers(rung), None if late is None else _MM * late)
@@ -77,7 +77,7 @@ def _markers(swing: Swing, runs: Mapping[str, Followed]) -> NumberTable:
                 rows.append((_SHOWN[name], marker, *_deviation(mine, float(swing.span[j]))))
     return NumberTable(
         "swing",
-        "Simulated less measured displacement of every marker, as a vector and along each axis.",
+        "Simulated minus measured displacement of every marker, as a vector and along each axis.",
         ("", "marker", "peak to peak / mm", "rms / mm", "rms / %", "max / mm", "rms x / mm",
          "rms y / mm", "rms z / mm", "samples"),
         tuple(rows),
@@ -119,7 +119,7 @@ def _spectra(swing: Swing, runs: Mapping[str, Followed]) -> Chart:
         series.append(Series(label, f[f <= _TO], _MM * amplitude[f <= _TO]))
     return Chart(
         "spectrum", "Spectrum of the mean vertical motion", "frequency / Hz", "amplitude / mm",
-        tuple(series), caption="Less a parabola, under Hann's window: peaks are wide by it.",
+        tuple(series), caption="Without a parabola, with a Hann window, which widens the peaks.",
     )  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def _rest(f: Followed) -> Exhibit:
         ("marker", *headings), tuple(rows),
     )  # fmt: skip
     return Exhibit(
-        "rest-shape", "Where it comes to rest",
+        "rest-shape", "Rest position",
         ("Seen from the side: the beam's upper and lower edge in its middle plane, and the markers "
          "on their stalks 6 mm off the free end, before the release and at rest.",),
         (table,), (_side(f, seen, shown),),

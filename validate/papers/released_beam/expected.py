@@ -43,7 +43,11 @@ def doubted(recording: Recording, p: ReleasedBeam) -> tuple[str, ...]:
         return ()
     mass = stiffness(p) / (2 * np.pi * seen) ** 2 - swinging(p)
     none = mass < -_FAR * swinging(p)
-    meant = "no mass would, but a stiffer beam" if none else f"{1e3 * max(mass, 0):.0f} g would"
+    meant = (
+        "no mass gives this frequency, but a stiffer beam does"
+        if none
+        else (f"{1e3 * max(mass, 0):.0f} g would")
+    )
     return (
         f"{recording.name} rings at {seen:.2f} Hz, where a beam with load.mass = "
         f"{1e3 * p.load.mass:g} g should at {expected(p):.2f} Hz; {meant}: check load.mass, "

@@ -88,15 +88,15 @@ def _release(name: str, tips: Floats, t: Floats) -> int:
     whole = float(np.percentile(drop[np.isfinite(drop)], 90)) if np.isfinite(drop).any() else 0.0
     if not whole > _MOVED:
         raise RecordingError(
-            f"{name}: no marker at the tip moves by {1e3 * _MOVED:g} mm: the beam is not let go"
+            f"{name}: no marker at the tip moves by {1e3 * _MOVED:g} mm: the beam is not released"
         )
     let_go = int(np.argmax(drop > _FALLEN * whole))
     held = np.flatnonzero(drop[: let_go + 1] < _HELD * whole)
     at = int(held[-1]) if len(held) else 0
     if t[at] - t[0] < _BEFORE / 2:
         raise RecordingError(
-            f"{name}: the beam moves at {t[at]:.2f} s; {_BEFORE / 2:g} s of rest before it is "
-            "let go are needed, to know where it was"
+            f"{name}: the beam moves at {t[at]:.2f} s; {_BEFORE / 2:g} s of rest before the "
+            "release are needed for the initial position"
         )
     return at
 

@@ -14,9 +14,9 @@ from validate.replay.experiment import Progress, Told
 from validate.replay.followed import MAIN, Cases
 
 _UNKNOWN = (
-    "No force was recorded: no modulus can be known, and none enters. No thickness was recorded: "
-    "that the strip contracts in it as it does in width is assumed by every law here, and with it "
-    "the change of volume. The states have no times: no rate is told."
+    "No force was recorded, so no modulus is identified or used. No thickness was recorded: "
+    "every law here assumes that thickness contracts like width, and this determines the "
+    "change of volume. The states have no times, so no rate is known."
 )
 
 
@@ -46,7 +46,7 @@ def _contraction(cases: Cases) -> Exhibit:
         "contraction", "Stretch across the strip", "stretch along it / 1", "stretch across / 1",
         (*points, *lines),
     )  # fmt: skip
-    return Exhibit("contraction", "How the strip contracts", (_UNKNOWN,), charts=(chart,))
+    return Exhibit("contraction", "Lateral contraction of the strip", (_UNKNOWN,), charts=(chart,))
 
 
 def _parts(p: Strip, path: Path) -> Exhibit:
@@ -62,5 +62,8 @@ def _parts(p: Strip, path: Path) -> Exhibit:
         ("part", "along / 1", "across / 1", "ratio, first / 1", "ratio, last / 1"),
         tuple(rows),
     )
-    words = "The strip is not homogeneous: what its parts differ by is in the uncertainty."
+    words = (
+        "The strip is not homogeneous: the differences between its parts are included in "
+        "the uncertainty."
+    )
     return Exhibit("parts", "Parts of the strip", (words,), tables=(table,))

@@ -33,7 +33,7 @@ class StripRatios:
     svk: float | None = quantity(None, "1", "Poisson ratio, St. Venant-Kirchhoff; none: identified")
     neo_split: float | None = quantity(None, "1", "neo-Hooke, split; none: identified")
     neo_coupled: float | None = quantity(None, "1", "neo-Hooke, coupled; none: identified")
-    incompressible: float = quantity(0.4999, "1", "of the rival that keeps its volume")
+    incompressible: float = quantity(0.4999, "1", "of the candidate of constant volume")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,9 @@ class Strip:
     patches: int = quantity(8, "1", "parts of the strip, along it, that the mean is over")
     unit: str | None = quantity(None, "1", "of the points; none: the end of the file's name")
     recording: str | None = quantity(None, "1", "tracked points, .npz; none: VALIDATE_SHARED_DATA")
-    stage: str = quantity("rbm_cam*_px.npz", "1", "files of the stage test beside the recording")
+    stage: str = quantity(
+        "rbm_cam*_px.npz", "1", "files of the stage test in the folder of the recording"
+    )
 
 
 @dataclass(frozen=True)

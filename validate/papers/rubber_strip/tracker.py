@@ -63,14 +63,15 @@ def stage_exhibit(folder: Path, pattern: str) -> Exhibit | None:
     if not found:
         return None
     return Exhibit(
-        "tracker", "The tracker against a stage", _WORDS, (_table(found),), (_chart(found),)
+        "tracker", "Tracker compared with a stage", _WORDS, (_table(found),), (_chart(found),)
     )
 
 
 _WORDS = (
-    "A rigid body on a motor stage, each camera by itself in pixels. The scale is the stage's own: "
-    "no calibration of the cameras came with the data, so that an error of scale, and the third "
-    "direction, cannot be seen. What is left over holds the stage and the cameras' mounting too.",
+    "A rigid body on a motor stage, each camera separately, in pixels. The scale comes from "
+    "the stage, because the data contain no calibration of the cameras. An error of scale or "
+    "in the third direction cannot be detected. The residual includes errors of the stage and "
+    "of the mounting of the cameras.",
 )
 
 
@@ -84,8 +85,8 @@ def _table(found: Sequence[AgainstStage]) -> NumberTable:
     ]  # fmt: skip
     return NumberTable(
         "tracker",
-        "Mean of all points less stage, rms and largest over the positions, along its motion and "
-        "across it; and the standard deviation of one point about the mean.",
+        "Mean of all points minus stage, rms and largest over the positions, along its motion "
+        "and across it; and the standard deviation of one point about the mean.",
         ("camera", "points", "positions", "scale / px/mm", "along, rms / um", "along, max / um",
          "across, rms / um", "one point / um"),
         tuple(rows),
@@ -96,5 +97,5 @@ def _chart(found: Sequence[AgainstStage]) -> Chart:
     series = [Series(f"{one.name}, along", 1e3 * one.stage, _UM * one.along) for one in found]
     series += [Series(f"{one.name}, across", 1e3 * one.stage, _UM * one.aside) for one in found]
     return Chart(
-        "tracker", "Mean of all points less stage", "stage / mm", "error / um", tuple(series)
+        "tracker", "Mean of all points minus stage", "stage / mm", "error / um", tuple(series)
     )

@@ -135,7 +135,8 @@ def _require_apart(folder: Path, u: Floats, f: Floats) -> None:
         if np.median(y[-10:]) - np.median(y[:10]) <= 0:
             raise RecordingError(
                 f"{folder.name}: the {name} goes from {np.median(y[:10]):.4g} to "
-                f"{np.median(y[-10:]):.4g}; pulling apart is positive: pass --set signs.{name}=-1"
+                f"{np.median(y[-10:]):.4g}; expected positive values as the pads separate: "
+                f"pass --set signs.{name}=-1"
             )
 
 
@@ -207,4 +208,4 @@ def _source(folder: Path) -> Source:
         content = read_bytes(path)
         whole.update(path.name.encode() + content)
         size += len(content)
-    return Source(str(folder), whole.hexdigest(), size, "integrity not provable: plain text")
+    return Source(str(folder), whole.hexdigest(), size, "integrity cannot be verified: plain text")

@@ -28,16 +28,16 @@ def exhibits(parameters: PulledSkin, cases: Cases, progress: Any) -> Told:
     ended = [f for f in cases[MAIN].values() if f.whole]
     rows = {f.label: _row(f) for f in ended}
     note = (
-        "A law is chosen by what it predicts. The interval is that of the modulus alone: by the "
-        "scatter about the fit, Student's t."
+        "A law is chosen by its prediction. The interval is that of the modulus alone, from "
+        "the scatter about the fit (Student's t)."
     )
     if rows:
         reach = max(row[4] for row in rows.values())
         best = min((n for n, r in rows.items() if r[4] == reach), key=lambda n: rows[n][5])
-        note += f" Least wrong of those that reach {reach:.2f} mm: {best}."
-    table = NumberTable("laws", "What was fitted, and what it predicts", _HEADINGS,
+        note += f" Smallest error of those that reach {reach:.2f} mm: {best}."
+    table = NumberTable("laws", "Fitted moduli and their predictions", _HEADINGS,
                         tuple(rows.values()), note)  # fmt: skip
-    return Told((Exhibit("laws", "What each law predicts", tables=(table,)),))
+    return Told((Exhibit("laws", "Prediction of each law", tables=(table,)),))
 
 
 def _row(found: Followed) -> tuple[Any, ...]:

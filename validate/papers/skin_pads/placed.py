@@ -62,11 +62,11 @@ def place(recording: Recording, parameters: PulledSkin, scene: Scene) -> Registe
     said = (
         f"{recording.record('pairing')['images']} images are paired with force samples by pad "
         f"displacement (to {1e3 * images.pulled[-1]:.2f} mm): neither has time stamps.",
-        f"Left out as spurious: {curve.left_out} of {len(recording.signals['force'].t)} samples of "
-        f"the force, {left} of {images.x.shape[1]} points.",
-        f"Beyond {1e3 * images.pulled[-1]:.2f} mm no image says how the pads share their "
-        f"displacement: the moving one's share of {images.share:.2f} is kept (no matter for force "
-        "where the far boundary is free).",
+        f"Omitted as spurious: {curve.left_out} of {len(recording.signals['force'].t)} samples "
+        f"of the force, {left} of {images.x.shape[1]} points.",
+        f"Beyond {1e3 * images.pulled[-1]:.2f} mm no image shows the share of each pad; the "
+        f"moving pad's share of {images.share:.2f} is kept (it does not affect force if the "
+        "far boundary is free).",
     )
     rest, *loaded = _holds(holds, t[~mine])
     compared = (*_windows(p, curve, t[mine]), *loaded)

@@ -67,8 +67,8 @@ class SheetMesh:
 
 @dataclass(frozen=True)
 class PullSigns:
-    displacement: float = quantity(1.0, "1", "1 or -1: makes the file's pulling apart positive")
-    force: float = quantity(1.0, "1", "1 or -1: makes the file's pulling apart positive")
+    displacement: float = quantity(1.0, "1", "1 or -1: makes separation of the pads positive")
+    force: float = quantity(1.0, "1", "1 or -1: makes separation of the pads positive")
 
     def __post_init__(self) -> None:
         if not {self.displacement, self.force} <= {1.0, -1.0}:
@@ -79,7 +79,7 @@ class PullSigns:
 class SkinRanges(Ranges):
     nu: float = quantity(0.1, "1", "of the Poisson ratio")
     pads: float = quantity(0.5e-3, "m", "of length and width of the pads")
-    gap: float = quantity(1e-3, "m", "of the distance between them, which nobody measured")
+    gap: float = quantity(1e-3, "m", "of the distance between them, which was not measured")
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,8 @@ class DwellRule:
     part: Literal["touch", "whole"] = quantity(
         "touch", "1", "the first touch, before the stylus is turned far, or the whole dwell"
     )
-    radius: float = quantity(3e-3, "m", "within which a tip that stands may wander")
-    least: float = quantity(1.0, "s", "for which it stands at least")
+    radius: float = quantity(3e-3, "m", "radius within which a resting tip may move")
+    least: float = quantity(1.0, "s", "shortest duration of a dwell")
     touch: float = quantity(0.5, "s", "of a dwell that is its first touch")
     holds: float = quantity(0.75e-3, "m", "within which the tip holds in it")
     match: float = quantity(5e-3, "m", "within which a place is a landmark's")
@@ -182,7 +182,7 @@ def digitised(
     standing = dwells(t, x, rule.radius, rule.least)
     if not standing:
         raise RecordingError(
-            f"{recording.name}: the tip never stands within {1e3 * rule.radius:g} mm for "
+            f"{recording.name}: the tip never rests within {1e3 * rule.radius:g} mm for "
             f"{rule.least:g} s; set dwell.radius and dwell.least"
         )
     whole = (part or rule.part) == "whole"

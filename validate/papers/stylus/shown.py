@@ -96,8 +96,9 @@ def _touched(d: Digitised) -> str:
     missing = f"; not touched: {', '.join(lost)}" if lost else ""
     order = "in the order of the list" if d.match.ordered else "in another order than the list's"
     return (
-        f"The tip stands {len(d.dwells)} times; {len(d.body)} of them are landmarks, {order}, told "
-        f"by their distances{missing}. The others are where it was parked, or touched one again."
+        f"The tip stands {len(d.dwells)} times; {len(d.body)} of them are landmarks, {order}, "
+        f"recognised by their distances{missing}. The others are where it was parked, or "
+        "touched one again."
     )
 
 
@@ -106,8 +107,8 @@ def _better(both: Mapping[Part, Digitised]) -> str:
     shown = ", ".join(f"{_MM * rms(d.left_out):.2f} mm by the {PARTS[k]}" for k, d in both.items())
     return (
         f"Left out one by one, landmarks are predicted to {shown}: the {PARTS[least]} predicts "
-        "best here. As the stylus is turned, its tip wanders by what its offset and the tracker "
-        "are off; --set dwell.part=whole takes the whole dwell."
+        "best here. As the stylus is turned, errors of its offset and of the tracker move the "
+        "tip; --set dwell.part=whole takes the whole dwell."
     )
 
 
@@ -137,10 +138,7 @@ def _beside_published(off: Apart, record: Mapping[str, str]) -> str:
     off_by = f"{off.angle:.2f} deg and {_MM * off.origin:.2f} mm"
     where = f"The transform in {record['file']} (its error {error:.3g} mm)"
     if off.angle > 5 or off.origin > 20e-3:
-        return (
-            f"{where} is {off_by} from ours: it belongs to another recording, and nothing is "
-            "concluded from it."
-        )
+        return f"{where} is {off_by} from ours: it belongs to another recording and is not used."
     same = "the same" if off.same else "another one"
     return f"{where} is {off_by} from ours: {same} within {_NEAR[0]:g} deg and .3 mm."
 
@@ -151,7 +149,7 @@ def _by_plus(
     try:
         found = by_plus(mine.t, mine.x, shaft_of(recording, p), mine.known)
     except RegistrationError as error:
-        return f"The detection of PLUS itself is not held beside ours: {error}."
+        return f"The detection of PLUS is not compared with ours: {error}."
     return found.pose, found.error
 
 
@@ -171,7 +169,7 @@ def exhibits(p: StylusPhantom, cases: Cases, tell: Progress) -> Told:
     shown = Exhibit(
         "landmarks",
         "Landmarks: fitted, and predicted from the others",
-        ("What is left of the fit is no evidence; what is left out and predicted is.",),
+        ("Residuals of the fit are no evidence; predictions of left-out landmarks are.",),
         tables=(_residuals(d), _matrix(d), _dwells(d)),
         pictures=(_picture(d),),
     )
@@ -222,7 +220,8 @@ def _dwells(d: Digitised) -> NumberTable:
     )  # fmt: skip
     return NumberTable(
         "dwells",
-        "Where the tip stands, in time: wander is rms from the mean, along an axis.",
+        "Positions and times at which the tip rests; wander is the rms distance from the mean "
+        "along an axis.",
         ("landmark", "from / s", "to / s", "samples", "wander / mm", "samples that count"),
         rows,
     )

@@ -55,7 +55,7 @@ def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
         why = why or "no reason given"
         return GuestAnswer(name, state, why, nothing, None, 0.0, None, _limits(said))
     if said.get("mesh_sha256") != job.document["mesh"]["sha256"]:
-        raise NoAnswerError("answer.json: mesh_sha256 is not that of the job's mesh.vtu")
+        raise NoAnswerError("answer.json: mesh_sha256 differs from that of the job's mesh.vtu")
     arrays = fields_of(folder, job)
     u, reactions, step = arrays["u"], arrays.get("reactions"), _times_done(arrays["t"], job, state)
     finite = np.all([_usable(a) for a in (u, reactions) if a is not None], axis=0)
@@ -74,7 +74,7 @@ def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
 def echoed(asked: Mapping[str, Any], used: Any) -> tuple[str, ...]:
     """Law and parameters that were ignored or changed, a line each."""
     if not isinstance(used, dict):
-        return ("does not say which law and parameters it used",)
+        return ("does not report which law and parameters it used",)
     found = []
     for name, value in asked.items():
         if name not in used:
@@ -99,14 +99,14 @@ def _document(folder: Path) -> dict[str, Any]:
     try:
         said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        raise NoAnswerError(f"answer.json: no JSON ({plain(str(error))})") from None
+        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
     if not isinstance(said, dict) or said.get("schema") != ANSWER_SCHEMA:
-        raise NoAnswerError(f"answer.json: no object of schema '{ANSWER_SCHEMA}'")
+        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
     return said
 
 
 def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number in JSON")
+    raise ValueError(f"{text} is not a number in JSON")
 
 
 def _text(said: Mapping[str, Any], key: str) -> str:
@@ -117,7 +117,7 @@ def _text(said: Mapping[str, Any], key: str) -> str:
 def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
     lines = said.get("could_not", [])
     if not isinstance(lines, list):
-        return ("says no list of what it could not do",)
+        return ("gives no list of what it could not do",)
     return tuple(f"could not: {plain(line)}" for line in lines[:_LINES] if isinstance(line, str))
 
 
@@ -134,9 +134,11 @@ def _times_done(t: Floats, job: GuestJob, state: str) -> int:
     slack = 1e-9 * max(float(job.times[-1]), 1e-30)
     if not np.allclose(t, asked, rtol=0.0, atol=slack):
         odd = int(np.argmin(np.isclose(t, asked, rtol=0.0, atol=slack)))
-        raise NoAnswerError(f"fields.npz: time {odd} is {t[odd]:g} s, asked {asked[odd]:g} s")
+        raise NoAnswerError(f"fields.npz: time {odd} is {t[odd]:g} s, requested {asked[odd]:g} s")
     if state == "finished" and len(t) < len(job.times):
-        raise NoAnswerError(f"fields.npz: {len(t)} of {len(job.times)} times, yet finished")
+        raise NoAnswerError(
+            f"fields.npz: {len(t)} of {len(job.times)} times, although its state is 'finished'"
+        )
     return len(t)
 
 
@@ -163,13 +165,18 @@ def _kept_still(job: GuestJob, u: Floats) -> tuple[str, ...]:
     largest = max(float(np.abs(u).max(initial=0.0)), float(np.abs(asked).max(initial=0.0)))
     if off.max(initial=0.0) <= _UNBALANCED * largest:
         return ()
-    return (f"what is held or driven is up to {1e3 * off.max():.3g} mm from where it should be",)
+    return (
+        f"held or driven nodes are up to {1e3 * off.max():.3g} mm away from their "
+        "prescribed position",
+    )
 
 
 def _balance(job: GuestJob, reactions: Floats | None) -> tuple[str, ...]:
     """In statics what supports and drives push is what loads and weight pull."""
     if reactions is None:
-        return ("gives no reaction forces: no drive's force is known, balance not checked",)
+        return (
+            "gives no reaction forces: forces of drives are unknown and the balance is not checked",
+        )
     if job.document["inertia"]:
         return ()
     system, k = job.system, len(reactions)

@@ -71,7 +71,7 @@ def _between(run: Run, grid: Floats, t: Floats, y: Floats) -> Run:
         return np.asarray(CubicSpline(knots, through)(at))
 
     traces = {n: replace(trace, y=spline(trace.y)) for n, trace in run.traces.items()}
-    words = f"asked at {len(grid)} levels of its input, splines between them"
+    words = f"solved at {len(grid)} levels of its input, with splines between them"
     run = replace(run, said=(*run.said, words))
     return _at_all(run, t[:upto], spline(run.u), traces)
 

@@ -48,8 +48,8 @@ def _series(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     slack = _SAME * float(np.ptp(mesh.nodes, axis=0).max())
     if points.shape != mesh.nodes.shape or np.abs(points - mesh.nodes).max() > slack:
         raise NoAnswerError(
-            f"{path.name}: {len(points)} points that are not the {len(mesh.nodes)} nodes of the "
-            "job's mesh, at rest and in their order"
+            f"{path.name}: {len(points)} points that differ from the {len(mesh.nodes)} nodes "
+            "of the job's mesh; expected its nodes at rest in the same order"
         )
     return found
 
@@ -89,9 +89,9 @@ def regular(path: Path, most: int) -> Path:
     try:
         found = path.lstat()
     except OSError:
-        raise NoAnswerError(f"no {path.name} was written") from None
+        raise NoAnswerError(f"{path.name} was not written") from None
     if not stat.S_ISREG(found.st_mode) or found.st_size > most:
         raise NoAnswerError(
-            f"{path.name}: {found.st_size} bytes, the limit is {most}, or no ordinary file"
+            f"{path.name}: {found.st_size} bytes: expected an ordinary file of at most {most} bytes"
         )
     return path

@@ -37,15 +37,21 @@ class Guest:
     handles: ClassVar[Handles] = Handles(
         ("linear", *LARGE), inertia=True, cavities=False, contact=()
     )
-    command: str = quantity("", "1", "command line of the guest; the job's folder is put behind it")
-    inertia: bool = quantity(False, "1", "masses count; else every time is an equilibrium")
-    levels: int = quantity(
-        0, "1", "of the one input of statics that are asked, between them splines; 0: every time"
+    command: str = quantity(
+        "", "1", "command line of the external simulator; the folder of the job is appended to it"
     )
-    tolerance: float = quantity(1e-6, "1", "relative tolerance that is asked of its equations")
-    seconds: float = quantity(600.0, "s", "wall time until it is ended")
-    memory: float = quantity(8192.0, "1", "MB of memory that each of its processes may have")
-    output: float = quantity(1024.0, "1", "MB that it may write into its folder")
+    inertia: bool = quantity(
+        False, "1", "inertia is included; otherwise every time is an equilibrium"
+    )
+    levels: int = quantity(
+        0,
+        "1",
+        "levels of the one static input that are solved, with splines between them; 0: every time",
+    )
+    tolerance: float = quantity(1e-6, "1", "relative tolerance requested for its equations")
+    seconds: float = quantity(600.0, "s", "wall time after which it is stopped")
+    memory: float = quantity(8192.0, "1", "memory limit of each of its processes, MB")
+    output: float = quantity(1024.0, "1", "limit of the data written into its folder, MB")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         """Under inputs (nt, k) at t (nt,) s, from rest at 0 s; refused where a job does not carry
@@ -132,4 +138,4 @@ def _overdrawn(answer: GuestAnswer, ended: Ended) -> tuple[str, ...]:
     told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
     if told <= ended.seconds:
         return ()
-    return (f"says that it took {told:.3g} s, and ran for {ended.seconds:.3g} s",)
+    return (f"reports that it took {told:.3g} s, but ran for {ended.seconds:.3g} s",)

@@ -83,7 +83,9 @@ def asked_material(scene: Scene, inertia: bool) -> dict[str, Any]:
 
 def _density(material: Material) -> float:
     if material.rho is None:
-        raise SceneError("a guest that moves or weighs the body needs a density; give material.rho")
+        raise SceneError(
+            "an external simulator with inertia or weight needs a density; give material.rho"
+        )
     return material.rho
 
 
@@ -134,10 +136,16 @@ def _unknowns(rows: Any) -> dict[str, list[int]]:
 def _require_carried(scene: Scene, t: Floats) -> None:
     mesh = scene.mesh
     if mesh.kind not in CELL_TYPES:
-        raise SceneError(f"a guest is given {', '.join(CELL_TYPES)}, not {mesh.kind}")
+        raise SceneError(f"an external simulator accepts {', '.join(CELL_TYPES)}, not {mesh.kind}")
     parts = ("regions", "foundations", "membranes", "contacts", "tracked", "tools")
     odd = [name for name in parts if getattr(scene, name)]
     if odd:
-        raise SceneError(f"a guest's job carries no {' nor '.join(odd)}; drop them from the scene")
+        raise SceneError(
+            f"a job for an external simulator cannot contain {' or '.join(odd)}; "
+            "remove them from the scene"
+        )
     if len(t) == 0 or t[0] < 0 or (np.diff(t) <= 0).any():
-        raise SceneError(f"{len(t)} times for a guest: at least one, from 0 s on, rising")
+        raise SceneError(
+            f"{len(t)} times for an external simulator: expected at least one, "
+            "from 0 s on, increasing"
+        )

@@ -55,10 +55,13 @@ def words(command: str) -> tuple[str, ...]:
     except ValueError as error:
         raise UsageError(f"command {command!r}: {error}") from None
     if not given:
-        raise UsageError("no command of a guest; give methods.NAME.command='python my_guest.py'")
+        raise UsageError(
+            "no command of the external simulator; give "
+            "methods.NAME.command='python my_simulator.py'"
+        )
     program = sys.executable if given[0] == "python" else shutil.which(given[0])
     if program is None:
-        raise UsageError(f"command {command!r}: not installed: no program '{given[0]}'")
+        raise UsageError(f"command {command!r}: not installed: there is no program '{given[0]}'")
     return str(Path(program).absolute()), *(_whole(word) for word in given[1:])
 
 
@@ -102,7 +105,7 @@ def _watched(pid: int, folder: Path, limits: Limits, start: float) -> str:
     pause = 0.002
     while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         if time.monotonic() - start > limits.seconds:
-            return f"over the limit of {limits.seconds:g} s, ended"
+            return f"over the limit of {limits.seconds:g} s, stopped"
         if size_of(folder) > limits.output:
             break
         time.sleep(pause)
@@ -128,8 +131,8 @@ def _ending(code: int) -> str:
     if code >= 0:
         return f"ended with code {code}" if code else ""
     if -code == signal.SIGXFSZ:
-        return "ended by the limit of its output"
-    return f"ended by signal {-code} ({signal.Signals(-code).name})"
+        return "stopped at the limit of its output"
+    return f"stopped by signal {-code} ({signal.Signals(-code).name})"
 
 
 def _surroundings(folder: Path) -> dict[str, str]:

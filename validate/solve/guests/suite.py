@@ -93,7 +93,7 @@ def _moved() -> SmallScene:
     mesh = _block()
     field_ = np.array([1e-3, -5e-4, 2e-4]) + np.cross([0.02, -0.01, 0.03], mesh.nodes)
     scene = Scene(mesh, Material(_E, _NU), drives=(_shaped(mesh, "z0", field_),))
-    return SmallScene("rigid motion", "moved and turned a little, linear law", scene, _ONCE,
+    return SmallScene("rigid motion", "small translation and rotation, linear law", scene, _ONCE,
                       np.ones((1, 1)), field_[None], {"base": np.zeros(1)})  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def _turned() -> SmallScene:
     scene = Scene(mesh, Material(_E, _NU, "neo_hooke"), (Support("z0", (2,)),), drives=drives)
     t = np.arange(1, steps + 1) / steps
     none = {"out": np.zeros(steps), "round": np.zeros(steps)}
-    return SmallScene("rigid turn", "turned by 30 degrees, neo-Hooke", scene, t,
+    return SmallScene("rigid turn", "rotation by 30 degrees, neo-Hooke", scene, t,
                       np.hstack([c - 1, s]), u, none)  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def _patch() -> SmallScene:
     mu, lam = _E / 2 / (1 + _NU), _E * _NU / (1 + _NU) / (1 - 2 * _NU)
     stress = 2 * mu * strain + lam * np.trace(strain) * np.eye(3)
     work = float(np.sum(stress * strain)) * _SIDE**3  # of the force, per unit of its input
-    return SmallScene("patch test", "an affine motion of the surface, distorted cells", scene,
+    return SmallScene("patch test", "affine motion of the surface, distorted cells", scene,
                       _ONCE, np.ones((1, 1)), affine[None],
                       {"surface": np.array([work])})  # fmt: skip
 
@@ -136,8 +136,8 @@ def _stretched() -> SmallScene:
     """A block between smooth plates, pulled by 1 %: linear."""
     mesh, strain = _block(), 0.01
     u = mesh.nodes * strain * np.array([-_NU, -_NU, 1.0])
-    return SmallScene("uniaxial, linear", "pulled by 1 %, free aside", _smooth(Material(_E, _NU)),
-                      _ONCE, np.array([[strain * _SIDE]]), u[None],
+    return SmallScene("uniaxial, linear", "stretched by 1 %, free lateral faces",
+                      _smooth(Material(_E, _NU)), _ONCE, np.array([[strain * _SIDE]]), u[None],
                       {"pull": np.array([_E * strain * _SIDE**2])})  # fmt: skip
 
 
@@ -150,7 +150,7 @@ def _stretched_far() -> SmallScene:
     aside = found["free_stretch"] - 1
     u = scene.mesh.nodes * np.stack([aside, aside, stretch - 1], axis=1)[:, None]
     t = np.arange(1, steps + 1) / steps
-    return SmallScene("uniaxial, neo-Hooke", "pulled by 30 %, free aside", scene, t,
+    return SmallScene("uniaxial, neo-Hooke", "stretched by 30 %, free lateral faces", scene, t,
                       _SIDE * (stretch[:, None] - 1), u,
                       {"pull": found["nominal_stress"] * _SIDE**2})  # fmt: skip
 
@@ -179,7 +179,7 @@ def _hanging() -> SmallScene:
     scene = _bar(5)
     u = np.zeros((1, *scene.mesh.nodes.shape))
     u[0, :, 2] = _sagged(scene.mesh.nodes[:, 2])
-    return SmallScene("hanging bar", "its own weight, linear, nu = 0", scene, _ONCE,
+    return SmallScene("hanging bar", "weight of the body, linear, nu = 0", scene, _ONCE,
                       np.array([[_G]]), u)  # fmt: skip
 
 
