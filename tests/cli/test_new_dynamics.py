@@ -312,7 +312,7 @@ def test_a_wrong_modulus_is_named_by_its_frequency(here: Path) -> None:
     result = compare(experiment(here))
     assert "Likely causes, in order: " in result.sentence
     causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0].rows
-    assert {str(row[2]) for row in causes} >= {"modulus or density"}
+    assert {str(row[3]) for row in causes} >= {"modulus or density"}
 
 
 @pytest.mark.slow

@@ -184,7 +184,7 @@ def test_a_cloud_of_mixed_floats_is_read_in_its_byte_order(order: str, tmp_path:
 def test_import_of_a_bag_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     make, wanted = MADE["geometry_msgs/WrenchStamped"]
     path, out = bag(tmp_path, "geometry_msgs/WrenchStamped", make), tmp_path / "y.mcap"
-    for argv in (["inspect", str(path)], ["import", str(path), "-o", str(out)]):
+    for argv in (["inspect", "-v", str(path)], ["import", str(path), "-o", str(out)]):
         with pytest.raises(SystemExit, match="0"):
             main(argv)
     said = capsys.readouterr()

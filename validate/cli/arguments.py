@@ -15,7 +15,7 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(dir_okay=False, path_type=Path)
 EXPERIMENTS = click.option(
     "--experiments", "named", multiple=True, type=FOLDER, metavar="DIR",
-    help="A folder of experiment files to look at too.",
+    help="A further folder of experiment files.",
 )  # fmt: skip
 FORCE = click.option("--force", is_flag=True, help="Replace an output that exists.")
 Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
@@ -37,8 +37,8 @@ def detailed(command: Callable[..., Any]) -> Any:
             return command(detail="short", **given)
 
     for option in (
-        click.option("-v", "--verbose", is_flag=True, help="Everything, not one screen of it."),
-        click.option("-q", "--quiet", is_flag=True, help="The answer alone, without progress."),
+        click.option("-v", "--verbose", is_flag=True, help="Print everything, not one screen."),
+        click.option("-q", "--quiet", is_flag=True, help="Print the answer only, no progress."),
     ):
         chosen = option(chosen)
     return chosen

@@ -23,6 +23,8 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
     cells = [[c.name, c.title, _needs(c, here)] for c in cards if not c.note]
     for line in rows(["name", "what", "needs"], cells, soft=1):
         print(line)
+    if not all(here.values()):
+        print("*: not here yet; `validate data get NAME` fetches it")
     for c in cards:
         for text in (c.note, _hides(files[c.name])):
             if text:
@@ -32,7 +34,7 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
 def _needs(found: Card, here: Mapping[str, bool]) -> str:
     if not found.needs:
         return "-"
-    return found.needs if here[found.needs] else f"validate data get {found.needs}"
+    return found.needs if here[found.needs] else f"{found.needs} *"
 
 
 def _is_here(name: str) -> bool:

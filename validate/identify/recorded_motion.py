@@ -23,6 +23,7 @@ FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves t
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
 _ABOVE_NOISE = 3.0
 _FEWEST = 16  # samples of a spectrum
+_SMOOTH = 10  # samples a period from which neighbours tell the noise
 _GAP = 1.5  # median intervals: a longer one is a gap
 _STILL = 0.01  # of the whole motion: within it the body rests
 _RISE = (0.02, 0.3)  # of the first swing: where its start is read off
@@ -137,6 +138,8 @@ def motion_in(topic: str, stream: object) -> RecordedMotion:
 def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) -> RecordedMotion:
     """Of displacements (nt, d) m by name at t (nt,) s, NaN = not seen; a signal is one of d = 1.
 
+    `noise` is the declared standard deviation. It is used as it is where the motion has fewer than
+    ten samples a period: differences of neighbours are the motion itself there, not its noise.
     Raises `ComparisonError` where nothing was seen twice.
     """
     sizes = {name: _extent(x) for name, x in moved.items()}
@@ -151,7 +154,8 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     steps = np.diff(t)
     usual = float(np.median(np.diff(t_all)))
     frequency, resolution = _dominant(t, y)
-    found, rings = max(noise, _noise(y)), _ringing(t, y)
+    coarse = noise > 0 and frequency * usual * _SMOOTH > 1
+    found, rings = noise if coarse else max(noise, _noise(y)), _ringing(t, y)
     starts = _starts(t, y, found)
     return RecordedMotion(
         name, direction, t, y, found, frequency, resolution,

@@ -83,7 +83,7 @@ def likely_causes(found: Difference) -> tuple[Cause, ...]:
     size = float(np.nanmax(np.abs(found.measured), initial=0.0))
     if len(found.t) < _FEWEST or not size > 0 or not _square(found.simulated - found.measured) > 0:
         return ()
-    shown = _motion(found.t, found.names, found.measured)
+    shown = _motion(found.t, found.names, found.measured, found.history.sd)
     tried = (_inertia, _frequency, _damping, _law, _loop, _clock, _marker, _zero, _factor)
     causes = [cause for one in tried if (cause := one(found, shown)) and cause.share >= _LEAST]
     return tuple(sorted(causes, key=lambda c: -c.share))
@@ -93,9 +93,11 @@ def _square(x: Floats) -> float:
     return float(np.nanmean(x**2))
 
 
-def _motion(t: Floats, names: tuple[str, ...], x: Floats) -> RecordedMotion | None:
+def _motion(
+    t: Floats, names: tuple[str, ...], x: Floats, noise: float = 0.0
+) -> RecordedMotion | None:
     try:
-        return recorded_motion(t, {n: x[:, j] for j, n in enumerate(names)})
+        return recorded_motion(t, {n: x[:, j] for j, n in enumerate(names)}, noise)
     except ValidateError:
         return None
 
