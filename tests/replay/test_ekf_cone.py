@@ -131,7 +131,7 @@ def test_an_explicit_run_that_is_refused_leaves_the_rest_standing(two: Experimen
     found = compare(two, {**COARSE, "clock.substeps": "5"})
     nfem = next(m for m in found.methods if m.name == "nfem")
     assert nfem.run.outcome.state == "refused"
-    assert "not judged" in words(found, "elements")[0]
+    assert "not checked" in words(found, "elements")[0]
     labels = [row[1] for row in tables(found)["ranking"].rows]
     assert nfem.label not in labels
     assert "plate moved, P2 neo-Hooke" in labels

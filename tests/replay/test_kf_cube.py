@@ -90,7 +90,7 @@ def test_the_printed_error_and_what_noise_is_left_over_50_seeds(some: Result) ->
     mean = found["NRMSE at the observation point"]
     assert mean.ours == pytest.approx(0.01146, abs=4e-4)
     assert mean.verdict == "reproduced"
-    left = found["share of the measurement noise that is left"]
+    left = found["share of the measurement noise that remains"]
     assert left.ours == pytest.approx(0.667, abs=0.02)
     assert left.verdict == "not reproduced"
     assert not [(p.name, p.fault) for p in some.published if p.fault]

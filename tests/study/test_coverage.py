@@ -326,7 +326,7 @@ def test_the_command_writes_a_page_with_tables_and_curves(
     assert content["study"]["draws"] == 40
     (folder,) = (tmp_path / "drawn").glob("study-coverage+*")
     page = (folder / "report.html").read_text("utf-8")
-    assert "How often a perfect model differs" in page
+    assert "Rate at which a perfect model differs" in page
     assert {p.name for p in (folder / "tables").glob("*.csv")} >= {
         "cells.csv", "coverage.csv", "terms.csv", "power.csv"
     }  # fmt: skip

@@ -14,7 +14,7 @@ def guest() -> None:
 
     \b
     Example:
-      validate guest job hanging_bar --method felupe -o job
+      validate guest job hanging_bar --method felupe -o felupe_job
     """
 
 
