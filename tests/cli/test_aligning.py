@@ -184,7 +184,7 @@ def test_what_does_not_tell_an_offset_is_one_line(tmp_path: Path) -> None:
     assert "no channel 'forse'; there are force" in refused(
         "align", log, seen, "--by", "forse=markers.tip.z", "-o", out
     )
-    assert "more than one file has ['force']" in refused("align", log, log, *BY, "-o", out)
+    assert "is given twice" in refused("align", log, log, *BY, "-o", out)
     assert "correlate by" in refused("align", log, seen, "--by", "force=markers.tip.z", "-o", out)
     assert "flat" in refused("align", log, seen, "--by", "force=markers.base.z", "-o", out)
     t = np.arange(0, 30, 0.02)

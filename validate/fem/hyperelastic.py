@@ -244,7 +244,7 @@ class Body:
             else:
                 continue
             words = f"principal stretch {found:.3f} in element {numbers[cells][cell]}"
-            return f"outside the range in which the law is valid: {words} is {ends}"
+            return f"beyond the law's validity: {words} is {ends}"
         return ""
 
     def _mean(self, b: _Block, values: Floats) -> Floats:
