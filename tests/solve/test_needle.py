@@ -335,7 +335,7 @@ def test_scenes_without_sense_are_refused(made, words: str) -> None:  # type: ig
     [
         (lambda: Needle("n", "top", TIP, (0.0, -2.0)), "axis of length 2"),
         (lambda: Needle("n", "top", (np.nan, 0.0), DOWN), "finite"),
-        (lambda: replace(scene(), tools=scene().tools * 2), "one at a time"),
+        (lambda: replace(scene(), tools=scene().tools * 2), "2 needles: expected one"),
         (lambda: scene((0.0, 0.0, 0.1)), "in a scene of 2 dimensions"),  # type: ignore[arg-type]
         (lambda: NeedleLoop(gain=-5.0), "a negative gain diverges"),
         (lambda: NeedleLoop(limit=0.0), "force limit 0 N"),

@@ -64,9 +64,7 @@ def test_end_of_the_law_is_invalid_with_the_last_good_load() -> None:
     failed = pressed(stepper, 0.04, 0.06)
     assert failed.failure is not None
     assert failed.failure[0] == "invalid"
-    assert failed.failure[1].startswith(
-        "outside the range in which the law is valid: principal stretch 0.57"
-    )
+    assert failed.failure[1].startswith("beyond the law's validity: principal stretch 0.57")
     assert "is below 0.577; last good load 4" in failed.failure[1]
     assert failed.inner.inputs[0] == pytest.approx(0.042265, abs=0.02 / 2**6)
     assert failed.inner.inputs[0] < 0.042265
