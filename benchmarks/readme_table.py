@@ -34,7 +34,7 @@ PRINTED_HEAD = ("printed", "ours", "theirs", "verdict")
 PRINTED = {
     "kf_cube": (
         "NRMSE at the observation point",
-        "share of the measurement noise that is left",
+        "share of the measurement noise that remains",
         "share of the error that remains 2 mm below the measured node, model 20 % too stiff",
     ),
     "ekf_cube": ("time step", "ekf_held: node_A.rmse", "ekf_held: node_B.rmse"),
