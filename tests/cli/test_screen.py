@@ -16,7 +16,7 @@ from validate.cli.display import say
 from validate.cli.inspecting import _passages
 from validate.cli.recordings import _besides
 from validate.cli.run_screen import show_run
-from validate.cli.screen import LINES, Passage, bar, fitted, rows, show
+from validate.cli.screen import LINES, Passage, bar, fitted, rows, sentences, show
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.recording.preflight import Inspection, Topic
 from validate.recording.types import Recording, Source
@@ -213,3 +213,16 @@ def test_many_unread_fields_are_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "150 fields are not read; the first: field0: not read: a table of text" in lines
     show(_passages(found, (), "full"), "full")
     assert capsys.readouterr().out.count("not read: a table of text") == 150
+
+
+def test_sentences_are_cut_on_a_screen_and_whole_with_verbose(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    text = " ".join(f"word{i}" for i in range(60))
+    show([sentences([text])])
+    cut_short = capsys.readouterr().out
+    assert len(cut_short.splitlines()) == 2
+    assert cut_short.endswith(" …\n")
+    show([sentences([text])], "full")
+    assert capsys.readouterr().out.split() == text.split()

@@ -11,7 +11,7 @@ from validate.cli.chosen import each
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
 from validate.cli.progress import progress
 from validate.cli.run_screen import figures_line
-from validate.cli.screen import Passage, rows, sentence_lines, show
+from validate.cli.screen import Passage, rows, sentences, show
 from validate.compare.result import KINDS, Result
 from validate.replay.described_motion import described
 from validate.replay.experiment import Experiment
@@ -118,7 +118,7 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
     moved, overall = content["moved"], content["overall"]
     parts = [f"the verdict is {overall['verdict']}"]
     parts += [f"{len(moved)} verdicts moved"] if moved else []
-    parts += [f"{len(fallen)} of {len(results)} printed figures no longer stand"] if fallen else []
+    parts += [f"{len(fallen)} printed figures no longer stand"] if fallen else []
     holds = "holds" if document["holds"] else "does not hold"
     warnings = [f"{m['method']}: {m['check']} is {m['found']}; expected: "
                 f"{m['expected'] or 'not declared'}" for m in moved]  # fmt: skip
@@ -131,16 +131,15 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
     full = detail == "full"
     show(
         (
-            Passage("", sentence_lines(f"{content['experiment']}: {holds}; {', '.join(parts)}.")),
-            Passage("", tuple(k for w in warnings for k in sentence_lines(f"warning: {w}", 2))),
-            Passage("", tuple(k for w in known for k in sentence_lines(w, 2)), keep=1, most=4),
-            Passage("", tuple(k for p in fallen for k in sentence_lines(
-                f"{p['name']}: {p['fault']}", 2)), keep=2, most=6),
+            sentences([f"{content['experiment']}: {holds}; {', '.join(parts)}."], None),
+            sentences(f"warning: {w}" for w in warnings),
+            sentences(known, keep=1, most=4),
+            sentences((f"{p['name']}: {p['fault']}" for p in fallen), keep=2, most=6),
             *([] if full else check_passages(checks)),
             Passage("Printed figures: ours, theirs", () if full or not cells else rows(
                 [""] * 4, cells), 3, 8),
-            Passage("", figures_line(results)),
-            Passage("", tuple(k for w in document["motion"] for k in sentence_lines(w, 2)), 1, 3),
+            figures_line(results),
+            sentences(document["motion"], keep=1, most=3),
         ),
         detail,
     )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 from validate.cli.arguments import complain
 from validate.cli.display import relative, say
 from validate.cli.layout import laid, width, wrapped
-from validate.cli.screen import LINES, sentence_lines
+from validate.cli.screen import LINES, sentences
 from validate.errors import UsageError
 from validate.report.folder import try_results
 from validate.report.numbers import shown_unit, significant, text
@@ -76,12 +76,8 @@ def _name(found: SideBySide, paths: tuple[Path, ...], wanted: Shown) -> str:
 def _show(found: SideBySide, *, everything: bool) -> None:
     """The largest change first, then pairs of methods and parameters, on one screen."""
     columns = width(sys.stdout)
-    warnings = [
-        k
-        for w in found.warnings
-        for k in sentence_lines(f"warning: {w}", None if everything else 2)
-    ]
-    head = [*sentence_lines(_headline(found)), *warnings]
+    warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
+    head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
     parameters = _parameters(found, columns, everything=everything)
     shown, more, unseen = pairs(found, every=everything)
     room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, pairs
 from validate.cli.chosen import ask_about
-from validate.cli.screen import Passage, rows, sentence_lines
+from validate.cli.screen import Passage, rows, sentences
 from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
@@ -53,7 +53,7 @@ def _passages(found: Coverage) -> list[Passage]:
     ]  # fmt: skip
     title = "A perfect model under these verdicts"
     return [
-        Passage("", sentence_lines(f"{quick}{coverage_page.sentence(found)}")),
-        Passage(title, rows(["", *HEAD[2:4], "finding"], cells) if cells else (), 4),
-        Passage("", tuple(k for note in notes for k in sentence_lines(note, 2)), keep=2, most=6),
+        sentences([f"{quick}{coverage_page.sentence(found)}"], None),
+        Passage(title, rows(["", *HEAD[2:4], "finding"], cells), 4),
+        sentences(notes, keep=2, most=6),
     ]

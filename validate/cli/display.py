@@ -25,11 +25,6 @@ def say(text: str, style: str = "", indent: str = "", *, error: bool = False) ->
         screen.print(line, style=style, markup=False, soft_wrap=True)
 
 
-def warn(text: str, *, error: bool = False) -> None:
-    """A warning, which nobody overlooks on a terminal."""
-    say(f"warning: {text}", "yellow", "  ", error=error)
-
-
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table of texts below its title; a column with a unit carries it in its name."""
     if not rows:
@@ -40,11 +35,6 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
         say(f"\n{title}", "bold")
     for line in laid(columns, rows, screen.width):
         screen.print(line, markup=False, soft_wrap=True)
-
-
-def fits(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
-    """Whether each row of such a table is one line."""
-    return len(laid(columns, rows, console().width)) == 1 + len(rows)
 
 
 def figures_table(figures: Sequence[Mapping[str, Any]]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from validate.cli.arguments import FAILED, OK, Detail, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import shown
-from validate.cli.screen import Passage, rows, sentence_lines
+from validate.cli.screen import Passage, rows, sentences
 from validate.cli.studying import StudyOptions, answer, running, written
 from validate.replay.find import find
 from validate.replay.named_run import differences, tag
@@ -46,7 +46,6 @@ def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
     known = sum(e.identified for _, e in estimates)
     quick = " (quick run)" if found.quick else ""
     first = f"{known} of {len(estimates)} parameters are identified{quick}."
-    missing = [k for line in identify_page.unidentified(found) for k in sentence_lines(line, 3)]
     cells = []
     for one, e in sorted(estimates, key=lambda pair: pair[1].identified):
         method = one.problem.calibration.method
@@ -54,9 +53,9 @@ def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
         numbers = [shown(v, units(one)[e.name]) for v in (e.value, e.low, e.high)]
         cells.append([name, *numbers, "yes" if e.identified else "no"])
     passages = [
-        Passage("", sentence_lines(first)),
-        Passage("", tuple(missing), keep=3),
-        Passage("Fitted values", rows(_HEAD, cells) if cells else (), 6),
+        sentences([first], None),
+        sentences(identify_page.unidentified(found), 3, keep=3),
+        Passage("Fitted values", rows(_HEAD, cells), 6),
     ]
     for one in found.calibrated if detail == "full" else ():
         names = one.found.space.names
@@ -66,5 +65,5 @@ def _passages(found: IdentifyStudy, detail: Detail) -> list[Passage]:
         ]  # fmt: skip
         on = f"{one.problem.calibration.method} on {one.on}"
         words = f"{on}; correlations: {'; '.join(pairs_)}" if pairs_ else on
-        passages.append(Passage("", sentence_lines(words, 2), keep=1))
+        passages.append(sentences([words]))
     return passages

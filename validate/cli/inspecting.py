@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from validate.cli.arguments import FAILED, OK, Detail, pairs
-from validate.cli.screen import Passage, rows, sentence_lines, show
+from validate.cli.screen import Passage, rows, sentences, show
 from validate.errors import ValidateError
 from validate.recording.mcap.peek import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
@@ -67,17 +67,14 @@ def _passages(found: Inspection, motion: Sequence[str], detail: Detail) -> list[
     facts = [*found.clock_offsets, *(found.facts if found.read_as == "mcap" else ())]
     file = (_head(found) if mcap else _other(found)).strip().splitlines()
 
-    def lines(texts: Sequence[str]) -> tuple[str, ...]:
-        return tuple(k for text in texts for k in sentence_lines(text, None if full else 2))
-
     return [
-        Passage("", sentence_lines(f"{found.source.path}: {names}, {counted}.")),
-        Passage("Defects" if defects else "", lines([f"  {d}" for d in found.defects]), 4, 8),
+        sentences([f"{found.source.path}: {names}, {counted}."], None),
+        sentences((f"defect: {d}" for d in found.defects), keep=4, most=8),
         Passage("Streams", rows(head, [_row(t)[:-1] for t in streams]), 4, 12),
-        Passage("", lines(unread), 2),
-        Passage("", lines(motion), 3),
-        Passage("", lines(facts), 1),
-        Passage("", lines(file), 3),
+        sentences(unread, keep=2),
+        sentences(motion, keep=3),
+        sentences(facts, keep=1),
+        sentences(file, keep=3),
         Passage("Schemas", rows(["", "schema (encoding)"], [[t.name, _row(t)[-1]] for t in streams])
               if full else ()),
     ]  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.cli.arguments import Detail
 from validate.cli.display import say, table
-from validate.cli.screen import Passage, cut, rows, sentence_lines
+from validate.cli.screen import Passage, cut, rows, sentences
 from validate.cli.screen import show as show_screen
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
@@ -105,7 +105,7 @@ def _passages(experiment: Experiment) -> list[Passage]:
     ]  # fmt: skip
     known = [[f"{e.method}: {e.check}", e.verdict, e.why] for e in experiment.expected]
     return [
-        Passage("", sentence_lines(f"{experiment.name}: {experiment.title}. {experiment.source}")),
+        sentences([f"{experiment.name}: {experiment.title}. {experiment.source}"], None),
         _block("Parameters (--set PATH=VALUE)", cells, _FIRST),
         _block("Methods", methods, 3),
         _block("Requirements, limits in SI", required, 2),

@@ -11,7 +11,7 @@ from validate.catalogue import experiment_files
 from validate.cli.arguments import Detail
 from validate.cli.check_bars import check_passages, worst_first
 from validate.cli.display import error_shown, figures_table, relative, say, shown, table
-from validate.cli.screen import Passage, cut, rows, sentence_lines, show, width
+from validate.cli.screen import Passage, cut, rows, sentences, show, width
 from validate.compare.result import KINDS, Result
 from validate.compare.verdict import Check
 from validate.replay.experiment import Experiment
@@ -36,21 +36,20 @@ def show_run(
 ) -> None:
     """Print the answer of a run on one screen; "full" adds every check and notice."""
     verbose = detail == "full"
-    lines = None if verbose else 2  # of a sentence
     ranking = _ranking(result)
     causes = "Likely causes: share of the squared error, what would decide"
     end = f"{seconds:.1f} s wall time; report: {relative(page)}"
     show(
         (
-            Passage("", sentence_lines(headline(result))),
-            Passage("", _recording(result)),
-            Passage("", _warnings(result, lines), keep=2, most=4),
+            sentences([headline(result)], None),
+            sentences(_recording(result), None),
+            sentences(_warnings(result), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
-            Passage("", _unfinished(result, lines), keep=2, most=4),
+            sentences(_unfinished(result), keep=2, most=4),
             Passage("Identified, with 95 % intervals", _identified(result), 1, 4),
             Passage(causes, () if verbose else _causes(result), 2, 4),
             *([ranking] if ranking else []),
-            Passage("", figures_line([figure_members(p) for p in result.published], name)),
+            figures_line([figure_members(p) for p in result.published], name),
             Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
             Passage("", () if verbose else (end,)),
         ),
@@ -89,28 +88,28 @@ def headline(result: Result) -> str:
     return f"{result.name}: {found.word}{doubt}{quick}; {'; '.join(parts) or found.counted}."
 
 
-def _recording(result: Result) -> tuple[str, ...]:
+def _recording(result: Result) -> list[str]:
     """What the recording is and what was chosen on it, where that limits what the verdict says."""
     texts = [] if result.kind == "measured" else [f"Recording: {KINDS[result.kind]}."]
     texts += [f"{m.name}: {m.chosen}." for m in result.methods if m.checks and m.chosen]
-    return tuple(line for text in texts for line in sentence_lines(text))
+    return texts
 
 
 def _checks(result: Result) -> list[Json]:
     return [{"method": m.name, **check_members(c)} for m in result.methods for c in m.checks]
 
 
-def _warnings(result: Result, most: int | None) -> tuple[str, ...]:
+def _warnings(result: Result) -> list[str]:
     moved = [f"the verdict moved: {m.words}" for m in result.moved] if result.expected else []
     findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
     texts = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
-    return tuple(line for t in texts for line in sentence_lines(f"warning: {t}", most))
+    return [f"warning: {text}" for text in texts]
 
 
 # --- methods --------------------------------------------------------------------------------------
 
 
-def _unfinished(result: Result, most: int | None) -> tuple[str, ...]:
+def _unfinished(result: Result) -> list[str]:
     """Why methods did not finish; one line for those with the same reason."""
     ends: dict[str, list[str]] = {}
     for method in result.methods:
@@ -118,8 +117,7 @@ def _unfinished(result: Result, most: int | None) -> tuple[str, ...]:
             ends.setdefault(f"{ended.state} at step {ended.step}: {ended.why}", []).append(
                 method.name
             )
-    texts = (f"{', '.join(names)}: {why}" for why, names in ends.items())
-    return tuple(line for text in texts for line in sentence_lines(text, most))
+    return [f"{', '.join(names)}: {why}" for why, names in ends.items()]
 
 
 def _causes(result: Result) -> tuple[str, ...]:
@@ -193,15 +191,15 @@ def _speed(run: Run) -> tuple[str, str]:
 # --- figures and next steps -----------------------------------------------------------------------
 
 
-def figures_line(figures: Sequence[Json], name: str = "") -> tuple[str, ...]:
+def figures_line(figures: Sequence[Json], name: str = "") -> Passage:
     """How many printed results have which verdict, in one sentence; none without any."""
     results = [f for f in figures if f["result"]]
     if not results:
-        return ()
+        return sentences(())
     counts = Counter(str(f["verdict"]) for f in results)
     words = ", ".join(f"{n} {verdict}" for verdict, n in counts.most_common())
     more = f"; validate check {name}" if name else "."
-    return sentence_lines(f"Of {len(results)} printed figures: {words}{more}")
+    return sentences([f"Of {len(results)} printed figures: {words}{more}"], None)
 
 
 def _next(result: Result, name: str) -> Iterator[str]:

@@ -5,7 +5,7 @@ show([Passage("Checks", rows, keep=2, most=8)])  # on at most 25 lines
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from validate.cli.arguments import Detail
@@ -23,7 +23,8 @@ class Passage:
     """Lines below a title ("" for none), of which the first `most` are shown.
 
     `keep` lines stay however little room there is (None: all). `rest` follows the number of lines
-    that are left out, `hidden` ones among them that are no lines here.
+    that are left out, `hidden` ones among them that are no lines here. With `wrap` the lines are
+    sentences, each shown on at most `each` lines of a screen (None: on as many as it takes).
     """
 
     title: str
@@ -32,6 +33,16 @@ class Passage:
     most: int | None = None
     rest: str = "more: --verbose"
     hidden: int = 0
+    wrap: bool = False
+    each: int | None = None
+
+    def laid(self, *, whole: bool) -> "Passage":
+        """The passage in lines of the screen's width; sentences are cut unless `whole`."""
+        if not self.wrap:
+            return self
+        each = None if whole else self.each
+        lines = tuple(k for text in self.lines for k in _wrapped(text, each))
+        return replace(self, lines=lines, wrap=False)
 
     def height(self, shown: int) -> int:
         """Lines on the screen where so many of its own are shown."""
@@ -58,7 +69,7 @@ def fitted(passages: Sequence[Passage], most: float = LINES) -> list[Passage]:
 def show(passages: Sequence[Passage], detail: Detail = "screen") -> None:
     """Print passages with their titles in bold: on one screen, whole, or the first one alone."""
     screen = console()
-    found = [b for b in passages if b.lines]
+    found = [p.laid(whole=detail == "full") for p in passages if p.lines]
     if detail == "screen":
         found = fitted(found)
     if detail == "short":
@@ -78,9 +89,16 @@ def width() -> int:
     return console().width
 
 
-def sentence_lines(text: str, most: int | None = None, indent: str = "  ") -> tuple[str, ...]:
+def sentences(
+    texts: Iterable[str], each: int | None = 2, keep: int | None = None, most: int | None = None
+) -> Passage:
+    """A passage of sentences, each of at most `each` lines on a screen and whole with --verbose."""
+    return Passage("", tuple(texts), keep, most, wrap=True, each=each)
+
+
+def _wrapped(text: str, most: int | None) -> tuple[str, ...]:
     """A sentence in lines of the screen's width; an ellipsis stands for what follows `most`."""
-    lines = wrapped(text, width(), indent)
+    lines = wrapped(text, width(), "  ")
     if most is None or len(lines) <= most:
         return tuple(lines)
     return (*lines[: most - 1], f"{lines[most - 1][: width() - 2].rstrip(' ,;:')} …")

@@ -10,7 +10,7 @@ from validate.cli.arguments import FAILED, OK, Detail, command_line, pairs
 from validate.cli.chosen import ask_about
 from validate.cli.display import relative, say, table
 from validate.cli.progress import progress
-from validate.cli.screen import Passage, cut, rows, sentence_lines, show
+from validate.cli.screen import Passage, cut, rows, sentences, show
 from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.find import find, sources_of
@@ -130,8 +130,7 @@ def _still(experiment: Experiment, still: GainMap | None, place: str, common: St
     )
     page = written(experiment, told, place, common)
     if not common.as_json:
-        lines = (*sentence_lines(told.sentence), f"report: {relative(page)}")
-        show([Passage("", lines)], common.detail)
+        show([sentences([told.sentence, f"report: {relative(page)}"], None)], common.detail)
     return FAILED if told.passed is False else OK
 
 
@@ -227,7 +226,7 @@ def answer(passages: Sequence[Passage], done: Finished[Any], page: Path, detail:
         f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
         f"{where}; report: {relative(page)}"
     )
-    show([*passages, Passage("", sentence_lines(ends))], detail)
+    show([*passages, sentences([ends], None)], detail)
 
 
 # --- terminals ------------------------------------------------------------------------------------
@@ -235,10 +234,9 @@ def answer(passages: Sequence[Passage], done: Finished[Any], page: Path, detail:
 
 def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
     """The best settings first, then the places of each condition."""
-    best = [line for b in found.best for line in sentence_lines(b.line)]
     passages = [
-        Passage("", sentence_lines(filter_page.sentence(found))),
-        Passage("", tuple(best), keep=1, most=4),
+        sentences([filter_page.sentence(found)], None),
+        sentences((b.line for b in found.best), None, keep=1, most=4),
     ]
     for ranking in found.rankings:
         under = f" with {named(ranking.condition)}" if ranking.condition else ""
@@ -248,8 +246,7 @@ def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
         if len(found.plan.seeds) == 1:
             notes += [] if ranking.blocks is None else [ranking.blocks.words]
             notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
-        lines = tuple(k for note in notes for k in sentence_lines(note))
-        passages.append(Passage("", lines, keep=1))
+        passages.append(sentences(notes, None, keep=1))
     if detail == "screen" and len(found.rankings) > _RANKINGS:
         left = len(found.rankings) - _RANKINGS
         passages = [
@@ -257,14 +254,13 @@ def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
             Passage("", (f"{left} more conditions: --verbose",)),
         ]
     if found.plan.single_words:
-        passages.append(Passage("", sentence_lines(found.plan.single_words)))
+        passages.append(sentences([found.plan.single_words], None))
     passages.append(Passage("", ("!: NIS outside its 95 % band; *: on the Pareto front",)))
     failed = (
         f"failed: {cell.name} ({named(cell.values)}): {why}"
         for r in found.rankings for cell, why in r.failed
     )  # fmt: skip
-    lines = tuple(k for text in failed for k in sentence_lines(text, 2))
-    return [*passages, Passage("", lines, keep=1, most=4)]
+    return [*passages, sentences(failed, keep=1, most=4)]
 
 
 def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
@@ -309,16 +305,16 @@ def _stability_passages(found: Stability, endings: str) -> list[Passage]:
     ]  # fmt: skip
     head = ["prediction", "worst / 1", "limit / 1", "count", "verdict"]
     return [
-        Passage("", sentence_lines(f"{quick}{stability_page.sentence(found)}")),
-        Passage("", sentence_lines(endings) if endings else ()),
+        sentences([f"{quick}{stability_page.sentence(found)}"], None),
+        sentences([endings] if endings else [], None),
         Passage("Predictions against measured spectral radii", rows(head, cells), 3),
     ]
 
 
 def _trade_passages(found: Trade) -> list[Passage]:
     passages = [
-        Passage("", sentence_lines(trade_page.sentence(found))),
-        Passage("", _warned(found.locking), keep=2, most=4),
+        sentences([trade_page.sentence(found)], None),
+        _warned(found.locking),
     ]
     head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
     for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
@@ -329,8 +325,8 @@ def _trade_passages(found: Trade) -> list[Passage]:
             for r in found.front(by).rows
         ]  # fmt: skip
         dominated = found.front(by).dominated
-        lines = sentence_lines(f"dominated ({by}): {'; '.join(dominated)}", 2) if dominated else ()
-        passages += [Passage(title, rows(head, cells) if cells else (), 3), Passage("", lines)]
+        text = [f"dominated ({by}): {'; '.join(dominated)}"] if dominated else []
+        passages += [Passage(title, rows(head, cells), 3), sentences(text)]
     return passages
 
 
@@ -345,13 +341,11 @@ def _choice_passages(choice: Choice) -> list[Passage]:
     head = ["", f"error / {choice.trade.shown_unit}", "verdict"]
     ladder = rows(head, cells)
     return [
-        Passage("", sentence_lines(first)),
-        Passage("", tuple(k for w in others for k in sentence_lines(w)), keep=4),
-        Passage("", _warned(choice.trade.locking), keep=2, most=4),
+        sentences([first], None),
+        sentences(others, None, keep=4),
+        _warned(choice.trade.locking),
         Passage("Candidate methods", ladder, 4),
-        Passage(
-            "", tuple(k for w in choice.rejected for k in sentence_lines(w, 2)), keep=1, most=4
-        ),
+        sentences(choice.rejected, keep=1, most=4),
     ]
 
 
@@ -365,5 +359,5 @@ def _choice_in_full(choice: Choice) -> None:
         table("Left out by a bound", ("candidate", "cell", "at least / µs", "why"), cells)
 
 
-def _warned(texts: Sequence[str]) -> tuple[str, ...]:
-    return tuple(k for text in texts for k in sentence_lines(f"warning: {text}", 2))
+def _warned(texts: Sequence[str]) -> Passage:
+    return sentences((f"warning: {text}" for text in texts), keep=2, most=4)

@@ -45,6 +45,7 @@ from validate.scene.material import Material
 from validate.scene.mesh import require_positive_cells
 from validate.scene.scene import Scene
 
+BEYOND_LAW = "beyond the law's validity"  # how the reason begins where a cell leaves the law
 _BLOCK = 2048  # cells at a time: bounds the memory of the kernel's temporaries
 
 
@@ -244,7 +245,7 @@ class Body:
             else:
                 continue
             words = f"principal stretch {found:.3f} in element {numbers[cells][cell]}"
-            return f"beyond the law's validity: {words} is {ends}"
+            return f"{BEYOND_LAW}: {words} is {ends}"
         return ""
 
     def _mean(self, b: _Block, values: Floats) -> Floats:

@@ -21,6 +21,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.hyperelastic import BEYOND_LAW
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Load, Pressure, Scene, Weight
@@ -328,7 +329,7 @@ def _added(before: Found, found: Found) -> Found:
 def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:
     """The outcome of a step whose smallest load step failed, with the last good load."""
     reached = f"{load} ({100 * done:.3g} % of the step)"
-    if "validity" in failed.why:
+    if BEYOND_LAW in failed.why:
         return failed.ending, (
             f"{failed.why}; last good load {reached}; use a law that is valid for such strains"
         )
