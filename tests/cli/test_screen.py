@@ -12,14 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report_samples import CHECK, small_result
 
+from validate.cli.check_bars import check_passages, worst_first
 from validate.cli.display import say
 from validate.cli.inspecting import _passages
 from validate.cli.recordings import _besides
 from validate.cli.run_screen import show_run
 from validate.cli.screen import LINES, Passage, bar, fitted, rows, sentences, show
 from validate.compare.exhibit import Exhibit, NumberTable
+from validate.compare.score import Score
 from validate.recording.preflight import Inspection, Topic
 from validate.recording.types import Recording, Source
+from validate.report.store import check_members
 
 PAGE = Path("report.html")
 
@@ -226,3 +229,43 @@ def test_sentences_are_cut_on_a_screen_and_whole_with_verbose(
     assert cut_short.endswith(" …\n")
     show([sentences([text])], "full")
     assert capsys.readouterr().out.split() == text.split()
+
+
+def test_checks_stand_by_verdict_and_then_by_the_room_that_is_left() -> None:
+    def check(name: str, value: float, verdict: str) -> dict[str, object]:
+        found = replace(CHECK, name=name, value=value, acceptance=verdict, validation="differs")
+        return {"method": "soft", **check_members(found)}
+
+    checks = [check("wide", 0.01, "good enough"), check("narrow", 0.4, "good enough"),
+              check("open", 0.5, "undecided"), check("bad", 0.7, "not good enough"),
+              check("worse", 0.9, "not good enough")]  # fmt: skip
+    names = [c["name"] for c in worst_first(checks)]
+    assert names == ["worse", "bad", "open", "narrow", "wide"]
+    titles = [p.title.partition(" (")[0] for p in check_passages(checks)]
+    assert titles == ["Checks: not good enough, worst first", "Checks: undecided",
+                      "Checks: good enough, worst first"]  # fmt: skip
+
+
+def test_methods_are_ranked_by_the_score_that_they_share(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    soft, stiff = small_result().methods
+    error = Score("force.plate@2mm", -0.4, "N", 1, "recording", "")
+    methods = (replace(soft, scores=(error,)), replace(stiff, scores=(replace(error, value=0.1),)))
+    show_run(replace(small_result(), methods=methods), "cube", PAGE, 1.0)
+    lines = capsys.readouterr().out.splitlines()
+    at = next(
+        i for i, line in enumerate(lines) if line.startswith("Methods by force.plate at 2 mm")
+    )
+    assert lines[at + 2].split()[:2] == ["1.", stiff.name]
+    assert lines[at + 3].split()[:2] == ["2.", soft.name]
+
+
+def test_data_that_are_not_here_are_marked(tmp_path: Path) -> None:
+    places = dict.fromkeys(("VALIDATE_SHARED_DATA", "XDG_CACHE_HOME"), str(tmp_path))
+    lines = here("list", cwd=tmp_path, COLUMNS="60", **places)[1].splitlines()
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= 60
+    assert lines[-1] == "*: not here yet; `validate data get NAME` fetches it"
+    assert any(line.endswith("silicone-beam *") for line in lines)
+    assert any(line.startswith("  kf_cube ") and line.endswith(" -") for line in lines)

@@ -5,12 +5,14 @@ import json
 import shlex
 from contextlib import chdir
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
 from commands import here
 from study_samples import experiment_file
 
+from validate.cli import studying
 from validate.cli.arguments import BAD_INPUT
 from validate.cli.main import run
 from validate.replay.find import load_file
@@ -136,3 +138,22 @@ def test_a_ranking_is_one_screen_with_nis_times_and_front(tmp_path: Path) -> Non
     assert "all columns" in whole
     answer = here(*command, "--out", str(tmp_path), "-q")[1]
     assert answer.count("\n") == 1
+
+
+def test_a_filter_outside_its_band_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
+    def row(r: str, by: str) -> tuple[object, ...]:
+        verdict = {"sound": "consistent", "sure": "overconfident: interval not used"}[r]
+        front = {"sound": "front", "sure": "#1 beats"}[r]
+        return (1, r, "", 0.1, 0.01, "", None, None, "", 2.5, verdict, None, 1.0, 2.0, None, front)
+
+    monkeypatch.setattr(studying, "ranking_row", row)
+    monkeypatch.setattr(studying, "ranking_head", lambda unit: ("", "", "", "error / mm"))
+
+    class Cell(str):
+        cell = SimpleNamespace(settings={})
+
+    ranking = SimpleNamespace(rows=[Cell("sound"), Cell("sure")])
+    found = SimpleNamespace(unit="m", by="all.rmse")
+    _, sound, sure = studying._places(ranking, found)  # type: ignore[arg-type]
+    assert ("!" in sound, sound.endswith("*")) == (False, True)
+    assert ("2.50 !" in sure, sure.endswith("*")) == (True, False)

@@ -104,3 +104,14 @@ def test_loads_that_act_at_once_do_not_rise_in_shorter_steps() -> None:
     np.testing.assert_allclose(at, [0.05, 0.1, 0.15, 0.2])
     assert rising[:, 0].tolist() == [2.0, 4.0, 4.0, 4.0]
     assert sudden[:, 0].tolist() == [4.0, 4.0, 4.0, 4.0]
+
+
+@pytest.mark.parametrize(("rate", "noise"), [(20.0, 1e-5), (400.0, 1e-5)])
+def test_a_coarse_film_keeps_its_declared_noise(rate: float, noise: float) -> None:
+    """Seven samples a period: differences of neighbours are the motion, not its noise."""
+    t = np.arange(0, 3, 1 / rate)
+    moved = {"tip": 5e-3 * np.sin(2 * np.pi * 2.8 * t)[:, None]}
+    found = recorded_motion(t, moved, noise)
+    assert found.noise == pytest.approx(noise, rel=0.01)
+    if rate < 28:
+        assert recorded_motion(t, moved).noise > 10 * noise
