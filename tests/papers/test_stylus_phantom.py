@@ -133,7 +133,7 @@ def test_a_wrong_landmark_differs(tmp_path: Path, shared_data: Path) -> None:
     [
         ({"tools.stylus": "Pointer"}, "no transform from StylusTip to Pointer"),
         ({"tools.tracker": "Table"}, "no signal"),
-        ({"dwell.least": "60s"}, "never stands"),
+        ({"dwell.least": "60s"}, "never rests"),
         ({"dwell.match": "0.01mm"}, "of 8 landmarks lie among"),
         ({"landmarks": "README.md"}, "XML"),
     ],
