@@ -95,7 +95,7 @@ def test_the_last_specimen_is_left_out_unless_another_is_named() -> None:
     assert split(LOGS, "EF30_0T_A").judged == "EF30_0T_A"
     alone = split(LOGS[:3], None)
     assert (alone.judged, alone.calibrating, alone.apart) == ("EF30_0T_A", ("EF30_0T_A",), False)
-    with pytest.raises(UsageError, match="judged = D: no such specimen; EF30_0T_A, EF30_0T_B"):
+    with pytest.raises(UsageError, match="judged = D: unknown specimen; EF30_0T_A, EF30_0T_B"):
         split(LOGS, "D")
     with pytest.raises(RecordingError, match="logs of 2 materials"):
         split([*LOGS, log("EF50_0T_A1", 2e5)], None)

@@ -74,7 +74,7 @@ def test_the_liver(shared_data: Path) -> None:
         (inp(body("tet4"), extra="*Include, input=../x.inp"), "outside its folder .* copy it"),
         (inp(body("tet4"), extra="*Include, input=body.inp"), "'body.inp' in line 36 includes its"),
         (inp(body("tet4"), extra="*Include, input=a.inp, password=b"), "locked; export it open"),
-        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is no name of a file"),
+        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is not a file name"),
         (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "cannot be followed"),
         (inp(body("tet4")).replace("*Part", "*Ngen\n1, 5\n*Part"), r"\*Ngen in line 3: is not"),
         (inp(body("tet4")).replace("*Node", "*System\n1., 0\n*Node"), r"\*System in line 4: exp"),

@@ -169,7 +169,7 @@ def test_files_without_triangles_or_numbers_are_no_surface(
     with pytest.raises(SceneError, match="no triangles in it: no surface"):
         _surface(path)
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")
-    with pytest.raises(SceneError, match="1 coordinates are no numbers; damaged"):
+    with pytest.raises(SceneError, match="1 coordinates are not numbers; damaged"):
         _surface(path)
     monkeypatch.setattr(surface_arrays, "_MOST", 0)
     with pytest.raises(SceneError, match="1 triangles, the limit is 0; simplify it"):

@@ -87,7 +87,7 @@ def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> No
 
 
 def test_a_unit_of_something_else_is_refused() -> None:
-    with pytest.raises(UsageError, match="'s' is no unit of displacement, force or pressure"):
+    with pytest.raises(UsageError, match="'s' is not a unit of displacement, force or pressure"):
         wanted("0.5s", "1000Hz")
 
 

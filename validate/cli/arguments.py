@@ -15,7 +15,7 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(dir_okay=False, path_type=Path)
 EXPERIMENTS = click.option(
     "--experiments", "named", multiple=True, type=FOLDER, metavar="DIR",
-    help="A folder of experiment files to look at too.",
+    help="A further folder of experiment files.",
 )  # fmt: skip
 FORCE = click.option("--force", is_flag=True, help="Replace an output that exists.")
 Detail = Literal["short", "screen", "full"]  # -q, neither, --verbose
@@ -30,15 +30,15 @@ def detailed(command: Callable[..., Any]) -> Any:
         from validate.cli.progress import quiet as without_progress
 
         if quiet and verbose:
-            raise UsageError("-q and --verbose: give one of them")
+            raise UsageError("-q and --verbose exclude each other: give one")
         if not quiet:
             return command(detail="full" if verbose else "screen", **given)
         with without_progress():
             return command(detail="short", **given)
 
     for option in (
-        click.option("-v", "--verbose", is_flag=True, help="Everything, not one screen of it."),
-        click.option("-q", "--quiet", is_flag=True, help="The answer alone, without progress."),
+        click.option("-v", "--verbose", is_flag=True, help="Print everything, not one screen."),
+        click.option("-q", "--quiet", is_flag=True, help="Print the answer only, no progress."),
     ):
         chosen = option(chosen)
     return chosen
@@ -102,6 +102,8 @@ def require_new(outputs: Iterable[Path], inputs: Iterable[Path] = (), *, force: 
     for out in outputs:
         there = out.exists() or out.is_symlink()
         if there and any(source.samefile(out) for source in sources if out.exists()):
-            raise UsageError(f"-o {out}: it is an input of this command; name another file")
+            raise UsageError(f"-o {out}: this file is an input of the command; name another output")
         if there and not force:
-            raise UsageError(f"-o {out}: it exists; name another file, or replace it with --force")
+            raise UsageError(
+                f"-o {out}: this file exists; name another output, or replace it with --force"
+            )

@@ -51,7 +51,7 @@ def _passages(found: Coverage) -> list[Passage]:
         f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
         for q in found.quantities if q.finding.words
     ]  # fmt: skip
-    title = "A perfect model under these verdicts"
+    title = "Verdicts on a perfect model"
     return [
         Passage("", sentence_lines(f"{quick}{coverage_page.sentence(found)}")),
         Passage(title, rows(["", *HEAD[2:4], "finding"], cells) if cells else (), 4),

@@ -67,7 +67,7 @@ def run(argv: list[str]) -> int:
             complain(f"the output cannot be written: {error.strerror}")
         else:
             place = Path(error.filename)
-            complain(f"{place}: {why_not(error, place)}; make room there, or use another place")
+            complain(f"{place}: {why_not(error, place)}; free space there, or use another folder")
     except MemoryError as error:
         said = f" ({error})" if str(error) else ""
         complain(f"out of memory{said}: take a coarser mesh or fewer steps")
@@ -119,8 +119,8 @@ def cli() -> None:
 @cli.command("list")
 @click.argument("name", required=False)
 @EXPERIMENTS
-@click.option("--all", "everything", is_flag=True, help="With NAME: every parameter.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.option("--all", "everything", is_flag=True, help="With NAME: list every parameter.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: bool) -> None:
     """List experiments, or the parameters and methods of one.
 
@@ -142,9 +142,11 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
 @click.argument("names", nargs=-1, metavar="NAME|FILE.py ...")
 @click.option("--all", "everything", is_flag=True, help="Every experiment.")
 @EXPERIMENTS
-@click.option("--quick", is_flag=True, help="Coarser and fewer comparisons; a banner says so.")
 @click.option(
-    "--out", type=FOLDER, help="Where reports go (default: reports/ of the project, or here)."
+    "--quick", is_flag=True, help="Coarser meshes and fewer comparisons; the report says so."
+)
+@click.option(
+    "--out", type=FOLDER, help="Folder of reports (default: reports/ of the project, or here)."
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
@@ -152,12 +154,16 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
     "--case",
     default="",
     metavar="NAME",
-    help="Run this case only, beside the recording.",
+    help="Run this case only, in addition to the recording.",
 )
 @GUESTS
-@click.option("--anyway", is_flag=True, help="Predict with what is not identifiable, too.")
-@click.option("--json", "as_json", is_flag=True, help="results.json of all on one list.")
-@click.option("--vtu", is_flag=True, help="Series for ParaView beside the report, in paraview/.")
+@click.option(
+    "--anyway", is_flag=True, help="Predict also with parameters that are not identifiable."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print results.json of all runs as one list.")
+@click.option(
+    "--vtu", is_flag=True, help="Also write a ParaView series to paraview/ in the report."
+)
 @detailed
 def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     """Simulate, compare with the measurement and write the report.
@@ -171,16 +177,19 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     from validate.cli import running
 
     if everything == bool(names):
-        raise UsageError("name one or more experiments, or --all; see 'validate list'")
+        raise UsageError(
+            "no experiment is named: name one or more experiments, or give --all; see 'validate "
+            "list'"
+        )
     return running.run(names, **options)
 
 
 @cli.command()
 @click.argument("names", nargs=-1, metavar="[NAME ...]")
 @EXPERIMENTS
-@click.option("--fresh", is_flag=True, help="Make every run anew, stored ones that match too.")
-@click.option("--out", type=FOLDER, help="Where reports lie (as for run).")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.option("--fresh", is_flag=True, help="Repeat every run, even if a stored run matches.")
+@click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 @detailed
 def check(names: tuple[str, ...], **options: Any) -> int:
     """Check that printed figures and declared verdicts still hold.
@@ -199,8 +208,8 @@ def check(names: tuple[str, ...], **options: Any) -> int:
 @cli.command("history")
 @click.argument("name", metavar="NAME|FILE.py")
 @EXPERIMENTS
-@click.option("--out", type=FOLDER, help="Where its reports are (default: as of run).")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     """Show past runs and what changed between them.
 
@@ -214,8 +223,8 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
 
 
 @cli.command("summary")
-@click.option("--out", type=FOLDER, help="Where the reports are (default: as of run).")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, no page.")
+@click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document; write no page.")
 def summary_(out: Path | None, as_json: bool) -> None:
     """Summarise bias and scatter over all stored runs.
 
@@ -230,15 +239,21 @@ def summary_(out: Path | None, as_json: bool) -> None:
 
 @cli.command()
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--method", "methods", multiple=True, metavar="GLOB", help="Only these: 'kf_*'.")
-@click.option("--score", "scores", multiple=True, metavar="GLOB", help="Only these: '*.rms@9mm'.")
+@click.option(
+    "--method", "methods", multiple=True, metavar="GLOB", help="Only these methods: 'kf_*'."
+)
+@click.option(
+    "--score", "scores", multiple=True, metavar="GLOB", help="Only these scores: '*.rms@9mm'."
+)
 @click.option(
     "--sort", type=click.Choice(["change", "difference", "score", "method", "stored"]),
-    default="change", show_default=True, help="Order of the scores, the largest change first.",
+    default="change", show_default=True, help="Order of the scores; default: largest change first.",
 )  # fmt: skip
-@click.option("--all", "everything", is_flag=True, help="Everything, not 40 lines of it.")
-@click.option("--out", type=FOLDER, help="Where the page goes (default: beside the first run).")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
+@click.option("--all", "everything", is_flag=True, help="Print everything, not 40 lines.")
+@click.option("--out", type=FOLDER, help="Folder of the page (default: next to the first run).")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON document; write a page only with --out."
+)
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
     """Compare stored runs side by side, without new runs.
 
@@ -253,8 +268,8 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 
 @cli.command("export")
 @click.argument("run", type=click.Path(path_type=Path))
-@click.option("--junit", type=FILE, help="JUnit XML of its checks and printed figures.")
-@click.option("--latex", type=FILE, help="A tabular of its checks.")
+@click.option("--junit", type=FILE, help="Write checks and published figures as JUnit XML.")
+@click.option("--latex", type=FILE, help="Write checks as a LaTeX tabular.")
 @FORCE
 def export_(run: Path, junit: Path | None, latex: Path | None, *, force: bool) -> None:
     """Write a stored run as JUnit XML or LaTeX.
@@ -282,15 +297,24 @@ def study() -> None:
 def _studied(command: Any) -> Any:
     """The argument and the options of every study."""
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Print results.json, nothing else."),
-        click.option("--scheduler", default="", metavar="ADDRESS", help="A running scheduler."),
-        click.option("--workers", type=int, help="Local processes (0: this one; else one a core)."),
+        click.option("--json", "as_json", is_flag=True, help="Print results.json only."),
+        click.option(
+            "--scheduler",
+            default="",
+            metavar="ADDRESS",
+            help="Address of a running Dask scheduler.",
+        ),
+        click.option(
+            "--workers", type=int, help="Local processes (0: this one; default: one per core)."
+        ),
         click.option(
             "--out",
             type=FOLDER,
-            help="Where reports go (default: reports/ of the project, or here).",
+            help="Folder of reports (default: reports/ of the project, or here).",
         ),
-        click.option("--quick", is_flag=True, help="Coarser and fewer runs; a banner says so."),
+        click.option(
+            "--quick", is_flag=True, help="Coarser meshes and fewer runs; the report says so."
+        ),
         EXPERIMENTS,
         click.argument("name", metavar="NAME|FILE.py"),
     ):
@@ -311,16 +335,23 @@ def _common(options: dict[str, Any]) -> Any:
     "sweeps",
     multiple=True,
     metavar="PATH=VALUES",
-    help="log:1e-6:1e-1:7, lin:1kPa:5kPa:5 or a,b,c of a parameter; several make a grid.",
+    help="Values of a parameter: log:1e-6:1e-1:7, lin:1kPa:5kPa:5 or a,b,c; several make a grid.",
 )
-@click.option("--seeds", default="", metavar="N|A,B,C", help="Noise samples of a twin (else 10).")
+@click.option("--seeds", default="", metavar="N|A,B,C", help="Noise seeds of a twin (default: 10).")
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @click.option("--methods", default="", metavar="M1,M2", help="Only these methods.")
 @click.option(
-    "--by", default="", metavar="SCORE", help="Rank by it; else truth, or what was withheld."
+    "--by",
+    default="",
+    metavar="SCORE",
+    help="Score to rank by (default: truth, or withheld markers).",
 )
 @click.option(
-    "--hold-out", "hold_out", default="", metavar="each|A,B", help="Markers kept from all filters."
+    "--hold-out",
+    "hold_out",
+    default="",
+    metavar="each|A,B",
+    help="Markers withheld from all filters.",
 )
 @_studied
 def filters(name: str, **options: Any) -> int:
@@ -367,10 +398,10 @@ def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
 @study.command()
 @click.option(
     "--error", required=True, metavar="ERROR",
-    help="The largest error; its unit says of what: 0.5mm (displacement), 0.2N (force), 300Pa.",
+    help="Largest error; the unit selects the quantity: 0.5mm (displacement), 0.2N (force), 300Pa.",
 )  # fmt: skip
-@click.option("--rate", required=True, metavar="RATE", help="The least rate, as in 1000Hz.")
-@click.option("--declared-law", is_flag=True, help="Leave out what the linear law itself costs.")
+@click.option("--rate", required=True, metavar="RATE", help="Lowest rate, as 1000Hz.")
+@click.option("--declared-law", is_flag=True, help="Leave out the error of the linear law.")
 @_studied
 def choose(name: str, **options: Any) -> int:
     """Find the cheapest method that meets your error and rate.
@@ -387,14 +418,16 @@ def choose(name: str, **options: Any) -> int:
 
 
 @study.command()
-@click.option("--draws", type=int, help="Recordings drawn (default: 200; 40 with --quick).")
+@click.option(
+    "--draws", type=int, help="Number of simulated recordings (default: 200; 40 with --quick)."
+)
 @click.option(
     "--noise",
     type=float,
     default=1.0,
     show_default=True,
     metavar="TIMES",
-    help="The real noise over the declared one.",
+    help="Ratio of real to declared noise.",
 )
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @_studied
@@ -415,9 +448,11 @@ def coverage(name: str, **options: Any) -> int:
     "--parameters",
     default="",
     metavar="A,B=LOW:HIGH",
-    help="These (default: those that stand open); what is not declared needs bounds.",
+    help="Parameters (default: those without a value). One that is not declared needs bounds.",
 )
-@click.option("--seeds", type=int, help="Seeded starts (default: 10; 5 for one parameter).")
+@click.option(
+    "--seeds", type=int, help="Number of starting points (default: 10; 5 for one parameter)."
+)
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
 @_studied
 def identify(name: str, **options: Any) -> int:
@@ -438,17 +473,19 @@ def identify(name: str, **options: Any) -> int:
 @click.argument("name", metavar="NAME|FILE.py")
 @EXPERIMENTS
 @click.option("--set", "values", multiple=True, metavar="PATH=VALUE", help="Change a parameter.")
-@click.option("--method", default="", metavar="NAME", help="Which one (default: the judged one).")
-@click.option("--seconds", type=float, help="Stop after so many (default: where the path ends).")
+@click.option(
+    "--method", default="", metavar="NAME", help="Method to run (default: the accepted one)."
+)
+@click.option("--seconds", type=float, help="Stop after this time (default: end of the path).")
 @click.option(
     "--listen", type=click.IntRange(0, 65535), is_flag=False, flag_value=51200, metavar="[PORT]",
-    help="Places from UDP packets on 127.0.0.1 (51200; 0: any free port), not from the recording.",
+    help="Take positions from UDP on 127.0.0.1, not the recording (51200; 0: any free port).",
 )  # fmt: skip
 @click.option(
-    "--realtime", is_flag=True, help="Before all other processes (Linux, with the right)."
+    "--realtime", is_flag=True, help="Use real-time priority (Linux, needs the permission)."
 )
-@output("What it did (default: NAME-live.mcap in reports/).", required=False)
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@output("Recording to write (default: NAME-live.mcap in reports/).", required=False)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 def live_(name: str, **options: Any) -> int:
     """Run a model in real time under a tool.
 

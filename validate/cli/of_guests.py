@@ -19,9 +19,11 @@ def guest() -> None:
 
 
 @guest.command("check", context_settings={"ignore_unknown_options": True})
-@click.option("--seconds", type=float, default=60.0, show_default=True, help="Limit of a scene.")
-@click.option("--memory", type=float, default=8192.0, show_default=True, help="Limit in MB.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.option(
+    "--seconds", type=float, default=60.0, show_default=True, help="Time limit of a scene."
+)
+@click.option("--memory", type=float, default=8192.0, show_default=True, help="Memory limit in MB.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 @click.argument("command", nargs=-1, required=True, type=click.UNPROCESSED)
 def check(command: tuple[str, ...], **options: Any) -> int:
     """Test what an external simulator can do, and how accurately.
@@ -41,12 +43,16 @@ def check(command: tuple[str, ...], **options: Any) -> int:
 @guest.command("job")
 @click.argument("name", metavar="NAME|FILE.py")
 @EXPERIMENTS
-@click.option("-o", "folder", required=True, type=FOLDER, help="The folder to write, new or empty.")
+@click.option("-o", "folder", required=True, type=FOLDER, help="Folder to write; new or empty.")
 @FORCE
-@click.option("--method", metavar="NAME", help="Whose scene (default: the first judged one's).")
+@click.option(
+    "--method", metavar="NAME", help="Method whose scene is written (default: the accepted one)."
+)
 @click.option("--times", type=click.IntRange(min=1), default=10, show_default=True,
-              help="Of a static one, evenly spaced.")  # fmt: skip
-@click.option("--inertia", is_flag=True, help="Masses count, at every step of the experiment.")
+              help="Number of evenly spaced load steps of a static scene.")  # fmt: skip
+@click.option(
+    "--inertia", is_flag=True, help="Include inertia; write every step of the experiment."
+)
 def job(name: str, named: tuple[Path, ...], **given: Any) -> None:
     """Write the files that an external simulator gets.
 

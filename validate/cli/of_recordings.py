@@ -19,11 +19,13 @@ from validate.cli.arguments import (
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
-@click.option("--as", "kind", metavar="KIND", help="The format, as of `validate import`.")
-@click.option("--map", "mapping", multiple=True, metavar="KEY=VALUE", help="As of `import`.")
-@click.option("--messages", "topic", metavar="TOPIC", help="MCAP: its messages, a line each.")
-@click.option("--most", type=int, default=10, show_default=True, help="So many of them.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
+@click.option("--as", "kind", metavar="KIND", help="File format, as for `validate import`.")
+@click.option("--map", "mapping", multiple=True, metavar="KEY=VALUE", help="As for `import`.")
+@click.option(
+    "--messages", "topic", metavar="TOPIC", help="MCAP: print the topic's messages, one per line."
+)
+@click.option("--most", type=int, default=10, show_default=True, help="Largest number of messages.")
 @detailed
 def inspect(
     file: Path,
@@ -56,7 +58,7 @@ def inspect(
     "--as",
     "kind",
     metavar="KIND",
-    help="As mcap, c3d, trc, vicon, ndi, instron (an unknown one lists all); else as it shows.",
+    help="File format: mcap, c3d, trc, ... (default: detected; an unknown name lists all).",
 )
 @output("The MCAP recording to write.")
 @click.option(
@@ -64,17 +66,15 @@ def inspect(
     "mapping",
     multiple=True,
     metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Overrides: column, unit, sign of time, displacement, force; specimen=2; unit=mm.",
+    help="Column, unit and sign of time, displacement or force; specimen=2; unit=mm.",
 )
 @click.option(
-    "--m-per-px", metavar="LENGTH", help="Of images and videos: size of a pixel: 1e-4 (m), 0.1mm."
+    "--m-per-px", metavar="LENGTH", help="Images and videos: size of a pixel, as 1e-4 (m) or 0.1mm."
 )
-@click.option("--rate", type=float, help="Of images and videos: images a second, Hz.")
-@click.option("--topic", help="Of images and videos: their topic (default: images).")
-@click.option(
-    "--specimens", metavar="one|each|A,A,B", help="Several logs: of which specimen each is."
-)
-@click.option("--recover", is_flag=True, help="MCAP without an end: save what of it is whole.")
+@click.option("--rate", type=float, help="Images and videos: images per second, Hz.")
+@click.option("--topic", help="Images and videos: topic to write (default: images).")
+@click.option("--specimens", metavar="one|each|A,A,B", help="Several logs: the specimen of each.")
+@click.option("--recover", is_flag=True, help="Truncated MCAP: save all complete messages.")
 def import_(
     files: tuple[Path, ...],
     kind: str | None,
@@ -103,20 +103,23 @@ def import_(
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--topic", default="", help="Its images (default: the only ones).")
-@click.option("--centre", metavar="X,Y", help="Roughly: 12mm,20mm or 120px,80px.")
-@click.option("--radius", metavar="LENGTH", help="Roughly, within a third: 8mm or 80px.")
+@click.option("--topic", default="", help="Topic of the images (default: the only one).")
+@click.option("--centre", metavar="X,Y", help="Rough centre, as 12mm,20mm or 120px,80px.")
+@click.option("--radius", metavar="LENGTH", help="Rough radius, within a third, as 8mm or 80px.")
 @click.option("--shape", type=click.Choice(["free", "ellipse", "circle"]), default="free",
-              show_default=True, help="What runs along the wall.")  # fmt: skip
-@click.option("--bright", is_flag=True, help="A bright region on dark ground.")
+              show_default=True, help="Shape fitted to the wall.")  # fmt: skip
+@click.option("--bright", is_flag=True, help="The region is bright, its surroundings are dark.")
 @click.option("--confidence", type=click.FloatRange(0, 1), default=0.5, show_default=True,
-              help="Less, beside other regions as distinct, is refused.")  # fmt: skip
+              help="Lowest confidence if other regions are equally distinct.")  # fmt: skip
 @click.option("--from", "drawn", type=click.Path(path_type=Path),
-              help="Of others: masks (.png, folder, .npy, .npz, .nrrd), .csv, .json.")  # fmt: skip
-@click.option("--sd", metavar="LENGTH", help="How far theirs may be off, as 0.3mm or 2px.")
-@click.option("--unit", metavar="UNIT", help="Of their points (default: px).")
-@click.option("--label", help="Which of their regions, by its value or name.")
-@click.option("--name", default="outline", show_default=True, help="The stream to write.")
+              help="Third-party masks (.png, folder, .npy, .npz, .nrrd) or outlines (.csv, "
+                   ".json).")  # fmt: skip
+@click.option(
+    "--sd", metavar="LENGTH", help="Standard uncertainty of third-party outlines, as 0.3mm or 2px."
+)
+@click.option("--unit", metavar="UNIT", help="Unit of third-party points (default: px).")
+@click.option("--label", help="Third-party region, by its value or name.")
+@click.option("--name", default="outline", show_default=True, help="Name of the stream to write.")
 @output("The recording to write (default: FILE itself).", required=False)
 def outline(
     file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, **given: Any
@@ -140,7 +143,7 @@ def outline(
     "shifts",
     multiple=True,
     metavar="TOPIC=SECONDS[:SD]",
-    help="Add to the times of a stream with a clock of its own; kept as a record.",
+    help="Shift the times of a stream from a separate clock; kept as a record.",
 )
 def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
     """Join the streams of several recordings into one.
@@ -157,16 +160,22 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=FILE)
 @click.option("--by", required=True, multiple=True, metavar="CHANNEL=CHANNEL",
-              help="What moves alike in the first file and a further one, as "
-              "force=-markers.tip.z; one for each further file, in their order.")  # fmt: skip
-@click.option("--event", type=click.Choice(["onset", "step"]), help="Not by correlation.")
-@click.option("--within", type=float, metavar="SECONDS", help="The largest offset searched.")
+              help="Channels that move alike in the first and a further file, as "
+              "force=-markers.tip.z; one per further file, in their order.")  # fmt: skip
+@click.option(
+    "--event",
+    type=click.Choice(["onset", "step"]),
+    help="Match an event instead of the correlation.",
+)
+@click.option("--within", type=float, metavar="SECONDS", help="Largest offset to search.")
 @click.option("--correlation", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
-              show_default=True, metavar="SHARE", help="Less is refused.")  # fmt: skip
+              show_default=True, metavar="SHARE", help="Lowest correlation.")  # fmt: skip
 @click.option("--coverage", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
               show_default=True, metavar="SHARE",
-              help="Of a file's samples that meet the first file; less is refused.")  # fmt: skip
-@click.option("--drift", "straighten", is_flag=True, help="Stretch the further files' clocks.")
+              help="Lowest share of a file's samples within the first file's time.")  # fmt: skip
+@click.option(
+    "--drift", "straighten", is_flag=True, help="Correct the drift of further files' clocks."
+)
 @output("The MCAP recording to write.")
 def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: Any) -> None:
     """Put recordings of one test on one clock.
@@ -182,16 +191,24 @@ def align(files: tuple[Path, ...], out: Path, by: tuple[str, ...], **options: An
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--points", type=FILE, help="CSV: image, u, v (px), target.")
+@click.option("--points", type=FILE, help="Marked points, CSV: image, u, v (px), target.")
 @click.option("--targets", type=FILE,
-              help="A file of landmarks, or CSV: target, x, y, z; a wire x2, y2, z2.")  # fmt: skip
-@click.option("--unit", metavar="UNIT", help="Of a table's targets, as mm.")
-@click.option("--probe", metavar="TOOL", help="Its poses, as ProbeToReference.")
-@click.option("--topic", default="images", show_default=True, help="The images.")
-@click.option("--pivot", "tool", metavar="TOOL", help="Its tip, from turns about a point.")
-@click.option("--reference", default="", metavar="TOOL", help="--pivot: tracked, and may move.")
+              help="Landmark file, or CSV: target, x, y, z; for wires also x2, y2, "
+                   "z2.")  # fmt: skip
+@click.option("--unit", metavar="UNIT", help="Unit of targets in a table, as mm.")
+@click.option("--probe", metavar="TOOL", help="Poses of the probe, as ProbeToReference.")
+@click.option("--topic", default="images", show_default=True, help="Topic of the images.")
+@click.option(
+    "--pivot",
+    "tool",
+    metavar="TOOL",
+    help="Calibrate the tip of this tool from turns about a point.",
+)
+@click.option(
+    "--reference", default="", metavar="TOOL", help="--pivot: tracked reference; it may move."
+)
 @click.option("--tip", "rough", default="", metavar="X,Y,Z",
-              help="--pivot: roughly, as 108mm,8mm,3mm: several points.")  # fmt: skip
+              help="--pivot about several points: rough tip, as 108mm,8mm,3mm.")  # fmt: skip
 @output("The MCAP recording to write.")
 def calibrate(
     file: Path, out: Path, tool: str | None, reference: str, rough: str, **given: Any
@@ -206,9 +223,11 @@ def calibrate(
     """
     images = [f"--{name}" for name in ("points", "targets", "unit", "probe") if given[name]]
     if tool is not None and images:
-        raise click.UsageError(f"{', '.join(images)}: of an image plane, not of --pivot {tool}.")
+        raise click.UsageError(
+            f"{', '.join(images)}: for an image plane; leave out with --pivot {tool}."
+        )
     if tool is None and (reference or rough):
-        raise click.UsageError("--reference and --tip are of --pivot TOOL; say it.")
+        raise click.UsageError("--reference and --tip need --pivot TOOL; give it.")
     if tool is not None:
         from validate.cli import pivoting
 
@@ -224,13 +243,15 @@ def calibrate(
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--tool", required=True, metavar="TOOL", help="Its poses, as StylusToTracker.")
 @click.option(
-    "--tip", required=True, metavar="X,Y,Z", help="In the tool's frame, as 108mm,8mm,3mm."
+    "--tool", required=True, metavar="TOOL", help="Poses of the tool, as StylusToTracker."
 )
-@click.option("--reference", default="", metavar="TOOL", help="A tracked tool, in whose frame.")
-@click.option("--known", type=FILE, help="A file of landmarks, or CSV: target, x, y, z.")
-@click.option("--unit", metavar="UNIT", help="Of a table's landmarks, as mm.")
+@click.option(
+    "--tip", required=True, metavar="X,Y,Z", help="Tip in the tool's frame, as 108mm,8mm,3mm."
+)
+@click.option("--reference", default="", metavar="TOOL", help="Tracked tool whose frame is used.")
+@click.option("--known", type=FILE, help="Landmark file, or CSV: target, x, y, z.")
+@click.option("--unit", metavar="UNIT", help="Unit of landmarks in a table, as mm.")
 @output("The MCAP recording to write.")
 def digitise(file: Path, out: Path, **how: Any) -> None:
     """Find the landmarks touched with a tracked tool.
@@ -249,9 +270,11 @@ def digitise(file: Path, out: Path, **how: Any) -> None:
 @click.command()
 @click.argument("name")
 @click.option("--from", "source", required=True, type=FILE, help="The MCAP recording.")
-@click.option("--answers", type=FILE, help="TOML answers to what the recording does not tell.")
-@click.option("--questions", is_flag=True, help="List the questions as such a file; write nothing.")
-@click.option("-o", "out", type=FILE, help="The file (default: experiments/NAME.py).")
+@click.option("--answers", type=FILE, help="TOML file of answers.")
+@click.option(
+    "--questions", is_flag=True, help="Print the questions as a file of answers; write nothing."
+)
+@click.option("-o", "out", type=FILE, help="File to write (default: experiments/NAME.py).")
 @FORCE
 def new(
     name: str, source: Path, out: Path | None, answers: Path | None, *, questions: bool, force: bool
@@ -271,16 +294,20 @@ def new(
 
 @click.command()
 @click.argument("file", type=FILE)
-@click.option("--unit", metavar="UNIT", help="Of its lengths, as mm; not of npz (m).")
-@click.option("--edge", metavar="LENGTH", help="Of the elements that fill a surface, as 2mm.")
-@click.option("--part", metavar="PART", help="One of several: its name there, or 1 (the largest).")
+@click.option("--unit", metavar="UNIT", help="Unit of lengths, as mm; npz files are in m.")
+@click.option("--edge", metavar="LENGTH", help="Edge of the elements that fill a surface, as 2mm.")
+@click.option(
+    "--part", metavar="PART", help="One of several bodies, by name or rank: 1 is the largest."
+)
 @click.option(
     "--face", "faces", multiple=True, metavar="NAME=WORDS",
-    help="A facet set by place: top=zmax, side=x=20mm, or box A to B, near P (docs/new.md).",
+    help="Facet set by place: top=zmax, side=x=20mm, box A to B or near P (docs/new.md).",
 )  # fmt: skip
-@click.option("--size", metavar="LENGTH", help="Its largest side: confirms an unusual one.")
-@click.option("--quadratic", "curved", is_flag=True, help="A node in the middle of every edge.")
-@output("The npz to write, as experiments take it.", required=False)
+@click.option("--size", metavar="LENGTH", help="Largest side; confirms an unusual size.")
+@click.option(
+    "--quadratic", "curved", is_flag=True, help="Quadratic elements: add a node on every edge."
+)
+@output("The npz file to write, for experiments.", required=False)
 def body(file: Path, **given: Any) -> None:
     """Convert a mesh or closed surface into a body.
 
@@ -315,7 +342,7 @@ def record(
 
 
 @click.group("data", invoke_without_command=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON document, nothing else.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 @click.pass_context
 def data_(context: click.Context, as_json: bool) -> None:
     """List and fetch public recordings by name.
