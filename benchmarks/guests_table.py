@@ -76,7 +76,7 @@ def _cells(row: tuple[Entry | TableCell, ...]) -> list[str]:
     who = str(label) if program in (_OURS, "-") else f"{label} ({program})"
     figures = [with_unit(c.value, c.unit) if isinstance(c, TableCell) else "-" for c in row[3:6]]
     if isinstance(error, float) and error == 0:
-        figures[0] = "within noise"
+        figures[0] = "below noise"
     if check == "-":
         return ["-", who, "-", "-", "-", _short(str(end)), "-", "-", "-"]
     costs = [significant(x, 2) if isinstance(x, float) else "-" for x in (rate, memory)]

@@ -59,7 +59,7 @@ def _told(result: Result, method: str) -> list[Check]:
 
 
 def _cells(c: Check) -> tuple[str, ...]:
-    error = with_unit(c.value, c.unit) if c.value else "within noise"
+    error = with_unit(c.value, c.unit) if c.value else "below noise"
     doubt, margin = (with_unit(n, c.unit) for n in (2 * c.u_val, c.margin))
     return (c.name, error, doubt, margin, c.acceptance, c.validation)
 

@@ -82,7 +82,7 @@ def test_names_are_followed_inside_their_folder_only(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match="lies outside its folder 'data'"):
             inside(folder, name)
     for name in ("", "  ", "a\0b", "a\nb"):
-        with pytest.raises(RecordingError, match="is no name of a file"):
+        with pytest.raises(RecordingError, match="is not a file name"):
             inside(folder, name)
     with pytest.raises(RecordingError, match="cannot be followed"):
         inside(folder, "x" * 300)
@@ -106,7 +106,7 @@ def test_arrays_are_read_whole_or_not(tmp_path: Path) -> None:
         npz_arrays(file, 80_000)
     whole = file.read_bytes()
     file.write_bytes(whole[:-30])
-    with pytest.raises(RecordingError, match=r"a\.npz: no archive of arrays, or damaged"):
+    with pytest.raises(RecordingError, match=r"a\.npz: not an archive of arrays, or damaged"):
         npz_arrays(file, 100_000)
     np.savez(file, o=np.array([{}], dtype=object))
     with pytest.raises(RecordingError, match="allow_pickle"):

@@ -104,7 +104,7 @@ def test_results_need_as_much_room_as_those_that_stay_meanwhile(
 
 def test_a_folder_of_the_user_is_refused_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("", "utf-8")
-    with pytest.raises(UsageError, match="1 entries and no"):
+    with pytest.raises(UsageError, match="1 entries but no"):
         try_results(tmp_path, ())
 
 
@@ -120,7 +120,7 @@ def test_a_disk_that_fills_up_leaves_the_old_report_and_says_how_much(tmp_path: 
         replace_folder(folder, fill, ())
     said = one_line(caught)
     assert "more than 200.0 kB are needed" in said
-    assert "are free; what was there stays" in said
+    assert "are free; its old content is kept" in said
     assert (folder / MARK).read_text("utf-8") == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["report"]
 

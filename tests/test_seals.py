@@ -24,7 +24,7 @@ def test_a_sealed_document_is_read_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (json.dumps(sealed(CONTENT)).replace("2.5", "2.6"), "does not fit its checksum"),
+        (json.dumps(sealed(CONTENT)).replace("2.5", "2.6"), "does not match its checksum"),
         (json.dumps(CONTENT), "no checksum"),
         ("[1]", "list, expected an object"),
         ("{", "Expecting property name"),
@@ -37,5 +37,5 @@ def test_any_other_is_one_line(text: str, why: str, tmp_path: Path) -> None:
     (tmp_path / "cube").mkdir()
     file = tmp_path / "cube" / "results.json"
     file.write_text(text, "utf-8")
-    with pytest.raises(RecordingError, match=rf"^cube/results\.json: not believed \(.*({why})"):
+    with pytest.raises(RecordingError, match=rf"^cube/results\.json: ignored \(.*({why})"):
         read_sealed(file)

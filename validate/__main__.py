@@ -31,8 +31,8 @@ def _require_plain_folder() -> None:
     rest = [p for p in sys.path if p and os.path.realpath(p) != os.path.realpath(here)]
     if not sys.flags.safe_path and (hidden := shadowing(here, rest)):
         print(
-            f"validate: {', '.join(hidden[:3])} in {here} would be imported in place of Python's "
-            "or a library's own; run 'validate', or 'python -P -m validate'",
+            f"validate: {', '.join(hidden[:3])} in {here} would replace modules of Python or of a "
+            f"library; run 'validate', or 'python -P -m validate'",
             file=sys.stderr,
         )
         raise SystemExit(2)

@@ -107,7 +107,7 @@ def inside(folder: Path, name: str) -> Path:
     """
     said = name.replace("\\", "/")
     if not said.strip() or not said.isprintable():
-        raise RecordingError(f"{name[:60]!r} is no name of a file")
+        raise RecordingError(f"{name[:60]!r} is not a file name")
     try:
         path = (folder / said).resolve()
         root = folder.resolve()
@@ -116,8 +116,8 @@ def inside(folder: Path, name: str) -> Path:
         raise RecordingError(f"'{name[:60]}' cannot be followed; expected a file name") from None
     if said.startswith("/") or said[1:2] == ":" or not path.is_relative_to(root):
         raise RecordingError(
-            f"'{name[:60]}' lies outside its folder '{root.name}', and is not read; copy it there "
-            "and give its name alone"
+            f"'{name[:60]}' lies outside its folder '{root.name}' and is not read; copy it there "
+            f"and give only its name"
         )
     return path
 
@@ -162,7 +162,7 @@ def npz_arrays(path: Path, most: int) -> dict[str, NDArray[Any]]:
         zipfile.BadZipFile, zlib.error,
     ) as error:  # fmt: skip
         why = " ".join(str(error).split())[:80] or type(error).__name__
-        raise RecordingError(f"{path.name}: no archive of arrays, or damaged ({why})") from None
+        raise RecordingError(f"{path.name}: not an archive of arrays, or damaged ({why})") from None
 
 
 def too_large(path: Path, size: int, limit: int) -> RecordingError:

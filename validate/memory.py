@@ -29,7 +29,7 @@ def require_memory(needed: float, what: str) -> None:
     if free is not None and needed > _MOST * free:
         raise MemoryShortError(
             f"{what}: about {needed / 1e9:.3g} GB of memory are needed, {free / 1e9:.3g} GB are "
-            "free; take a coarser mesh",
+            f"free; take a coarser mesh",
             _MOST * free / needed,
         )
 

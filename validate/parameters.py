@@ -145,7 +145,7 @@ def _doubt(path: str, text: str, unit: str, default: Any) -> str:
     if not odd or not all(v is None or low <= v <= high for v in usual):
         return ""
     near = low <= (in_si(odd[0], short, unit) or 0.0) <= high
-    meant = f"a factor 1000? {path}=" if near else f"with its unit it is taken: {path}="
+    meant = f"a factor 1000? {path}=" if near else f"with its unit it is accepted: {path}="
     return (
         f"{path}={text}: {odd[0]:g} {unit} is outside {low:g} to {high:g} {unit} (default "
         f"{_plain(default)}); {meant}{odd[0]:g}{short if near else unit}"
@@ -264,16 +264,18 @@ def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
     if get_origin(hint) is Literal:
         choices = {str(choice): choice for choice in get_args(hint)}
         if text not in choices:
-            raise UsageError(f"{path}={text}: one of {', '.join(choices)}")
+            raise UsageError(f"{path}={text}: expected one of {', '.join(choices)}")
         return choices[text]
     if get_origin(hint) is tuple:
         parts = text.split(",") if text else []
         if len({bool(found[1]) for found in map(split, parts) if found and found[0]}) > 1:
-            raise UsageError(f"{path}={text}: all in {unit} without unit, or each with its own")
+            raise UsageError(
+                f"{path}={text}: expected all in {unit} without unit, or each with its unit"
+            )
         return tuple(_parse(get_args(hint)[0], path, part.strip(), unit) for part in parts)
     if hint is bool:
         if text.lower() not in ("true", "false"):
-            raise UsageError(f"{path}={text}: true or false")
+            raise UsageError(f"{path}={text}: expected true or false")
         return text.lower() == "true"
     if hint is int:
         return _whole(path, text)

@@ -31,7 +31,7 @@ def unsealed(content: Any) -> dict[str, Any]:
     if SEAL not in content:
         raise ValueError("no checksum")
     if content[SEAL] != seal_of(plain):
-        raise ValueError("its content does not fit its checksum: edited or damaged")
+        raise ValueError("its content does not match its checksum: edited or damaged")
     return plain
 
 
@@ -55,4 +55,4 @@ def read_sealed(path: Path) -> dict[str, Any]:
     except ValueError as error:
         why = " ".join(str(error).split())[:120]
         name = f"{path.parent.name}/{path.name}"
-        raise RecordingError(f"{name}: not believed ({why})") from None
+        raise RecordingError(f"{name}: ignored ({why})") from None

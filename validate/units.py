@@ -68,11 +68,11 @@ def si_factor(unit: str, quantity: str) -> float:
         kinds = [name for name, _ in QUANTITIES if _factor(unit.strip(), name) is not None]
         meant = f"it measures {kinds[0]}" if kinds else "it is not known"
         if is_symbolic(unit):
-            meant = "nobody stated which one it is, so that it converts to nothing"
+            meant = "its kind is not declared, so it cannot be converted"
         if quantity == "force" and unit.strip().lower() in ("kg", "g"):
-            meant = f"it is not known as force; if the weight of a mass is meant say {unit}f"
+            meant = f"it is not known as force; for the weight of a mass write {unit}f"
         raise RecordingError(
-            f"unit '{unit}' is no unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
+            f"unit '{unit}' is not a unit of {quantity}: {meant}; examples: {_EXAMPLES[quantity]}"
         )
     return factor
 

@@ -54,7 +54,7 @@ def test_an_offset_is_found_below_a_sample_and_kept(tmp_path: Path) -> None:
     code, said, err = here("align", *files(tmp_path), *BY, "-o", str(out))
     assert (code, err) == (0, "")
     told = " ".join(said.split())
-    assert "by correlation; 1374 samples meet the first file, 100 % of them" in told
+    assert "by correlation; 1374 samples (100 %) lie within the first file's time" in told
     found = read_recording(out)
     record = found.record("clock_offset/markers")
     sd = float(record["sd"])
@@ -72,8 +72,8 @@ def test_a_drift_is_said_enters_the_sd_and_is_taken_out_on_demand(tmp_path: Path
     code, said, err = here("align", *given, *BY, "-o", str(out))
     assert code == 0
     assert "drift: +4" in said or "drift: +3.9" in said
-    assert "the clocks run apart by 2" in err
-    assert "--drift takes it out" in err
+    assert "the clocks drift by 2" in err
+    assert "--drift corrects it" in err
     blunt = float(read_recording(out).record("clock_offset/markers")["sd"])
     assert blunt > drift * 55 / np.sqrt(12) * 0.9
     assert f"sd {blunt:.2g} s" in " ".join(said.split())
@@ -112,7 +112,7 @@ def test_three_files_come_onto_the_first_clock(tmp_path: Path, late: float) -> N
     record = read_recording(out).record("clock_offset/markers")
     assert f"seen.mcap: offset: {float(record['seconds']):+.6g} s" in told
     assert "laser.mcap: offset: " in told
-    assert all(float(share.split()[0]) > 0.99 for share in told.split("they correlate by ")[1:])
+    assert all(float(share.split()[0]) > 0.99 for share in told.split("correlation  ")[1:])
     found = read_recording(out)
     begin = found.signals["force"].t[0]
     for topic, stream, offset in (("markers", found.markers["markers"], OFFSET),
@@ -139,7 +139,7 @@ def test_one_file_that_does_not_follow_is_named_and_nothing_is_written(tmp_path:
         assert f"--by {odd}: expected CHANNEL=CHANNEL" in refused(
             "align", *given[:2], "--by", odd, "-o", out
         )
-    assert "1 file, at least 2" in refused("align", given[0], *BY, "-o", out)
+    assert "1 file; give at least 2" in refused("align", given[0], *BY, "-o", out)
 
 
 @pytest.mark.slow
@@ -149,7 +149,7 @@ def test_what_is_enough_is_the_users(tmp_path: Path) -> None:
     assert "at least 0.9 is needed" in why
     code, said, _ = here("align", *given)
     assert code == 0
-    assert "they correlate by 0." in " ".join(said.split())
+    assert "correlation 0." in " ".join(said.split())
     pair = (files(tmp_path)[0], third(tmp_path, 35.0, 0.01), "--by", "force=laser")
     for share, code in (("0.5", 0), ("0.9", 2)):
         out = str(tmp_path / f"{share}.mcap")
@@ -171,7 +171,7 @@ def test_a_flash_marks_images(tmp_path: Path) -> None:
     assert code == 0
     for ignored in (("--drift",), ("--within", "3"), ("--correlation", "0.9")):
         why = refused("align", *pair, *by, *ignored, "-o", str(tmp_path / "x.mcap"))
-        assert f"--event step: {ignored[0]} is of the correlation; leave it away" in why
+        assert f"--event step: {ignored[0]} belongs to the correlation; leave it out" in why
     record = read_recording(out).record("clock_offset/images")
     assert float(record["seconds"]) == pytest.approx(1.0, abs=0.03)
     assert float(record["sd"]) == pytest.approx(0.05 / np.sqrt(12), rel=0.2)
@@ -216,11 +216,11 @@ def test_every_further_file_has_its_channels_and_a_reason(tmp_path: Path) -> Non
     log, seen = files(tmp_path)
     out = tmp_path / "out.mcap"
     line = refused("align", log, "--by", "force=force", "-o", str(out))
-    assert "align: 1 file, at least 2 are needed" in line
+    assert "align: 1 file; give at least 2" in line
     line = refused("align", log, seen, *BY, *BY, "-o", str(out))
     assert "--by: 2 given for 1 further files; give one for each" in line
     line = refused("align", log, seen, "--by", "force=", "-o", str(out))
-    assert "--by force=: expected CHANNEL=CHANNEL, of the first and a further file" in line
+    assert "--by force=: expected CHANNEL=CHANNEL, a channel of the first" in line
     line = refused("align", log, seen, *BY, "--correlation", "0.9999999", "-o", str(out))
     assert "the streams correlate by 1.00 at most" in line
     assert not out.exists()
@@ -237,6 +237,6 @@ def test_a_drift_that_half_a_recording_cannot_determine_is_reported(
     assert aligning._drift(pair, None, "b.mcap: ") is None  # type: ignore[arg-type]
     said = " ".join(capsys.readouterr().out.split())
     assert (
-        said == "b.mcap: drift: not known, half of the recording does not tell it (7 samples "
+        said == "b.mcap: drift: not known: half of the recording is not enough (7 samples "
         "meet the reference, 10 are needed)"
     )

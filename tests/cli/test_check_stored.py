@@ -65,7 +65,7 @@ def test_a_run_of_the_same_is_reused_and_said_so(stored: Path) -> None:
     taken, said = checked(stored)
     created = json.loads((stored / "reports/pulled/results.json").read_text("utf-8"))["created"]
     assert taken
-    assert f"stored run of {created} (reports/pulled); --fresh makes it anew" in said
+    assert f"stored run of {created} (reports/pulled); --fresh repeats it" in said
     assert checked(stored, "--fresh") == (False, "")
     assert checked(stored, "--out", "elsewhere") == (False, "")
 
@@ -161,7 +161,7 @@ def test_whatever_else_differs_makes_it_anew(
 def test_a_damaged_one_is_made_anew(stored: Path, tmp_path: Path) -> None:
     (tmp_path / "pulled").mkdir()
     (tmp_path / "pulled" / "results.json").write_text("{", "utf-8")
-    assert "pulled/results.json: not believed" in checked(stored, "--out", str(tmp_path))[1]
+    assert "pulled/results.json: ignored" in checked(stored, "--out", str(tmp_path))[1]
 
 
 def test_a_recording_without_a_hash_is_never_reused(tmp_path: Path) -> None:

@@ -336,7 +336,7 @@ def test_places_that_cannot_be_known_are_refused(
     file = tmp_path / "wires.csv"
     file.write_text("target,x,y,z,x2,y2,z2\nw,1,2,3,1,2,3\n")
     row = known_places.rows_of(file, ("target", "x"))[0]
-    with pytest.raises(RecordingError, match=r"wires.csv: wire w has one place twice"):
+    with pytest.raises(RecordingError, match=r"wires.csv: wire w has two equal ends"):
         known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 3e-3]))
     assert known_places._along(file, {**row, "x2": " "}, 1.0, np.zeros(3)) is None
     along = known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 0.0]))
@@ -348,25 +348,26 @@ def test_places_that_cannot_be_known_are_refused(
     with pytest.raises(RecordingError, match=r"wires.csv: 36 bytes, the limit is 20"):
         known_places.rows_of(file, ("target",))
     monkeypatch.setattr(known_places, "read_device_set", lambda _: SimpleNamespace(landmarks={}))
-    with pytest.raises(UsageError, match=r"d.xml: no landmarks in its PhantomDefinition"):
+    with pytest.raises(UsageError, match=r"d.xml: its PhantomDefinition has no landmarks"):
         known_places._declared(tmp_path / "d.xml")
 
 
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: known_places._table(Path("w.csv"), "kg"), "--unit kg: expected a length, as mm"),
+        (lambda: known_places._table(Path("w.csv"), "kg"), "--unit kg: expected a unit of length, "
+                                                           "as mm"),
         (lambda: bodies._metres("edge", "2"), "--edge 2: expected a length with its unit, as 2mm"),
         (lambda: bodies._metres("edge", "-2mm"), "--edge -2mm: expected a length with its unit"),
         (lambda: outlining._place("3px", None), "--centre 3px: expected X,Y as 120px,80px or"),
         (
             lambda: outlining._drawn(Path("a"), None, "", {"centre": "1px,1px", "radius": 0,
                                                            "bright": False}),
-            "--centre is for outlines that are searched: not with --from",
+            "--centre is for searched outlines; leave it out with --from",
         ),
         (
             lambda: calibrating._seen(None, None, "probe", {}, Path(os.devnull)),
-            "null: no points are marked",
+            "null: the file has no marked points",
         ),
     ],
 )  # fmt: skip
@@ -400,14 +401,14 @@ def test_a_study_that_is_interrupted_says_how_many_cells_are_kept(
         studying.running(experiment, "choose", "choose", common),  # type: ignore[arg-type]
     ):
         raise KeyboardInterrupt
-    assert "3 finished cells are kept; the same command goes on" in capsys.readouterr().err
+    assert "3 finished cells are kept; the same command resumes" in capsys.readouterr().err
 
 
 def test_commands_without_what_they_need_report_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "kept").write_text("x")
-    with pytest.raises(UsageError, match="it is not empty; name another folder"):
+    with pytest.raises(UsageError, match="this folder is not empty; name another"):
         guesting.job("x", tmp_path, None, 2, (), inertia=False, force=False)
     experiment = SimpleNamespace(methods={"linear": None}, accepted=("linear",), twin=None)
     for module in (guesting, making):
@@ -415,9 +416,11 @@ def test_commands_without_what_they_need_report_it(
     monkeypatch.setattr(guesting, "own_body", lambda found: SimpleNamespace(experiment=found))
     with pytest.raises(UsageError, match=r"no method 'lin'; .*linear"):
         guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
-    with pytest.raises(UsageError, match="experiment 'x' has no synthetic recording; its data are"):
+    with pytest.raises(
+        UsageError, match="experiment 'x' has no synthetic recording, as its data are"
+    ):
         making.record("x", tmp_path / "x.mcap", ())
-    with pytest.raises(UsageError, match="no such file here"):
+    with pytest.raises(UsageError, match="no such file; paths start from"):
         new_body_questions.there(str(tmp_path / "nowhere"))
     new_body_questions.there(str(tmp_path / "kept"))
 
@@ -427,13 +430,9 @@ def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
 ) -> None:
     monkeypatch.setattr(new_body, "_mesh_of", lambda found: None)
     monkeypatch.setattr(new_body, "_judged", lambda found: ())
-    with pytest.raises(
-        UsageError, match=r"held.all, .x, .y, .z and .slides are all empty: the body"
-    ):
+    with pytest.raises(UsageError, match=r"held.all, .x, .y, .z and .slides are all empty: name"):
         new_body._fields(None, "", Path(), {})  # type: ignore[arg-type]
-    with pytest.raises(
-        UsageError, match=r"nothing is judged: seen.force, seen.markers and seen.outl"
-    ):
+    with pytest.raises(UsageError, match=r"seen.force, seen.markers and seen.outline are all none"):
         new_body._fields(None, "", Path(), {"held.all": "x0"})  # type: ignore[arg-type]
 
 
@@ -446,12 +445,10 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
         return poses[tool], np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3))
 
     monkeypatch.setattr(tool_poses, "tool_poses", seen)
-    with pytest.raises(UsageError, match="'a' and 'b' are never seen at one time"):
+    with pytest.raises(UsageError, match="'a' and 'b' are never visible at the same time"):
         tool_poses.in_reference(None, "a", "b")  # type: ignore[arg-type]
     partly = SimpleNamespace(unread={"/x": "", "/y": ""})
-    with pytest.raises(
-        UsageError, match=r"a.mcap holds 2 topics that are not read here and would be"
-    ):
+    with pytest.raises(UsageError, match=r"a.mcap has 2 topics that are not read and would be"):
         outlining._same(Path("a.mcap"), partly)  # type: ignore[arg-type]
     whole = SimpleNamespace(unread={})
     assert outlining._same(Path("a.mcap"), whole) == Path("a.mcap")  # type: ignore[arg-type]
@@ -468,4 +465,4 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
 @pytest.mark.parametrize("seconds", ["0", "-1", "inf", "nan"])
 def test_a_loop_takes_seconds_above_zero(seconds: str) -> None:
     line = refused("live", "needle_block", "--seconds", seconds)
-    assert f"--seconds {float(seconds):g}: a number above 0" in line
+    assert f"--seconds {float(seconds):g}: expected a number above 0" in line

@@ -145,7 +145,7 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     assert code == 0
     assert "good enough" in output
     first = " ".join(output.partition("Checks of")[0].split())
-    assert "specimen.diameter = 30 m is 1000 times 30 mm: were millimetres meant?" in first
+    assert "specimen.diameter = 30 m is 1000 times 30 mm: check its unit" in first
     assert "material.E (identified) is a modulus of 0.02 Pa" in first
     assert "is a stress of" in first
     assert "was entered; the recording says 0.03 m, 1e+03 times" in first
@@ -155,10 +155,10 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
         "value": 30.0, "unit": "m", "origin": "entered",
     }  # fmt: skip
     assert stored["parameters"]["material.E"]["origin"] == "identified"
-    assert stored["sentence"].startswith("Doubtful input")
+    assert stored["sentence"].startswith("With warnings")
     page = (folder / "report.html").read_text("utf-8")
     assert 'class="band good"' not in page
-    assert page.index("were millimetres meant?") < page.index("<nav")
+    assert page.index("check its unit") < page.index("<nav")
     assert "identified" in page.split("Origin: recorded")[1]
 
 
@@ -199,7 +199,7 @@ def test_streams_that_are_not_used_are_named(tmp_path: Path) -> None:
     write_recording(replace(log(**SIZES), frames={"camera": frames}), tmp_path / "gel.mcap")
     write_recording(log(**SIZES), tmp_path / "alone.mcap")
     _, said = in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")
-    assert "'camera' is not used by the experiment that was written" in " ".join(said.split())
+    assert "'camera' is not used by this experiment" in " ".join(said.split())
     assert "not used" not in in_folder(tmp_path, "new", "other", "--from", "alone.mcap")[1]
 
 
@@ -222,14 +222,14 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path) -> None:
     assert in_folder(tmp_path, *arguments)[0] == 0
     before = (tmp_path / "mine.py").read_bytes()
     code, message = in_folder(tmp_path, *arguments)
-    assert (code, "exists; name another file" in message) == (2, True)
+    assert (code, "exists; name another output" in message) == (2, True)
     assert (tmp_path / "mine.py").read_bytes() == before
     (tmp_path / "mine.py").write_text("x = 1")
     assert in_folder(tmp_path, *arguments, "--force")[0] == 0
     assert (tmp_path / "mine.py").read_bytes() == before
     for name in ("Mine", "json", "a-b", "../x"):
         assert in_folder(tmp_path, "new", name, "--from", "gel.mcap")[0] == 2
-    assert "called as it is" in in_folder(tmp_path, *arguments[:-1], "other.py")[1]
+    assert "must have the experiment's name" in in_folder(tmp_path, *arguments[:-1], "other.py")[1]
     assert in_folder(tmp_path, "list", "mine.py")[0] == 0
 
 
@@ -325,7 +325,7 @@ def test_the_header_s_lengths_stand_beside_the_question_for_a_size(tmp_path: Pat
     said = {"width_m": "0.02", "thickness_m": "0.01"}
     write_recording(log(**said), tmp_path / "gel.mcap")
     _, listed = in_folder(tmp_path, "new", "a", "--from", "gel.mcap", "--questions")
-    assert listed.count("; the header says width 20 mm, thickness 10 mm, m or as") == 2
+    assert listed.count("; the header says width 20 mm, thickness 10 mm, in m or as") == 2
 
 
 def test_several_lengths_of_a_strip_are_shown_and_none_is_taken(tmp_path: Path) -> None:
@@ -429,4 +429,4 @@ def test_a_prediction_of_a_few_samples_is_no_evidence(tmp_path: Path) -> None:
     code, output = in_folder(tmp_path, "run", "sliver", *sets, "--methods", "slip", "--quick")
     assert code == 2
     assert "window 'beyond'" in output
-    assert "10 are needed to judge a prediction" in output
+    assert "10 are needed to check a prediction" in output

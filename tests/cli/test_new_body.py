@@ -94,7 +94,10 @@ def test_a_body_of_an_unusual_size_is_a_question(here: Path) -> None:
     assert "0.04 x 0.03 x 0.05 mm (lengths in mm)" in said
     assert "40 x 30 x 50 mm in m" in said
     code, said = new("small", 'unit = "mm", size = "5mm"')
-    assert (code, "body.size = 5mm: the largest side is 0.05 mm; change" in said) == (2, True)
+    assert (code, "body.size = 5mm: the file's largest side is 0.05 mm; if that" in said) == (
+        2,
+        True,
+    )
     assert new("small", 'unit = "mm", size = "0.05mm"')[0] == 0
     assert new("right", 'unit = "m"')[0] == 0
     (here / "h.toml").write_text(PRESSED.replace("40mm,30mm,50mm", "40,30,50"), "utf-8")
@@ -121,7 +124,7 @@ def test_what_is_open_is_asked_all_at_once(here: Path) -> None:
     for key in ("body.block", "material.E", "material.nu", "moved.by",
                 "accept.marker", "ranges.nu", "seen.layout"):  # fmt: skip
         assert f"{key} (" in said
-    assert "--questions writes out" in said
+    assert "--questions prints such a file" in said
     assert not (here / "experiments").exists()
 
 
@@ -131,8 +134,8 @@ def test_what_is_open_is_asked_all_at_once(here: Path) -> None:
     ('material.E = "15mm"', "material.E = 15mm"),
     ('moved.by = "stage"', "one of displacement, force, markers, gravity"),
     ('accept.force = "-1"', "a number above 0 in N"),
-    ('hold.all = "zmin"', "answers to no question: hold.all; nearest: held.all"),
-    ('body.file = "x.npz"', "answers to no question: body.file"),
+    ('hold.all = "zmin"', "no question has the key hold.all; nearest: held.all"),
+    ('body.file = "x.npz"', "no question has the key body.file"),
     ('seen.still = "soon"', "seen.still = soon"),
 ])  # fmt: skip
 def test_a_wrong_answer_is_named(here: Path, line: str, why: str) -> None:
@@ -148,9 +151,9 @@ def test_a_wrong_answer_is_named(here: Path, line: str, why: str) -> None:
 
 @pytest.mark.parametrize(("line", "why"), [
     ('moved.markers = "A, B, C"', ""),
-    ('moved.markers = "A, B"', "2 markers, at least 3 are needed"),
-    ('moved.markers = "A, B, tip"', "tip not among A, B, C, D"),
-    ('material.E = "unknown"', "material.E = unknown: it is identified on a force that is judged"),
+    ('moved.markers = "A, B"', "2 markers; at least 3 are needed"),
+    ('moved.markers = "A, B, tip"', "no marker tip; there are A, B, C, D"),
+    ('material.E = "unknown"', "material.E = unknown: identifying it needs a compared force"),
 ])  # fmt: skip
 def test_what_markers_on_a_face_move_is_asked_before_it_runs(
     here: Path, line: str, why: str
@@ -238,8 +241,10 @@ def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:
     write_recording(recording(signals=log(), contours={"o": contours}), here / "o.mcap")
     listing = called("new", "mine", "--from", "o.mcap", "--questions", "--answers", "a.toml")[1]
     assert 'seen.pose = ""' in listing
-    assert "# answers to no question, left out: seen.layout, seen.still, accept.marker" in listing
-    assert "open: nothing tells it" in listing
+    assert (
+        "# left out, as no question has this key: seen.layout, seen.still, accept.marker" in listing
+    )
+    assert "open: the recording does not answer it" in listing
 
 
 def test_images_alone_lead_to_their_outlines(here: Path) -> None:

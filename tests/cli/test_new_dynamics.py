@@ -183,15 +183,15 @@ def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Pa
 def test_what_rings_is_proposed_as_dynamic_and_its_questions_are_open(here: Path) -> None:
     code, said = new(here, "pushed", ('motion = {how = "dynamic", damping = "0.003s"}\n', ""))
     assert code == 2
-    assert "motion.damping (damping: of the stiffness as a time" in said
+    assert "motion.damping (damping: stiffness-proportional" in said
     listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
     assert 'motion.how = "dynamic"' in listing[1]
     assert "first mode of the body at 2.93 Hz (with an assumed density of 1000" in listing[1]
-    assert "inertia matters from 0.33 of it on" in listing[1]
+    assert "inertia matters above 0.33 of it" in listing[1]
 
 
 @pytest.mark.parametrize(("change", "why"), [
-    (('held = "0.015N"', 'held = "0.015"'), "a force as 0.2N or a displacement as 5mm"),
+    (('held = "0.015N"', 'held = "0.015"'), "expected a force, as 0.2N, or a displacement, as 5mm"),
     (('damping = "0.003s"', 'damping = "heavy"'), "motion.damping = heavy"),
     (STATIC, "motion.how = static: a release is a motion in time"),
 ])  # fmt: skip

@@ -52,8 +52,11 @@ def written(folder: Path, answers: Mapping[str, str]) -> tuple[str, str]:
 def test_the_place_of_the_images_is_open_until_it_is_said(seen: Path) -> None:
     (seen / "a.toml").write_text('experiment = "plates"\noutline.shows = "edge"\n', "utf-8")
     told = refused("new", "mine", "--from", "gel.mcap", "--answers", "a.toml")
-    assert "3 questions are open: outline.origin (the images' first pixel in the body's" in told
-    assert "outline.sd (how well that place is known" in told
+    assert (
+        "3 questions are open: outline.origin (position of the images' first pixel in the body's"
+        in told
+    )
+    assert "outline.sd (standard uncertainty of that position" in told
     assert "1 question is open: outline.shows" in refused("new", "mine", "--from", "gel.mcap")
 
 
@@ -73,8 +76,8 @@ def test_the_edge_is_judged_as_answered(seen: Path) -> None:
 
 def test_what_the_model_does_not_have_is_left_out_and_named(seen: Path) -> None:
     err, text = written(seen, {"outline.shows": "other"})
-    assert "'cyst' is not used by the experiment" in err
-    assert "'us' is not used by the experiment" in err
+    assert "'cyst' is not used by this experiment" in err
+    assert "'us' is not used by this experiment" in err
     assert "outline" not in text.split("PARAMETERS")[1]
 
 
@@ -107,7 +110,5 @@ def test_a_specimen_of_an_unusual_size_is_a_question(seen: Path) -> None:
         text = "\n".join([*lines, f"specimen.mesh_unit = '{unit}'"])
         (seen / "a.toml").write_text(text, "utf-8")
         told = refused("new", "mine", "--from", "gel.mcap", "--answers", "a.toml")
-        said = (
-            "specimen.mesh_size (largest side of the body, as 3mm, if its unit is right: it is 0.02"
-        )
+        said = "specimen.mesh_size (largest side of the body, as 3mm, to confirm its unit"
         assert (said in told) == is_asked

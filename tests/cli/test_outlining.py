@@ -101,8 +101,8 @@ def test_the_sd_says_that_it_is_widened_to_distances_from_experts_lines(
 def test_a_rival_is_named_and_lowers_the_confidence(two: Path, tmp_path: Path) -> None:
     code, out, err = here("outline", str(two), "-o", str(tmp_path / "c.mcap"))
     assert code == 0
-    assert "as distinct as the outline (others: 1): (22." in err
-    assert "is another one meant, say --centre X,Y" in err
+    assert "1 other regions are as distinct as the outline: (22." in err
+    assert "to choose one, give --centre X,Y" in err
     assert "confidence falls to 0.5" in err
     assert "confidence: 0.5" in out
 
@@ -122,8 +122,8 @@ def test_what_is_meant_is_said(two: Path, tmp_path: Path) -> None:
 def test_a_rival_that_leaves_too_little_confidence_refuses(two: Path, tmp_path: Path) -> None:
     out = tmp_path / "c.mcap"
     told = refused("outline", str(two), "-o", str(out), "--confidence", "0.9")
-    assert "0.9 is needed beside rivals: (22." in told
-    assert "(--centre X,Y) or take it (--confidence 0.56)" in told
+    assert "but 0.9 is needed, as other regions are as distinct: (22." in told
+    assert "(--centre X,Y) or accept it (--confidence 0.56)" in told
     assert not out.exists()
     assert here("outline", str(two), "-o", str(out), "--confidence", "0.56")[0] == 0
 
@@ -186,7 +186,10 @@ def test_outlines_of_others_come_in(kind: str, two: Path, tmp_path: Path) -> Non
     """A mask's edge runs half a pixel outside its outermost pixels, at the circle that cut it."""
     out, file = tmp_path / "c.mcap", drawn(tmp_path, kind)
     arguments = ("outline", str(two), "--from", str(file), "--name", "theirs", "-o", str(out))
-    assert "may be off along their normal is not in it: --sd 0.3mm or 2px" in refused(*arguments)
+    assert (
+        "does not contain the uncertainty of its outlines along their normal; give it, as --sd "
+        "0.3mm or 2px" in refused(*arguments)
+    )
     assert here(*arguments, "--sd", "2px")[0] == 0
     contours = read_recording(out).contour("theirs")
     assert contours.sd == pytest.approx(2 * SIDE)
@@ -211,7 +214,7 @@ def test_coco_images_are_in_the_order_of_their_files(moving: Path, tmp_path: Pat
     file.write_text(json.dumps({"images": images, "annotations": notes}))
     assert "several polygons in one image" in refused(*given)
     file.write_text(json.dumps({"images": images[:2], "annotations": notes[1:2]}))
-    assert "2 images for 3 images leave open whose they are" in refused(*given)
+    assert "2 images for 3 images do not show which belongs to which image" in refused(*given)
 
 
 def test_masks_of_a_folder_are_one_an_image(moving: Path, tmp_path: Path) -> None:
@@ -226,7 +229,7 @@ def test_masks_of_a_folder_are_one_an_image(moving: Path, tmp_path: Path) -> Non
     assert found.t == pytest.approx([0.0, 0.2])
     assert (found.outlines[1] / SIDE).mean(axis=0) == pytest.approx(CENTRE + [10, 0], abs=0.2)
     (folder / "2.png").unlink()
-    assert "2 masks for 3 images leave open whose they are" in refused(*given)
+    assert "2 masks for 3 images do not show which belongs to which image" in refused(*given)
 
 
 def segmented(path: Path) -> Path:
@@ -245,7 +248,7 @@ def test_one_of_several_regions_is_said(label: str, two: Path, tmp_path: Path) -
     out = tmp_path / "c.mcap"
     given = ("outline", str(two), "--from", str(segmented(tmp_path / "x.seg.nrrd")), "--sd", "1px",
              "--name", "theirs", "-o", str(out))  # fmt: skip
-    assert "2 regions, skin (2), cyst (5): say which, as --label skin" in refused(*given)
+    assert "2 regions, skin (2), cyst (5): choose one, as --label skin" in refused(*given)
     assert "--label bone: not in x.seg.nrrd; there are skin (2)" in refused(
         *given, "--label", "bone"
     )
@@ -253,7 +256,7 @@ def test_one_of_several_regions_is_said(label: str, two: Path, tmp_path: Path) -
     away = radii(read_recording(out).contour("theirs").outlines[0], CENTRE) - RADIUS
     assert np.abs(away).max() < 0.6
     assert read_recording(out).record("found/theirs")["label"] == label
-    assert "--label is for outlines of others" in refused("outline", str(two), "--label", "cyst")
+    assert "--label is for third-party outlines" in refused("outline", str(two), "--label", "cyst")
 
 
 @pytest.mark.parametrize("coco", [True, False])
@@ -271,7 +274,7 @@ def test_one_of_several_labels_of_polygons_is_said(coco: bool, two: Path, tmp_pa
     file.write_text(json.dumps(told))
     given = ("outline", str(two), "--from", str(file), "--sd", "1px", "--name", "theirs",
              "-o", str(out))  # fmt: skip
-    assert "2 regions, skin, cyst: say which, as --label skin" in refused(*given)
+    assert "2 regions, skin, cyst: choose one, as --label skin" in refused(*given)
     assert here(*given, "--label", "cyst")[0] == 0
     assert radii(read_recording(out).contour("theirs").outlines[0], CENTRE) == pytest.approx(RADIUS)
 
@@ -280,7 +283,7 @@ def test_a_picture_is_no_mask(two: Path, tmp_path: Path) -> None:
     levels = np.arange(mask().size).reshape(mask().shape) % 200
     (tmp_path / "x.png").write_bytes(encode_png(levels.astype(np.uint8)))
     given = ("outline", str(two), "--from", str(tmp_path / "x.png"), "--sd", "1px", "--name", "t")
-    assert "199 values, no mask of regions" in refused(*given, "-o", str(tmp_path / "c.mcap"))
+    assert "199 values, not a mask of regions" in refused(*given, "-o", str(tmp_path / "c.mcap"))
 
 
 def test_what_is_no_outline_is_one_line(two: Path, moving: Path, tmp_path: Path) -> None:
@@ -295,7 +298,7 @@ def test_what_is_no_outline_is_one_line(two: Path, moving: Path, tmp_path: Path)
         ("two.png", "2 closed lines, expected one region"),
         ("small.png", "mask 0 is (50, 150), its image (110, 150)"),
         ("late.csv", "outlines of 1 images, image 9 among them; 'images' has the images 0 to 0"),
-        ("bad.csv", "are no numbers"),
+        ("bad.csv", "are not numbers"),
         ("bad.json", "neither LabelMe nor COCO polygons"),
         ("none.png", "cannot be read"),
         ("x.doc", "outlines come as .png"),
@@ -303,7 +306,7 @@ def test_what_is_no_outline_is_one_line(two: Path, moving: Path, tmp_path: Path)
         told = refused("outline", str(two), "--from", str(tmp_path / name), "--sd", "1px")
         assert why in told, name
     assert "expected a length with its unit" in refused("outline", str(moving), "--centre", "3,4")
-    assert "has a stream 'images' already" in refused("outline", str(moving), "--name", "images")
+    assert "already has a stream 'images'" in refused("outline", str(moving), "--name", "images")
 
 
 def test_images_of_several_sizes_are_streams_of_their_own(tmp_path: Path) -> None:
@@ -318,7 +321,7 @@ def test_images_of_several_sizes_are_streams_of_their_own(tmp_path: Path) -> Non
         "images_30x20": [0.0, 0.2],
         "images_32x24": [0.1, 0.3],
     }
-    assert "say which: --topic NAME" in refused("outline", str(out))
+    assert "choose one: --topic NAME" in refused("outline", str(out))
 
 
 @pytest.mark.parametrize(
@@ -352,7 +355,7 @@ def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
     (tmp_path / "a.csv").write_text("frame,x,y\n")
     with pytest.raises(UsageError, match=r"--label cyst: of masks and polygons; a.csv has none"):
         foreign_outline._read(tmp_path / "a.csv", frames, "cyst")
-    with pytest.raises(UsageError, match=r"unit kg of a.csv: px, or a length as mm"):
+    with pytest.raises(UsageError, match=r"unit kg of a.csv: expected px, or a unit of length"):
         foreign_outline._scale(tmp_path / "a.csv", frames, "kg")
     assert foreign_outline._scale(tmp_path / "a.csv", frames, "mm").tolist() == [1e-3, 1e-3]
     assert foreign_outline._scale(tmp_path / "a.npy", frames, "mm").tolist() == [SIDE, SIDE]

@@ -55,7 +55,7 @@ def test_the_list_runs_no_file_and_a_broken_one_hides_no_other(own: Path) -> Non
 def test_one_of_the_users_hiding_a_shipped_one_is_said(own: Path) -> None:
     (own / "experiments" / "kf_cube.py").write_text("EXPERIMENT = None", "utf-8")
     shown = here("list", cwd=own)[1]
-    assert "experiments/kf_cube.py: is meant by this name, not the shipped one" in shown
+    assert "experiments/kf_cube.py: this file replaces the shipped experiment of this name" in shown
 
 
 @pytest.mark.parametrize(

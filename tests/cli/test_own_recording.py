@@ -134,7 +134,7 @@ def test_merge_refuses_equal_topics_and_one_file(own_files: Path) -> None:
     code, _, err = called(["merge", "a.mcap", "a.mcap", "-o", "b.mcap"])
     assert (code, "['displacement', 'force'] occur in several" in err) == (2, True)
     code, _, err = called(["merge", "a.mcap", "-o", "b.mcap"])
-    assert (code, "1 recordings to merge, at least 2" in err) == (2, True)
+    assert (code, "1 recordings to merge; give at least 2" in err) == (2, True)
     assert not (own_files / "b.mcap").exists()
 
 
@@ -148,11 +148,11 @@ def test_a_stack_needs_scale_and_rate_and_a_shift_is_checked(own_files: Path) ->
     assert "expected SECONDS" in called([*both, "us=soon"])[2]
     assert "0 of 100 samples (0 %) meet" in called([*both, "us=60"])[2]
     assert "no other stream" in called([*both, "images=1"])[2]
-    assert "clocks are taken as one" in called(both[:-1])[2]
-    assert "clocks are taken as one" not in called([*both, "us=0"])[2]
+    assert "are assumed to share one clock" in called(both[:-1])[2]
+    assert "are assumed to share one clock" not in called([*both, "us=0"])[2]
     code, _, err = called(["import", "log.csv", "--as", "png-stack", "-o", "x.mcap",
                            "--m-per-px", "1", "--rate", "1"])  # fmt: skip
-    assert (code, "no folder of PNG images" in err) == (2, True)
+    assert (code, "not a folder of PNG images" in err) == (2, True)
 
 
 def test_merged_streams_keep_their_moments_and_differing_records() -> None:

@@ -121,7 +121,7 @@ CORNER = Corner("contour.top_left", np.deg2rad(225.0), "a corner")
 
 
 def holds_of(t: Floats) -> tuple[Selection, ...]:
-    words = "one sample at the hold"
+    words = "one sample at the load step"
     at = zip(("0mm", "4mm", "9mm"), t, strict=True)
     return tuple(Selection(label, np.array([instant]), words) for label, instant in at)
 

@@ -327,7 +327,7 @@ def test_a_model_of_its_own_recording_is_never_confirmed_but_may_fail() -> None:
 
 def test_what_compared_nothing_says_so_with_and_without_a_requirement() -> None:
     for accept, word in ((required(1.0), "nothing compared"), (Accept("p"), "no requirement")):
-        check = nothing_compared(accept, "p@9mm", "Pa", "no such load")
+        check = nothing_compared(accept, "p@9mm", "Pa", "unknown load")
         assert (check.acceptance, check.validation) == (word, "nothing compared")
         assert (check.verdict, check.count, check.margin) == ("nothing compared", 0, None)
 

@@ -115,9 +115,10 @@ def test_a_changed_file_is_not_kept_and_the_others_come(server: Server, logs: Da
     with pytest.raises(RecordingError) as caught:
         bring(logs, nothing)
     assert str(caught.value) == (
-        f"1 of 2 files did not come: LICENSE: what lies at {server.base}/lab/logs/0123456/raw/"
-        f"LICENSE is not the registered file (sha256 {logs.files[0].sha256[:12]}..., 11 bytes); "
-        "nothing of it was kept"
+        f"1 of 2 files could not be downloaded: LICENSE: the file at "
+        f"{server.base}/lab/logs/0123456/raw/"
+        f"LICENSE is not the registered one (sha256 {logs.files[0].sha256[:12]}..., 11 bytes); "
+        "the download is discarded"
     )
     assert kept() == ["log.csv"]
 
@@ -126,7 +127,7 @@ def test_a_cut_transfer_leaves_nothing_and_the_next_one_mends_it(
     server: Server, logs: DataSet
 ) -> None:
     server.holds("raw/log.csv", LOG[:200_000], said=len(LOG))
-    with pytest.raises(RecordingError, match=r"log\.csv: the transfer from .* was cut before its"):
+    with pytest.raises(RecordingError, match=r"log\.csv: the transfer from .* ended before its"):
         bring(logs, nothing)
     assert kept() == ["LICENSE"]
     server.holds("raw/log.csv", LOG)
@@ -141,7 +142,7 @@ def test_a_damaged_file_of_the_cache_is_brought_anew_and_stays_till_then(
     damaged = cache_folder() / "force/logs/first/log.csv"
     damaged.write_bytes(b"half")
     server.holds("raw/log.csv", LOG[:10], said=len(LOG))
-    with pytest.raises(RecordingError, match="was cut"):
+    with pytest.raises(RecordingError, match="ended before"):
         bring(logs, nothing)
     assert damaged.read_bytes() == b"half"
     server.holds("raw/log.csv", LOG)
@@ -153,7 +154,7 @@ def test_a_damaged_file_of_the_cache_is_brought_anew_and_stays_till_then(
 def test_a_server_that_refuses_is_one_line(server: Server, logs: DataSet, status: int) -> None:
     server.holds("raw/log.csv", b"no", status=status)
     with pytest.raises(
-        RecordingError, match=rf"1 of 2 files did not come: first/log\.csv: {status}"
+        RecordingError, match=rf"1 of 2 files could not be downloaded: first/log\.csv: {status}"
     ):
         bring(logs, nothing)
     assert kept() == ["LICENSE"]
@@ -167,7 +168,7 @@ def test_without_a_network_the_command_says_so_in_one_line(
     monkeypatch.setattr(registry, "RAW", nowhere)
     line = refused("data", "get", "logs")
     assert "127.0.0.1" in line
-    assert "cannot be reached; look at the network and run the command again" in line
+    assert "cannot be reached; check the network and run the command again" in line
     assert kept() == []
 
 
@@ -188,7 +189,7 @@ def test_the_command_brings_says_what_to_cite_and_knows_what_is_here(
 ) -> None:
     code, out, _ = here("data", "get", "logs")
     assert code == 0
-    assert "2 files came, 0 were there" in out
+    assert "2 files downloaded, 0 already present" in out
     assert "licence MIT; cite: Lab (2026). https://github.com/lab/logs/tree/0123456" in out
     listed = json.loads(here("data", "--json")[1])[0]
     assert listed["here"] == str(cache_folder())
@@ -196,7 +197,7 @@ def test_the_command_brings_says_what_to_cite_and_knows_what_is_here(
         "name": "LICENSE", "address": f"{server.base}/lab/logs/0123456/raw/LICENSE",
         "sha256": logs.files[0].sha256, "bytes": 11,
     }  # fmt: skip
-    assert "is here already" in here("data", "get", "logs")[1]
+    assert "is already here" in here("data", "get", "logs")[1]
     assert "logs" in here("data")[1]
     assert server.asked == ["LICENSE", "log.csv"]
 
@@ -241,7 +242,7 @@ def test_rows_of_a_program_become_the_registered_file(
     bring(replace(logs, files=(rows,)), nothing)
     assert (cache_folder() / "force/logs/pull.csv").read_bytes() == content
     wrong = replace(rows, name="other.csv", header="x,z")
-    with pytest.raises(RecordingError, match=r"other\.csv: what lies at .* is not the registered"):
+    with pytest.raises(RecordingError, match=r"other\.csv: the file at .* is not the registered"):
         bring(replace(logs, files=(wrong,)), nothing)
     assert kept() == ["pull.csv"]
 
@@ -253,9 +254,9 @@ def test_what_was_made_by_hand_is_not_brought(
     made = replace(logs, files=(by_hand,), made="the rows of data.jl")
     monkeypatch.setattr(registry, "data_sets", lambda: (made,))
     line = refused("data", "get", "logs")
-    assert "logs cannot be brought: the rows of data.jl" in line
+    assert "logs cannot be downloaded: the rows of data.jl" in line
     some = replace(logs, files=(by_hand, logs.files[1]), made="the rows of data.jl")
     monkeypatch.setattr(registry, "data_sets", lambda: (some,))
     code, out, _ = here("data", "get", "logs")
     assert code == 0
-    assert "1 did not come: the rows of data.jl" in out
+    assert "1 files are not downloadable: the rows of data.jl" in out

@@ -61,13 +61,13 @@ def test_what_is_absent_names_the_command(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as caught:
         found(FOLDER, FILE, tmp_path / "p" / "experiments")
     assert str(caught.value) == (
-        f"{FOLDER}/{FILE} is not here: `validate data get silicone-beam` brings it "
+        f"{FOLDER}/{FILE} is missing: `validate data get silicone-beam` downloads it "
         "(srl-ethz/diffPD_sim2real 825e7b7, MIT); or pass --set recording=FILE, or set "
         "VALIDATE_SHARED_DATA to a folder that holds it"
     )
     with pytest.raises(RecordingError, match=r"--set landmarks=FILE"):
         found(FOLDER, FILE, tmp_path / "p" / "experiments", by="landmarks")
-    with pytest.raises(RecordingError, match=r"`validate data get rubber-strip` says what it is"):
+    with pytest.raises(RecordingError, match=r"`validate data get rubber-strip` describes how to"):
         found("markers/rubber-strip", "points3d_mm.npz", tmp_path / "p" / "experiments")
     with pytest.raises(RecordingError, match=r"get skin-pads`.*--set data=FOLDER"):
         found("force/skin-pads", None, tmp_path / "p" / "experiments")

@@ -61,11 +61,11 @@ def test_it_agrees_with_the_csv_of_the_same_motion(shared_data: Path) -> None:
 
 def test_a_unit_that_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path / "x.c3d", unit="")
-    with pytest.raises(UsageError, match="states no unit of length; say it: --map unit=mm"):
+    with pytest.raises(UsageError, match="has no unit of length; give --map unit=mm"):
         read_c3d(path, {})
     x = read_c3d(path, {"unit": "cm"}).marker("markers").x
     assert x[0, 1].tolist() == pytest.approx([0.05, 0.15, 0.25])
-    with pytest.raises(UsageError, match="states the unit 'N' of length"):
+    with pytest.raises(UsageError, match="has the unit 'N' of length"):
         read_c3d(written(tmp_path / "n.c3d", unit="N"), {})
 
 
@@ -103,8 +103,8 @@ def test_a_cut_file_is_told_with_its_bytes_before_any_library_reads_it(tmp_path:
         ("import os; os.kill(os.getpid(), 11)", "ended with signal 11"),
         ("import sys; sys.exit(7)", "ended with code 7"),
         ("raise ValueError('odd\\nblock')", r"damaged \(odd block\)"),
-        ("bytearray(2**33)", "wants more than"),
-        ("any(iter(int, 1))", "took over 1 s for 1 bytes and was ended"),
+        ("bytearray(2**33)", "needs more than"),
+        ("any(iter(int, 1))", "its reader was stopped after 1 s for 1 bytes"),
     ],
 )
 def test_a_library_that_crashes_costs_one_line(
@@ -146,7 +146,7 @@ def test_a_forged_number_of_values_is_told_before_any_library_reads_it(
     raw[at : at + 8] = bytes([7, *[255] * 7])
     path.write_bytes(raw)
     monkeypatch.setattr("validate.recording.formats.c3d.decoded", None)
-    with pytest.raises(RecordingError, match=rf"'{name.decode()}' tells of 7\.01e\+16 values"):
+    with pytest.raises(RecordingError, match=rf"'{name.decode()}' declares 7\.01e\+16 values"):
         read_c3d(path, {})
 
 
@@ -177,7 +177,7 @@ def test_a_file_of_whole_numbers_is_as_long_as_its_own_processor_says(
     path.write_bytes(whole + bytes(3 * 2 * 4 * 2))
     _require_whole(path)
     path.write_bytes(whole + bytes(3 * 2 * 4 * 2 - 1))
-    with pytest.raises(RecordingError, match="1072 bytes; cut"):
+    with pytest.raises(RecordingError, match="1072 bytes; truncated"):
         _require_whole(path)
 
 
@@ -236,7 +236,7 @@ def test_force_plates_alone_need_no_unit_of_length(tmp_path: Path) -> None:
     assert not got.markers
     np.testing.assert_allclose(got.signals["analog/Fz"].y[:, 0], np.arange(10))
     assert got.signals["analog/Fz"].t[-1] == pytest.approx(9 / 200)
-    assert got.unread == {"analog/Fx": "1 numbers are none"}
+    assert got.unread == {"analog/Fx": "1 values are not numbers"}
 
 
 def test_points_of_three_zeros_were_not_seen(tmp_path: Path) -> None:
@@ -307,9 +307,9 @@ def test_whole_numbers_without_a_sign_are_read_as_such(tmp_path: Path, first: in
 @pytest.mark.parametrize(
     ("rate", "says"),
     [
-        (0.0, "0 frames a second stated; expected above 0"),
-        (float("nan"), "nan frames a second stated; expected above 0"),
-        (100.0, "neither points that were seen nor channels: {'markers': 'never seen'}"),
+        (0.0, "0 frames per second declared; expected above 0"),
+        (float("nan"), "nan frames per second declared; expected above 0"),
+        (100.0, "neither visible points nor channels: {'markers': 'never seen'}"),
     ],
 )
 def test_a_file_without_a_rate_or_streams_is_refused(
@@ -328,5 +328,5 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     (tmp_path / "file").write_bytes(b"x" * 7)
     monkeypatch.setattr(apart, "_LOADING", 0)
     monkeypatch.setattr(apart, "_SHARED", 0)
-    with pytest.raises(RecordingError, match="file: its reader took over 0 s for 7 bytes and was"):
+    with pytest.raises(RecordingError, match="file: its reader was stopped after 0 s for 7 bytes"):
         apart.decoded("c3d_arrays", tmp_path / "file")

@@ -109,7 +109,7 @@ def test_every_export_holds_the_same_points(name: str, tmp_path: Path) -> None:
         assert got.unread == (
             {}
             if quaternion
-            else {"Box": "its rotation is no quaternion; export it as Rotation Type Quaternion"}
+            else {"Box": "its rotation is not a quaternion; export it as Rotation Type Quaternion"}
         )
 
 
@@ -130,7 +130,7 @@ def test_a_row_that_begins_with_null_loses_no_row(tmp_path: Path) -> None:
 
 def test_zeros_that_were_taken_as_not_seen_are_told(tmp_path: Path) -> None:
     got = read(tmp_path / "x.csv", CASES["vicon zeros"])
-    assert got.metadata["provenance"]["three zeros"] == "1 points, taken as not seen"
+    assert got.metadata["provenance"]["three zeros"] == "1 points, taken as missing"
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_zeros_that_were_taken_as_not_seen_are_told(tmp_path: Path) -> None:
         (qualisys("blank", 2).replace("\t3D", "\tAnalog"), "data of kind 'Analog'; 3D and 6D are"),
         (qualisys("blank", 2).replace("\t3D", "\t6D"), "8 columns for 2 bodies; expected 16 each"),
         ("Objects\n100\n,,Box\nFrame,Sub Frame,RX\n,,rad\n1,0,0.1\n", "it has Objects"),
-        (vicon(";", "blank").replace("1.5", "1,5"), "'1,5' is no number"),
+        (vicon(";", "blank").replace("1.5", "1,5"), "'1,5' is not a number"),
     ],
 )
 def test_what_is_not_read_is_named(text: str, says: str, tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_two_blocks_of_devices_are_both_read_and_events_told(tmp_path: Path) -> 
         "analog/Plate.Fz (2) (1)": 2, "analog/Plate.Fz (2) (2)": 2.5,
     }  # fmt: skip
     told = got.metadata["provenance"]["events"]
-    assert told.startswith("Left Foot Strike 1.03 s (of the trial")
+    assert told.startswith("Left Foot Strike 1.03 s (events of the trial")
     assert not got.unread
 
 
@@ -185,7 +185,7 @@ def test_every_event_of_qualisys_is_told(tmp_path: Path) -> None:
         "MARKER_NAMES", "EVENT\tToe off\t7\t0.06\nMARKER_NAMES"
     )
     told = written(tmp_path / "x.tsv", text).metadata["provenance"]
-    assert told["events"].startswith("Heel strike 0.04 s; Toe off 0.06 s (of the trial")
+    assert told["events"].startswith("Heel strike 0.04 s; Toe off 0.06 s (events of the trial")
 
 
 def test_a_code_of_time_beside_the_times_of_qualisys_is_no_coordinate(tmp_path: Path) -> None:
@@ -218,16 +218,16 @@ def test_times_rounded_to_equal_ones_are_counted_at_the_stated_rate(tmp_path: Pa
     times = [f"{k / 2000:.3f}" for k in range(9)]
     got = written(tmp_path / "x.trc", trc(times, "2000"))
     assert got.marker("markers").t.tolist() == pytest.approx(np.arange(9) / 2000)
-    assert "2000 Hz that it states" in got.metadata["provenance"]["assumed"]
+    assert "2000 Hz that the file declares" in got.metadata["provenance"]["assumed"]
     (tmp_path / "y.trc").write_text(trc(["0", "0.1", "0.1"], "2000"))
-    with pytest.raises(RecordingError, match=r"row 3 is not after .* say --map rate=HZ"):
+    with pytest.raises(RecordingError, match=r"row 3 is not after .* give --map rate=HZ"):
         recognised(tmp_path / "y.trc").read(tmp_path / "y.trc", {})
 
 
 def test_three_zeros_of_a_trc_are_not_seen(tmp_path: Path) -> None:
     got = written(tmp_path / "x.trc", trc(["0", "0.1"], "10", "0"))
     assert np.isnan(got.marker("markers").x).all()
-    assert got.metadata["provenance"]["three zeros"] == "2 points, taken as not seen"
+    assert got.metadata["provenance"]["three zeros"] == "2 points, taken as missing"
 
 
 @pytest.mark.parametrize("before", [True, False])
@@ -272,7 +272,7 @@ def test_a_text_of_nexus_1_is_called_so(tmp_path: Path, end: str) -> None:
         (
             "x.csv",
             vicon(",", "zeros").replace("\n100\n", "\nfast\n"),
-            "line 2: 'fast' is no rate in Hz",
+            "line 2: 'fast' is not a rate in Hz",
         ),
         (
             "x.csv",
@@ -299,8 +299,8 @@ def test_a_body_that_was_never_tracked_is_reported_with_its_count(tmp_path: Path
     text = "NO_OF_FRAMES\t2\nNO_OF_BODIES\t1\nFREQUENCY\t100\nDATA_INCLUDED\t6D\nBODY_NAMES\tA\n"
     text += ("\t".join(["0.000"] * 6 + ["-1.000"] + ["0.000"] * 9) + "\n") * 2
     (tmp_path / "x.tsv").write_text(text, "utf-8")
-    with pytest.raises(RecordingError, match=r"no body was seen: {'A': '2 of 2'}"):
+    with pytest.raises(RecordingError, match=r"no body is visible: {'A': '2 of 2'}"):
         read_qualisys(tmp_path / "x.tsv", {})
     (tmp_path / "x.tsv").write_text(text.replace("Y\t100", "Y\tfast"), "utf-8")
-    with pytest.raises(RecordingError, match="FREQUENCY 'fast' is no number of Hz above 0"):
+    with pytest.raises(RecordingError, match="FREQUENCY 'fast' is not a rate above 0 Hz"):
         read_qualisys(tmp_path / "x.tsv", {})

@@ -148,5 +148,5 @@ def test_markers_of_millimetres_taken_as_metres_are_asked_back() -> None:
     made = Recording("r", Source("r", "", 0, ""), 0,
                      markers={"m": Markers(np.zeros(1), ("a", "b"), x, 0.0, "lab")})  # fmt: skip
     (line,) = odd_scales(made)
-    assert "markers 120 m apart are outside 0.001 to 50 m" in line
+    assert "marker distances of 120 m are outside 0.001 to 50 m" in line
     assert "a factor 1000?" in line

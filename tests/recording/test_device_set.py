@@ -31,8 +31,8 @@ def test_lengths_are_metres(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("", "0 bytes"),
-        (TEXT.replace("</Geometry>", ""), "no XML, or damaged"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]>' + TEXT, "without declarations"),
+        (TEXT.replace("</Geometry>", ""), "not XML, or damaged"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]>' + TEXT, "without DTD declarations"),
         (TEXT.replace("210", "x"), "not 16 finite numbers"),
         (TEXT.replace("104.3 5", "104.3"), "not 3 finite numbers"),
         (TEXT.replace('"0.5"', '"nan"'), "not 1 finite numbers"),

@@ -71,9 +71,9 @@ def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
 
 
 def test_what_is_not_stated_is_asked_for() -> None:
-    with pytest.raises(UsageError, match="2 images without times; say --map rate=HZ"):
+    with pytest.raises(UsageError, match="2 images without times; give --map rate=HZ"):
         read_dicom(DATA / "OBXXXX1A_2frame.dcm", {})
-    with pytest.raises(UsageError, match=r"states no scale, .* say --map m_per_px=0.1mm"):
+    with pytest.raises(UsageError, match=r"has no scale, .* give --map m_per_px=0.1mm"):
         read_dicom(DATA / "US1_UNCR.dcm", {})
 
 
@@ -84,8 +84,8 @@ def test_what_is_not_stated_is_asked_for() -> None:
         (DATA / "SC_rgb_32bit.dcm", "pixels of uint32; those of 8 and 16 bits are read"),
         (BESIDE / "dicomdirtests/98892003/MR700", "7 images of 7 places: slices of a volume"),
         (BESIDE / "dicomdirtests/98892003/MR1", r"3 series in one folder, of \[1, 1, 1\] files"),
-        (BESIDE / "dicomdirtests", r"1 of 7 files are no DICOM \(README.txt\); take them out"),
-        (BESIDE / "JPEG-lossy.dcm", "are in .JPEG Extended.*make it uncompressed first"),
+        (BESIDE / "dicomdirtests", r"1 of 7 files are not DICOM \(README.txt\); take them out"),
+        (BESIDE / "JPEG-lossy.dcm", "are in .JPEG Extended.*decompress it first"),
     ],
 )
 def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:
@@ -108,8 +108,8 @@ def test_16_bits_become_8_by_a_level_that_is_told() -> None:
         expected = np.rint(np.clip(deep * (255 / white), 0, 255))
         assert (got.frame("images").images[0] == expected).all()
         told = got.metadata["provenance"]
-        assert f"16 bits made 8: 0 to {white} (" in told["levels"]
-        assert told["scale"] == "0.661468 x 0.661468 mm a pixel (PixelSpacing)"
+        assert f"16 bits converted to 8: 0 to {white} (" in told["levels"]
+        assert told["scale"] == "0.661468 x 0.661468 mm per pixel (PixelSpacing)"
 
 
 def series(folder: Path, **changed: dict[int, object]) -> Path:
@@ -137,7 +137,7 @@ def test_a_folder_of_one_series_is_one_sequence(tmp_path: Path) -> None:
     assert frames.m_per_px == pytest.approx((2.622878766e-4, 2.622878766e-4), rel=1e-9)
     told = got.metadata["provenance"]
     assert told["times"] == "ContentTime"
-    assert told["scale"].endswith("mm a pixel (SequenceOfUltrasoundRegions)")
+    assert told["scale"].endswith("mm per pixel (SequenceOfUltrasoundRegions)")
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_a_folder_of_one_series_is_one_sequence(tmp_path: Path) -> None:
     [
         ({"InstanceNumber": {2: 1}}, "3 instance numbers of 4 files"),
         ({"NumberOfFrames": {2: 2}}, "1 files of several images each; import them one by one"),
-        ({"ContentTime": {2: "125959.10"}}, "4 images without times; say --map rate=HZ"),
+        ({"ContentTime": {2: "125959.10"}}, "4 images without times; give --map rate=HZ"),
         ({"SliceLocation": {i: 1.5 * i for i in range(4)}}, "4 images of 4 places: slices of a"),
         ({"SeriesInstanceUID": {0: "1.2.3"}}, r"2 series in one folder, of \[1, 3\] files"),
     ],
@@ -239,8 +239,11 @@ def test_lossless_jpeg_is_read_bit_for_bit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "why"),
     [
-        (DATA / "emri_small.dcm", r"10 slices of a volume \(1.2 mm apart, without times\)"),
-        (BESIDE / "rtdose.dcm", r"15 slices of a volume \(counted by their distance\)"),
+        (
+            DATA / "emri_small.dcm",
+            r"10 slices of a volume \(1.2 mm between slices, without times\)",
+        ),
+        (BESIDE / "rtdose.dcm", r"15 slices of a volume \(spaced by distance\)"),
         (DATA / "eCT_Supplemental.dcm", r"2 slices of a volume \(of 2 places\)"),
     ],
 )
@@ -266,14 +269,14 @@ def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(tmp_path: P
     ds = of_pixels(pydicom.uid.MPEG4HP41, packed)
     ds["PixelData"].is_undefined_length = True
     ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
-    with pytest.raises(RecordingError, match=r"as by `gdcmraw -i x\.dcm -o x\.mp4`"):
+    with pytest.raises(RecordingError, match=r"as with `gdcmraw -i x\.dcm -o x\.mp4`"):
         read_dicom(tmp_path / "x.dcm", {})
 
 
 def test_more_images_than_stated_are_not_cut_off(tmp_path: Path) -> None:
     ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(4 * 24))
     ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
-    with pytest.raises(RecordingError, match="more images than the 3 that its header tells of"):
+    with pytest.raises(RecordingError, match="more images than the 3 that its header declares"):
         read_dicom(tmp_path / "x.dcm", {})
 
 
@@ -324,7 +327,7 @@ def test_images_that_are_too_many_of_several_sizes_or_missing(
         dicom_arrays._images([ds, other])
     image = np.zeros((4, 6), np.uint8)
     monkeypatch.setattr(dicom_arrays, "_frames", lambda ds: iter([image, image]))
-    with pytest.raises(RecordingError, match="2 of 3 images can be read: cut or damaged"):
+    with pytest.raises(RecordingError, match="2 of 3 images can be read: truncated or damaged"):
         dicom_arrays._images([ds])
     monkeypatch.setattr(dicom_arrays, "MAX_PIXELS", 71)
     with pytest.raises(RecordingError, match=r"\(3, 4, 6\) pixels, the limit is 71; split"):

@@ -87,7 +87,7 @@ CASES: dict[str, tuple[str, dict[str, str], int]] = {
                                     F / (100 * np.pi)),
         {"force": "Load (kN):N"}, 3,
     ),
-    "rows of one time": (table("Time (s),Stroke (mm),Load (N)", TWICE, D, F), {}, 3),
+    "rows of equal time": (table("Time (s),Stroke (mm),Load (N)", TWICE, D, F), {}, 3),
     "two specimens": (
         "Specimen 1\n" + table("Time (s),Stroke (mm),Load (N)", T, D, F)
         + "Specimen 2\n" + table("Time (s),Stroke (mm),Load (N)", T, D, 2 * F), {}, 3,

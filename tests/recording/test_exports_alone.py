@@ -29,7 +29,7 @@ def test_a_force_alone_is_taken_when_it_is_said_so(tmp_path: Path) -> None:
     assert found.record(ASSUMED)["signs"].startswith("as written")
     turned = read_instron(path, {"displacement": "none", "force": "Forza (N):-"})
     assert np.allclose(turned.signal("force", "N").y[:, 0], -F, rtol=0, atol=1e-6)
-    assert turned.record(ASSUMED)["signs"] == "turned, as said"
+    assert turned.record(ASSUMED)["signs"] == "reversed, as given by --map"
 
 
 def test_a_stage_alone_and_nothing(tmp_path: Path) -> None:
@@ -38,5 +38,5 @@ def test_a_stage_alone_and_nothing(tmp_path: Path) -> None:
         read_instron(path)
     found = read_instron(path, {"force": "none"}).signal("displacement", "m")
     assert np.allclose(found.y[:, 0], D / 1e3, rtol=0, atol=1e-9)
-    with pytest.raises(UsageError, match="nothing is left"):
+    with pytest.raises(UsageError, match="no column is left"):
         read_instron(path, {"force": "none", "displacement": "none"})

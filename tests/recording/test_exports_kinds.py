@@ -21,7 +21,7 @@ from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.types import Recording
 
 BARE = "Time (s),Displacement (mm),Load (N)\n"
-ASKED = "nothing says whether this test presses or pulls: .*--map test=compression or --map test=t"
+ASKED = "the file does not tell compression from tension: .*--map test=compression or --map test=t"
 
 
 def read(folder: Path, text: str, **mapping: str) -> Recording:
@@ -131,7 +131,7 @@ def test_what_says_nothing_or_both_is_asked_and_the_answer_is_taken(
     for kind, wanted in (("compression", PRESSES), ("tension", PULLS)):
         recording = read(tmp_path, text, test=kind)
         assert sense(recording) == wanted
-        assert recording.record(ASSUMED)["test"] == f"{kind}: said by the user"
+        assert recording.record(ASSUMED)["test"] == f"{kind}: given by --map"
 
 
 def test_both_negative_tells_nothing_and_the_answer_says_what_was_flipped(tmp_path: Path) -> None:
@@ -164,12 +164,14 @@ def test_a_sign_that_is_said_makes_the_kind_immaterial(tmp_path: Path) -> None:
 def test_a_sign_that_is_said_is_believed_over_the_header(tmp_path: Path) -> None:
     text = "Tensile test\n" + BARE + rows()
     assert sense(read(tmp_path, text, force="Load:+")) == PRESSES
-    with pytest.raises(UsageError, match=r"test=tension: the signs given .* make it compression"):
+    with pytest.raises(
+        UsageError, match=r"test=tension: the signs of the other --map options mean compression"
+    ):
         read(tmp_path, text, test="tension", force="Load:+")
 
 
 def test_a_kind_that_is_neither_is_refused() -> None:
-    with pytest.raises(UsageError, match="test=bending: a test is one of tension, compression"):
+    with pytest.raises(UsageError, match="test=bending: expected tension or compression"):
         kind_of_test("bending", {}, ())
 
 
@@ -208,5 +210,5 @@ def test_a_bent_or_indented_body_is_told_what_to_answer(name: str, tmp_path: Pat
     path = tmp_path / "log.csv"
     lines = "".join(f"{t},{d},{f}\n" for t, d, f in zip(T, D, F, strict=True))
     path.write_text(BARE.replace("Displacement (mm)", name) + lines)
-    with pytest.raises(UsageError, match=ASKED + ".* say compression .* experiment = body"):
+    with pytest.raises(UsageError, match=ASKED + ".* give compression .* experiment = body"):
         read_instron(path, {})

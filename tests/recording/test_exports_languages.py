@@ -169,7 +169,7 @@ def test_what_decided_the_encoding_is_told() -> None:
     doubtful = decode("Łódź\n".encode("cp1250"))
     assert (doubtful.encoding, "cp1250 would fit" in doubtful.why) == ("cp1252", True)
     assert decode("Łódź\n".encode("cp1250"), "cp1250").text == "Łódź\n"
-    with pytest.raises(UsageError, match="no such encoding"):
+    with pytest.raises(UsageError, match="unknown encoding"):
         decode(b"abc", "klingon")
 
 
@@ -216,7 +216,7 @@ def test_a_column_that_no_word_names_is_offered_before_a_strain(tmp_path: Path) 
     )
     with pytest.raises(RecordingError) as raised:
         read(tmp_path, text, test=None)
-    said = "(if 'Koloumb (mm)' is the displacement, say --map 'displacement=Koloumb (mm)' alone)"
+    said = "(if 'Koloumb (mm)' is the displacement, give --map 'displacement=Koloumb (mm)' alone)"
     assert said in str(raised.value)
     recording = read(tmp_path, text, test=None, displacement="Koloumb (mm)")
     assert np.allclose(recording.signals["displacement"].y[:, 0], -D * 1e-3)

@@ -22,16 +22,16 @@ def beside(name: str, cell: str, units: str = "") -> str:
 @pytest.mark.parametrize(
     ("name", "cell", "told"),
     [
-        ("Stress (N)", "1", "column 'Stress (N)': 'N' is no unit of stress"),
+        ("Stress (N)", "1", "column 'Stress (N)': 'N' is not a unit of stress"),
         ("Stress (MPa)", "", "column 'Stress (MPa)': empty"),
         ("Strain (%)", "", "column 'Strain (%)': empty"),
         ("Strain (%)", "---", "column 'Strain (%)': empty"),
         ("Strain", "0.1", "column 'Strain': no unit for strain"),
-        ("Strain (N)", "0.1", "column 'Strain (N)': 'N' is no unit of strain"),
-        ("Force 2 (V)", "0.1", "column 'Force 2 (V)': 'V' is no unit of force"),
+        ("Strain (N)", "0.1", "column 'Strain (N)': 'N' is not a unit of strain"),
+        ("Force 2 (V)", "0.1", "column 'Force 2 (V)': 'V' is not a unit of force"),
         ("Force 2 (N)", "", "column 'Force 2 (N)': empty"),
         ("Position", "4", "column 'Position': no unit for displacement"),
-        ("Zeit (V)", "4", "column 'Zeit (V)': 'V' is no unit of time"),
+        ("Zeit (V)", "4", "column 'Zeit (V)': 'V' is not a unit of time"),
         ("Temperature (C)", "", "column 'Temperature (C)': empty"),
     ],
 )

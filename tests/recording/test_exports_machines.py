@@ -107,10 +107,10 @@ def test_time_is_a_word_of_many_languages(word: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(text, "utf-8")
     recording = read_instron(tmp_path / "log.csv", {"test": "compression"})
     assert_test(recording)
-    assert "'V' is no unit of stress" in recording.record("provenance")[LEFT_OUT]
+    assert "'V' is not a unit of stress" in recording.record("provenance")[LEFT_OUT]
 
 
 def test_one_column_is_never_two_things(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("Time (s);Load (N);Stroke (mm)\n" + semicolons(T, D, F))
-    with pytest.raises(UsageError, match=r"'Stroke \(mm\)' would be displacement and force at"):
+    with pytest.raises(UsageError, match=r"'Stroke \(mm\)' would be both displacement and"):
         read_instron(tmp_path / "log.csv", {"test": "compression", "force": "Stroke (mm):N"})

@@ -88,7 +88,7 @@ def test_a_stretch_says_itself_which_way_it_goes(tmp_path: Path) -> None:
     recording = read(tmp_path, pressed, area="314mm2", length="20mm")
     assert recording.record("specimen")["test"] == "compression"
     assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
-    with pytest.raises(RecordingError, match=r"tension test .* goes below 1; say --map test=comp"):
+    with pytest.raises(RecordingError, match=r"tension test .* goes below 1; give --map test=comp"):
         read(tmp_path, pressed, area="314mm2", length="20mm", test="tension")
 
 
@@ -122,9 +122,9 @@ def test_the_sizes_of_a_header_count_where_they_are_meant(tmp_path: Path) -> Non
     assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
     area = np.pi * 0.025**2 / 4
     assert np.allclose(recording.signals["force"].y[:, 0], SIGMA * 1e3 * area)
-    assert "(of the header)" in recording.record(ASSUMED)["sizes"]
+    assert "(from the header)" in recording.record(ASSUMED)["sizes"]
     pulled = "Tensile test\nArea: 314 mm^2\nLength: 80 mm\n" + table(PLAIN, 100 * E, SIGMA)
-    with pytest.raises(RecordingError, match="the length that strain is measured on"):
+    with pytest.raises(RecordingError, match="the gauge length of the strain"):
         read(tmp_path, pulled, measure="engineering")
 
 
@@ -137,7 +137,7 @@ def test_one_of_the_two_may_be_written(tmp_path: Path) -> None:
 def test_a_true_stress_beside_a_displacement(tmp_path: Path) -> None:
     names = "Time (s),Extension (mm),True stress (kPa)\n"
     text = "Tensile test\n" + table(names, 3 + 1e3 * LENGTH * E, SIGMA * (1 + E))
-    with pytest.raises(RecordingError, match=r"the area that is left: give .*--map length=20mm"):
+    with pytest.raises(RecordingError, match=r"the current area: give .*--map length=20mm"):
         read(tmp_path, text, area="314mm2")
     force = read(tmp_path, text, area="314mm2", length="20mm").signals["force"].y[:, 0]
     assert np.allclose(force, -SIGMA * 1e3 * AREA, rtol=1e-9, atol=1e-12)
@@ -157,9 +157,9 @@ def test_a_strain_cannot_be_led_into_being_a_length(tmp_path: Path) -> None:
     for names in ("Time (s),Strain (%),Load (N)\n", "Time (s),Strain,Load (N)\n"):
         label = names.split(",")[1]
         text = "Tensile test\n" + table(names, 100 * E, SIGMA)
-        with pytest.raises(UsageError, match=r"it is a strain, which no unit makes a displacem"):
+        with pytest.raises(UsageError, match=r"this column is a strain, not a displacem"):
             read(tmp_path, text, displacement=f"{label}:mm")
-    with pytest.raises(UsageError, match=r"it is a stress, which no unit makes a force"):
+    with pytest.raises(UsageError, match=r"this column is a stress, not a force"):
         read(tmp_path, table(PLAIN, E, SIGMA), force="Stress (kPa):N")
     force = 1e3 * AREA * SIGMA
     text = "Tensile test\n" + table("Time (s),Strain (%),Load (N)\n", 100 * E, force)
@@ -171,7 +171,7 @@ def test_a_strain_cannot_be_led_into_being_a_length(tmp_path: Path) -> None:
     [
         ({"area": "314"}, "expected a size above 0 with a unit, as 314mm2"),
         ({"area": "-3mm2"}, "expected a size above 0"),
-        ({"length": "20mm2"}, "'mm2' is no unit of length"),
+        ({"length": "20mm2"}, "'mm2' is not a unit of length"),
         ({"measure": "nominal"}, "expected one of engineering, true"),
     ],
 )
@@ -190,7 +190,7 @@ def test_more_than_all_of_a_specimen_is_refused(tmp_path: Path) -> None:
 
 def test_a_name_that_says_its_measure_is_not_overruled(tmp_path: Path) -> None:
     text = table("Time (s),True strain (%),Stress (kPa)\n", 100 * E, SIGMA)
-    with pytest.raises(UsageError, match=r"'True strain \(%\)' says true itself"):
+    with pytest.raises(UsageError, match=r"'True strain \(%\)' names true itself"):
         read(tmp_path, text, **SIZES, test="tension")
 
 
@@ -227,7 +227,7 @@ def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
         ):
             sized._relative(picked("stretch", *values), "", None)
     with pytest.raises(
-        ValidateError, match="'strain' does not say whether the specimen is pressed"
+        ValidateError, match="'strain' does not show whether the specimen is pressed"
     ):
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
 
@@ -236,7 +236,9 @@ def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = {"strain": Said("e", "%", -1.0)}
-    with pytest.raises(UsageError, match="--map strain: no sign; say --map test=compression or"):
+    with pytest.raises(
+        UsageError, match="--map strain: no sign is allowed; give --map test=compression or"
+    ):
         sized._source("strain", None, said)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="--map repeated=both: expected first or last"):
         repeats.without_repeats(None, Said("every", "1s", None), "both")  # type: ignore[arg-type]

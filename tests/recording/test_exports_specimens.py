@@ -58,7 +58,7 @@ def test_several_specimens_are_named_and_chosen(name: str, tmp_path: Path) -> No
         read(tmp_path, text)
     assert_test(read(tmp_path, text, specimen="1"))
     assert_test(read(tmp_path, text, specimen="2"), f=2 * F)
-    with pytest.raises(UsageError, match="specimen=9: no such specimen"):
+    with pytest.raises(UsageError, match="specimen=9: unknown specimen"):
         read(tmp_path, text, specimen="9")
 
 

@@ -64,7 +64,7 @@ def test_png_round_trip_is_exact() -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"GIF89a", "no PNG"),
+        (b"GIF89a", "not a PNG"),
         (hand_made(MAX_SIDE + 1, 1, b""), "4097 x 1 px, allowed 1..4096"),
         (hand_made(2**31, 2**31, b""), "2147483648 x 2147483648 px"),
         (hand_made(0, 5, b""), "0 x 5 px"),
@@ -74,7 +74,7 @@ def test_png_round_trip_is_exact() -> None:
         (hand_made(2, 1, bytes(3), colour=3), "colour type 3"),
         (hand_made(1, 1, b"\0\1\2\3", colour=2), "1 coloured and 0 transparent pixels"),
         (encode_png(IMAGES[0])[:-12], "without an end"),
-        (encode_png(IMAGES[0])[:-20], "cut at byte"),
+        (encode_png(IMAGES[0])[:-20], "truncated at byte"),
     ],
 )
 def test_png_that_is_damaged_or_too_large_is_refused(data: bytes, message: str) -> None:
@@ -147,8 +147,8 @@ CALIBRATED = {
     ("changes", "metadata", "message"),
     [
         ({"format": "jpeg"}, CALIBRATED, "image format 'jpeg', readable: 'png'"),
-        ({"data": "!!"}, CALIBRATED, "no base64"),
-        ({"data": base64.b64encode(b"nothing").decode()}, CALIBRATED, "no PNG"),
+        ({"data": "!!"}, CALIBRATED, "not base64"),
+        ({"data": base64.b64encode(b"nothing").decode()}, CALIBRATED, "not a PNG"),
         ({}, CALIBRATED | {"pose//us": {}}, "no record 'pose//us' with T_frame_from_image"),
         ({}, CALIBRATED | {"calibration//us": {"m_per_px_x": "1"}}, "with m_per_px_y, 2 numbers"),
         (
@@ -258,7 +258,7 @@ def test_png_stacks_that_cannot_be_ordered_or_timed_are_refused(tmp_path: Path) 
     options = {**SCALE, "rate": "1"}
     with pytest.raises(RecordingError, match=r"no \*.png files"):
         read_png_stack(tmp_path, options)
-    with pytest.raises(UsageError, match="no folder of PNG images"):
+    with pytest.raises(UsageError, match="not a folder of PNG images"):
         read_png_stack(tmp_path / "absent", options)
     (tmp_path / "a1.png").write_bytes(encode_png(IMAGES[0]))
     with pytest.raises(UsageError, match="needs --m-per-px and --rate"):
@@ -271,7 +271,7 @@ def test_png_stacks_that_cannot_be_ordered_or_timed_are_refused(tmp_path: Path) 
         read_png_stack(tmp_path, options)
     (tmp_path / "a01.png").write_bytes(b"")
     (tmp_path / "a1.png").unlink()
-    with pytest.raises(RecordingError, match=r"a01.png: no PNG"):
+    with pytest.raises(RecordingError, match=r"a01.png: not a PNG"):
         read_png_stack(tmp_path, options)
 
 
@@ -343,12 +343,12 @@ def test_only_grey_of_8_bits_is_encoded(image: np.ndarray) -> None:
 
 def test_the_size_of_what_is_no_png_is_refused() -> None:
     assert png_size(encode_png(IMAGES[0])[:40]) == (23, 17)
-    with pytest.raises(RecordingError, match=r"no PNG .wrong first bytes.; only PNG images"):
+    with pytest.raises(RecordingError, match=r"not a PNG .wrong first bytes.; only PNG images"):
         png_size(b"GIF89a")
 
 
 def test_a_mosaic_narrower_than_its_filter_is_refused() -> None:
-    with pytest.raises(RecordingError, match=r"a mosaic of \(3, 8\), at least 4 px a side"):
+    with pytest.raises(RecordingError, match=r"a mosaic of \(3, 8\), at least 4 px per side"):
         demosaiced(np.zeros((3, 8), np.uint8), "RGGB")
     assert (demosaiced(np.full((4, 8), 90, np.uint8), "RGGB") == 90).all()
 

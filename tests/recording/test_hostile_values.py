@@ -60,7 +60,7 @@ def image(data: bytes) -> bytes:
 @pytest.mark.parametrize("side", [5_000, 12_000, 20_000, 60_000])
 def test_a_picture_that_declares_too_much_is_refused_by_its_header(side: int) -> None:
     """Beyond some 180 million pixels Pillow has an error of its own for it."""
-    with pytest.raises(RecordingError, match=r"px, allowed|damaged picture"):
+    with pytest.raises(RecordingError, match=r"px, allowed|damaged image"):
         decode_picture(bomb(side))
 
 
@@ -135,5 +135,5 @@ def test_hostile_answers_are_one_line(tmp_path: Path) -> None:
 def test_a_row_beyond_its_names_without_others_is_one_line(tmp_path: Path) -> None:
     names = "Time (s)\tDisplacement (mm)\tLoad (N)\n"
     for row in ("1\t\t1\t1\t\t1\t", "1\t\t1\t1\t\t1\t\n"):
-        with pytest.raises(RecordingError, match="line 1 names 3 columns, and no row"):
+        with pytest.raises(RecordingError, match="line 1 names 3 columns, but no row"):
             parse_tables((names + row).encode())

@@ -49,10 +49,10 @@ def test_an_odd_frame_is_looked_at_whole(frame: str) -> None:
 
 @pytest.mark.parametrize(("change", "why"), [
     (lambda m: m.replace(b'"png"', b'"jpg"'), "image format 'jpg'"),
-    (lambda m: m[:-30] + m[-22:], "field 'data' is no base64|damaged PNG"),
-    (lambda m: m.replace(b"iVBORw0KGgo", b"jVBORw0KGgo"), "no PNG"),
+    (lambda m: m[:-30] + m[-22:], "field 'data' is not base64|damaged PNG"),
+    (lambda m: m.replace(b"iVBORw0KGgo", b"jVBORw0KGgo"), "not a PNG"),
     (lambda m: m.replace(b"UgAAACgAAAAe", b"UgAAACkAAAAe"), "wrong CRC of the chunk"),
-    (lambda m: m[:-1], "no readable JSON"),
+    (lambda m: m[:-1], "not readable JSON"),
     (lambda m: m.replace(b'"frame_id"', b'"frame"'), "field 'frame_id' is missing"),
 ])  # fmt: skip
 def test_the_first_odd_message_is_named(change: object, why: str) -> None:

@@ -48,18 +48,21 @@ def test_a_video_has_the_containers_times(tmp_path: Path, name: str, code: str) 
     middles = [float(np.average(np.arange(64), weights=np.maximum(im[20], 60) - 60))
                for im in frames.images]  # fmt: skip
     assert np.diff(middles) == pytest.approx(4.0, abs=0.3)
-    assert got.metadata["provenance"]["times"] == "the container's, even"
-    assert got.metadata["provenance"]["colour"] == "grey as recorded"
+    assert got.metadata["provenance"]["times"] == "from the container, evenly spaced"
+    assert got.metadata["provenance"]["colour"] == "grey, as recorded"
 
 
 def test_a_videos_rate_scale_and_every_frame_are_the_users(tmp_path: Path) -> None:
     path = film(tmp_path / "x.mp4", colour=True)
-    with pytest.raises(UsageError, match="states no scale; say it: --m-per-px"):
+    with pytest.raises(UsageError, match="has no scale; give it, as --m-per-px"):
         read_video(path, {})
     got = read_video(path, {"m_per_px": "0.1mm", "rate": "500", "every": "5"})
     assert got.frame("images").t.tolist() == pytest.approx([0.0, 0.01, 0.02])
     said = got.metadata["provenance"]
-    assert (said["frames"], said["colour"]) == ("3 of 12, one in 5", "made grey (ITU-R 601)")
+    assert (said["frames"], said["colour"]) == (
+        "3 of 12, one in 5",
+        "converted to grey (ITU-R 601)",
+    )
     for wrong in ("0", "1.5", "x"):
         with pytest.raises(UsageError, match="every"):
             read_video(path, {"m_per_px": "0.1mm", "every": wrong})
@@ -91,7 +94,7 @@ def test_a_folder_of_jpeg_is_in_the_order_of_its_numbers(tmp_path: Path) -> None
     images = read_image_stack(tmp_path, SAID).frame("images").images
     tops = [int(image[-1].mean()) for image in images]
     assert tops == pytest.approx([int(gradient(i)[-1].mean()) for i in (2, 9, 10)], abs=3)
-    with pytest.raises(UsageError, match="states no scale"):
+    with pytest.raises(UsageError, match="has no scale"):
         read_image_stack(tmp_path, {"rate": "20"})
     with pytest.raises(UsageError, match="3 images without times"):
         read_image_stack(tmp_path, {"m_per_px": "1mm"})
@@ -105,7 +108,7 @@ def test_pages_of_16_bits_become_8_and_it_is_said(tmp_path: Path) -> None:
     images = got.frame("images").images
     assert [int(im.max()) for im in images] == [255, 230, 204]
     assert got.metadata["provenance"]["levels"].startswith(
-        "16 bits made 8: 0 to 4000 (the largest)"
+        "16 bits converted to 8: 0 to 4000 (the largest)"
     )
     white = read_image_stack(path, SAID | {"white": "8000"}).frame("images").images
     assert int(white[0].max()) == 128
@@ -124,7 +127,7 @@ def test_imagej_states_scale_and_interval(tmp_path: Path) -> None:
     assert got.m_per_px == pytest.approx((5e-5, 5e-5))
     assert got.t.tolist() == [0.0, 0.25]
     pages[0].save(tmp_path / "y.tif", dpi=(300, 300))
-    with pytest.raises(UsageError, match="states no scale"):
+    with pytest.raises(UsageError, match="has no scale"):
         read_image_stack(tmp_path / "y.tif", {})
 
 
@@ -156,10 +159,10 @@ def test_a_bomb_or_a_cut_image_costs_a_line(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize(
     ("name", "dots", "said"),
     [
-        ("x.tif", 2540, "states 2540 dots an inch: where they are .* --m-per-px 0.01mm$"),
-        ("x.tif", 96, "states 96 dots an inch, as printers and screens have them: no scale$"),
-        ("png/1.png", 2540, "states 2540 dots an inch: where they are .* --m-per-px 0.01mm$"),
-        ("png/1.png", 72, "as printers and screens have them: no scale$"),
+        ("x.tif", 2540, "declares 2540 dots an inch: if the instrument .* --m-per-px 0.01mm$"),
+        ("x.tif", 96, "declares 96 dots an inch, as for printers and screens: not a scale$"),
+        ("png/1.png", 2540, "declares 2540 dots an inch: if the instrument .* --m-per-px 0.01mm$"),
+        ("png/1.png", 72, "as for printers and screens: not a scale$"),
         ("jpg/1.jpg", 508, "--m-per-px 0.05mm$"),
         ("png/1.png", None, "e.g. 1e-4 and 10$"),
     ],
@@ -187,7 +190,7 @@ def test_import_prints_the_level_by_which_deep_images_became_8_bits(tmp_path: Pa
     Image.fromarray(np.full((8, 9), 7, np.uint8)).save(tmp_path / "y.tif")
     line = ["import", str(tmp_path / "x.tif"), "--m-per-px", "1mm", "-o", str(tmp_path / "x.mcap")]
     said = CliRunner().invoke(cli, line).output
-    assert "levels: 16 bits made 8: 0 to 1000 (the largest) became 0 to 255" in said
+    assert "levels: 16 bits converted to 8: 0 to 1000 (the largest) became 0 to 255" in said
     line[1] = str(tmp_path / "y.tif")
     assert "levels" not in CliRunner().invoke(cli, line).output
 
@@ -222,8 +225,8 @@ def packed(image: Image.Image, kind: str) -> bytes:
 @pytest.mark.parametrize(
     ("data", "says"),
     [
-        (b"no picture at all", "no picture of .* in 17 bytes"),
-        (packed(Image.new("L", (MAX_SIDE + 1, 1)), "PNG"), "4097 x 1 px, allowed 1..4096 a side"),
+        (b"no picture at all", "17 bytes are not an image"),
+        (packed(Image.new("L", (MAX_SIDE + 1, 1)), "PNG"), "4097 x 1 px, allowed 1..4096 per side"),
         (packed(Image.new("F", (2, 2)), "TIFF"), "of mode F: over 16 bits; save 16-bit grey"),
     ],
 )
@@ -235,7 +238,7 @@ def test_a_message_without_picture_is_refused(data: bytes, says: str) -> None:
 def test_levels_below_zero_and_images_beyond_the_limit_are_refused() -> None:
     with pytest.raises(RecordingError, match="levels from -2 to 7; save them from 0 on"):
         shallow([np.array([[-2.0, 7.0]])], {})
-    with pytest.raises(RecordingError, match="4097 x 1 px, the limit is 4096 a side"):
+    with pytest.raises(RecordingError, match="4097 x 1 px, the limit is 4096 per side"):
         shallow([np.zeros((1, MAX_SIDE + 1), np.uint8)], {})
 
 
@@ -258,7 +261,7 @@ def test_images_beyond_all_bytes_of_a_stack_are_refused(
 
 
 def test_rows_of_a_raw_image_that_are_cut_are_refused() -> None:
-    with pytest.raises(RecordingError, match="11 bytes for 3 x 2 px of 2; cut"):
+    with pytest.raises(RecordingError, match="11 bytes for 3 x 2 px of 2; truncated"):
         raw._numbers(RawImage("yuv422", 2, 3, 6, bytes(11), False), 2, 1)
     found = raw._numbers(RawImage("mono16", 1, 2, 6, b"\0\1\0\2\\9\\9", True), 1, 2)
     assert found[..., 0].tolist() == [[1, 2]]

@@ -53,7 +53,7 @@ def test_a_pixel_beyond_reason_is_a_defect(tmp_path: Path, side: float) -> None:
     image = np.zeros((4, 5), np.uint8)
     frames = Frames(np.array([0.0]), (image,), (side, 1e-4), np.eye(4), "probe")
     write_recording(replace(sample_recording(), frames={"/us": frames}), tmp_path / "a.mcap")
-    odd = "'/us': 0.1 x 0.0001 m a pixel is outside 1e-06 to 0.01 m"
+    odd = "'/us': 0.1 x 0.0001 m per pixel is outside 1e-06 to 0.01 m"
     assert inspect_recording(tmp_path / "a.mcap").defects == ((odd,) if side == 0.1 else ())
 
 
@@ -142,7 +142,7 @@ def test_the_exit_code_tells_of_defects(tmp_path: Path, flags: tuple[str, ...]) 
         code, out, _ = here("inspect", str(file), *flags)
         assert (code, integrity in " ".join(out.split())) == (0, True)
     code, out, _ = here("inspect", _cut(file, 0.6), *flags)
-    assert (code, "messages; the writer was ended" in " ".join(out.split())) == (1, True)
+    assert (code, "messages; the writer was stopped" in " ".join(out.split())) == (1, True)
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 4
     file.write_bytes(data)

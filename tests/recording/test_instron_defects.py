@@ -59,10 +59,10 @@ DEFECTS: dict[str, tuple[str | bytes, str]] = {
     "empty": (b"", "empty file"),
     "blank": (b"\n \n", "empty file"),
     "prose": ("Dear all,\nthe test, as said, went well.\n", "no table of numbers"),
-    "binary": (bytes(range(256)) * 4, "binary|no text file"),
+    "binary": (bytes(range(256)) * 4, "binary|not a text file"),
     "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x01", "binary"),
     "no names": ("\n".join(bare().split("\n")[1:]), "no column names"),
-    "few": ("\n".join(bare().split("\n")[:9]), "8 samples, at least 10"),
+    "few": ("\n".join(bare().split("\n")[:9]), "8 samples; at least 10"),
     "backward": (
         spoiled(12, lambda r: cell(r, 0, "0.35")),
         r"line 12: time runs backward, 0.9 -> 0.35 s",
@@ -76,12 +76,12 @@ DEFECTS: dict[str, tuple[str | bytes, str]] = {
     "infinite": (spoiled(20, lambda r: cell(r, 1, "1e999")), "line 20, .*'1e999' is not a number"),
     "nan row": (spoiled(20, lambda r: "NaN,NaN,NaN"), "line 20, .*'NaN' is not a number"),
     "last row nan": (spoiled(61, lambda r: "NaN,NaN,NaN"), "line 61, .*'NaN' is not a number"),
-    "emptied row": (spoiled(20, lambda r: ",,"), "line 20: a row with all cells empty"),
+    "emptied row": (spoiled(20, lambda r: ",,"), "line 20: an empty row"),
     "cut row": (spoiled(61, lambda r: r.rpartition(",")[0]), "line 61: 2 cells, .* 3 columns"),
     "cut number": (
         "Time (s),Displacement (mm),Load (N)"
         + "".join(f"\n{t:.3f},{d:.5f},{f:.5f}" for t, d, f in zip(T, D, F, strict=True))[:-2],
-        "line 61: the file is cut, its last number",
+        "line 61: the file is truncated: its last number",
     ),
     "long row": (spoiled(30, lambda r: r + ",1.0"), "line 30: 4 cells"),
     "two tests": (bare() + bare(), "line 62"),
@@ -89,18 +89,18 @@ DEFECTS: dict[str, tuple[str | bytes, str]] = {
         "\n".join(bare().split("\n")[:21]) + "\n" + bare(),
         r"2 specimens in one file: '1' \(20 rows from line 2 on.*'2' \(60 rows from line 23 on",
     ),
-    "text amid": (spoiled(30, lambda r: "Pause"), "line 30: text 'Pause' amid"),
+    "text amid": (spoiled(30, lambda r: "Pause"), "line 30: text 'Pause' between"),
     "no time": (bare("Kanal 1 (s),Displacement (mm),Load (N)"), "no time column .*time=every"),
     "no force": (bare("Time (s),Displacement (mm),Channel 3 (V)"), "no force column"),
     "no unit": (bare("Time (s),Displacement (mm),Load"), r"'Load': no unit .*force=Load:UNIT"),
     "empty unit": (bare("Time (s),Displacement (mm),Load ()"), "no unit for force"),
     "unknown unit": (
         bare("Time (s),Displacement (mm),Load (stone)"),
-        "'stone' is no unit of force",
+        "'stone' is not a unit of force",
     ),
-    "mass for force": (bare("Time (s),Displacement (mm),Load (kg)"), "'kg' is no unit of force"),
+    "mass for force": (bare("Time (s),Displacement (mm),Load (kg)"), "'kg' is not a unit of force"),
     "swapped units": (bare("Time (s),Displacement (N),Load (mm)"), "swapped"),
-    "load in mm": (bare("Time (s),Displacement (mm),Load (mm)"), "'mm' is no unit of force"),
+    "load in mm": (bare("Time (s),Displacement (mm),Load (mm)"), "'mm' is not a unit of force"),
     "two units": (bare(BARE + "\ns,mm,kN"), r"'Load \(N\)': unit 'N' in its name, 'kN' in the row"),
     "kN": (full(FULL.replace("Load (N)", "Load (kN)")), r"contradictory units \(a factor of 1e-3"),
     "stress": (full(FULL.replace("kPa", "N/mm^2")), r"contradictory units \(a factor of 1e\+3"),
@@ -182,7 +182,7 @@ def test_mapping_overrides_units_signs_columns_and_time(tmp_path: Path) -> None:
     assert kilo.record("provenance")["given by the user"].startswith("test=compression, force=Load")
     believed = load(tmp_path, full(FULL.replace("kPa", "N/mm^2")), force="Load:N")
     assert np.allclose(si(believed, "force"), F)
-    assert "unit given by the user, not checked" in believed.record("provenance")["compared"]
+    assert "unit given by --map, not checked" in believed.record("provenance")["compared"]
     unitless = load(tmp_path, bare("Time (s),Displacement (mm),Load"), force="Load:kN")
     assert np.allclose(si(unitless, "force"), 1e3 * F)
     flipped = load(tmp_path, bare(f=-F), force="Load (N):-")
@@ -218,13 +218,13 @@ def test_wrong_mapping_names_the_nearest(
 
 
 def test_a_unit_of_the_wrong_kind_is_refused_in_a_mapping_too(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="'mm' is no unit of force"):
+    with pytest.raises(RecordingError, match="'mm' is not a unit of force"):
         load(tmp_path, bare(), force="Load:mm")
 
 
 def test_a_column_name_used_twice_needs_its_number(tmp_path: Path) -> None:
     text = table("Time (s),Displacement (mm),Load (N),Load (N)", T, D, F, 2 * F)
-    with pytest.raises(UsageError, match="2 columns are called"):
+    with pytest.raises(UsageError, match="2 columns have the name"):
         load(tmp_path, text, force="Load (N)")
     assert np.allclose(si(load(tmp_path, text, force="#4"), "force"), 2 * F)
 

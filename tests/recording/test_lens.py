@@ -100,8 +100,9 @@ def test_dots_are_where_they_are_once_the_lens_is_known(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "change", "why"), [
-    ("a.yml", lambda p: p.write_text("nothing: 1"), "a.yml: no camera_matrix in it"),
-    ("b.yml", lambda p: opencvs(p, coefficients=D[:3]), "3 coefficients of distortion; one of"),
+    ("a.yml", lambda p: p.write_text("nothing: 1"), "a.yml: it has no camera_matrix"),
+    ("b.yml", lambda p: opencvs(p, coefficients=D[:3]), "3 coefficients of distortion; expected "
+                                                        "one of"),
     ("c.yml", lambda p: opencvs(p, matrix=-K), "focal lengths and distortion must be numbers"),
     ("d.yml", lambda p: ross(p, "equidistant"), "distortion model 'equidistant'; read are"),
     ("e.yml", lambda p: p.write_bytes(b"\xff\x00{"), "e.yml: damaged"),
@@ -132,9 +133,9 @@ def test_images_of_another_size_are_refused_and_the_lens_is_printed(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("fisheye_model: 1\n", "a fisheye model; the one of OpenCV's calibrateCamera is read"),
-        ("distortion_model: equidistant\n", "distortion model 'equidistant'; read are plumb_bob"),
-        ("image_width: 320\n", "no camera_matrix in it"),
+        ("fisheye_model: 1\n", "a fisheye model; expected the model of OpenCV's calibrateCamera"),
+        ("distortion_model: equidistant\n", "distortion model 'equidistant'; expected plumb_bob"),
+        ("image_width: 320\n", "it has no camera_matrix"),
         ("x: " + "1" * 2**21, "bytes, the limit is 1000000"),
     ],
     ids=["fisheye", "model", "matrix", "size"],
@@ -150,7 +151,7 @@ def test_another_lens_is_called_by_its_name(text: str, says: str, tmp_path: Path
     [
         (np.diag([-260.0, 255.0, 1.0]), D, "focal lengths and distortion must be numbers, above 0"),
         (K, np.array([np.nan, 0, 0, 0]), "focal lengths and distortion must be numbers, above 0"),
-        (K, np.zeros(3), r"3 coefficients of distortion; one of \("),
+        (K, np.zeros(3), r"3 coefficients of distortion; expected one of \("),
     ],
 )
 def test_a_calibration_that_is_none_is_refused(

@@ -44,13 +44,13 @@ def test_a_stack_of_images_has_its_frames_last(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_what_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     points = written(tmp_path / "x.mat", P=np.ones((4, 2)))
-    with pytest.raises(UsageError, match=r"x\.mat: P states no unit of length; .* unit=mm"):
+    with pytest.raises(UsageError, match=r"x\.mat: P has no unit of length; .* unit=mm"):
         read_matlab(points, {})
     with pytest.raises(UsageError, match="unit=3kg: expected a length"):
         read_matlab(points, {"unit": "3kg"})
     assert read_matlab(points, {"unit": "mm", "sd": "2um"}).marker("P").sd == pytest.approx(2e-6)
     images = written(tmp_path / "y.mat", I=np.ones((4, 5, 2), np.uint8))
-    with pytest.raises(UsageError, match=r"I states no times; .* rate=10"):
+    with pytest.raises(UsageError, match=r"I has no times; .* rate=10"):
         read_matlab(images, {"m_per_px": "1mm"})
     single = written(tmp_path / "z.mat", I=np.ones((4, 5), np.uint8))
     assert len(read_matlab(single, {"m_per_px": "1mm"}).frame("I").images) == 1
@@ -112,13 +112,13 @@ def test_a_cut_file_is_told_with_its_bytes(tmp_path: Path, packed: bool) -> None
     whole = path.read_bytes()
     for count in (0, 100, 127, 131, len(whole) - 9, len(whole) - 1):
         path.write_bytes(whole[:count])
-        with pytest.raises(RecordingError, match=r"x\.mat: (no MATLAB 5 file|\d+ bytes)"):
+        with pytest.raises(RecordingError, match=r"x\.mat: (not a MATLAB 5 file|\d+ bytes)"):
             read_matlab(path, {"unit": "m"})
 
 
 def test_another_version_is_told(tmp_path: Path) -> None:
     (tmp_path / "x.mat").write_bytes(b"MATLAB 7.0 MAT-file".ljust(600))
-    with pytest.raises(RecordingError, match="no MATLAB 5 file"):
+    with pytest.raises(RecordingError, match="not a MATLAB 5 file"):
         read_matlab(tmp_path / "x.mat", {})
 
 

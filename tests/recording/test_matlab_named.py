@@ -91,17 +91,18 @@ def test_which_axis_is_which_is_told_by_times_or_asked_for(file: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "asks"),
     [
-        ({"force": "data.load.N"}, r"states no unit; say it: --map force=data.load.N:N"),
-        ({"force": "data.load.N:N"}, r"force states no times; .*time=PATH:s or --map rate"),
+        ({"force": "data.load.N"}, r"has no unit; give it, as --map force=data.load.N:N"),
+        ({"force": "data.load.N:N"}, r"force has no times; .*time=PATH:s or --map rate"),
         ({"force": "data.lod.N:N"}, r"is no array; did you mean 'data.load.N'\?"),
         ({"force": "data.name:N"}, r"'data.name' is char, no real numbers"),
         ({"force": "data.load.N:N:+"}, r"expected PATH:UNIT or PATH:UNIT:-"),
         ({"force": "data.load.N:N", "time": "data.t:mm"}, r"expected a vector and a unit of time"),
-        ({"force": "I:V", "time": "data.t:s", "unit": "mm"}, r"unit=...: each named array"),
+        ({"force": "I:V", "time": "data.t:s", "unit": "mm"}, r"unit=...: give the unit with each "
+                                                             r"named array"),
         ({"m": "data.X:N", "time": "data.t:s"}, r"m: coordinates in 'N'; expected a length"),
         ({"axes.m": "tpx"}, r"axes.m=...: no stream of that name"),
-        ({"f": "file:N", "time": "data.t:s"}, r"\(4, 4\) and 5 times leave open"),
-        ({}, "states no unit|no array shows|states no unit of length"),
+        ({"f": "file:N", "time": "data.t:s"}, r"\(4, 4\) and 5 times do not show"),
+        ({}, "has no unit|no array's role|has no unit of length"),
     ],
 )  # fmt: skip
 def test_what_is_not_said_is_asked_for(file: Path, options: dict[str, str], asks: str) -> None:
@@ -118,7 +119,7 @@ def test_inspect_lists_the_arrays_before_anything_is_said(file: Path) -> None:
         "file": "not read: (4, 4) float64",
     }  # fmt: skip
     assert got.defects == ()
-    assert got.facts[0].startswith("still needed: x.mat: I states no unit of length")
+    assert got.facts[0].startswith("still needed: x.mat: I has no unit of length")
     assert "m_per_px" in got.facts[0]
     with pytest.raises(UsageError, match="is no array"):
         inspect_file(file, "matlab", {"force": "nothing:N"})
@@ -320,8 +321,8 @@ def test_whole_numbers_may_be_coordinates(tmp_path: Path, X: np.ndarray) -> None
 @pytest.mark.parametrize(
     ("arrays", "why"),
     [
-        ({"vol": IMAGE}, "it is called so"),
-        ({"mri_2": IMAGE}, "it is called so"),
+        ({"vol": IMAGE}, "its name says so"),
+        ({"mri_2": IMAGE}, "its name says so"),
         ({"I": IMAGE, "info": {"PixelSpacing": np.ones((1, 3))}}, "info.PixelSpacing has three"),
     ],
 )
@@ -335,7 +336,7 @@ def test_a_volume_is_no_film(tmp_path: Path, arrays: dict[str, Any], why: str) -
 
 def test_a_stack_that_may_be_a_film_is_never_taken_for_one_unasked(tmp_path: Path) -> None:
     path = file_of(tmp_path, I=IMAGE, spacing=np.ones((1, 2)), volume=3.5)
-    with pytest.raises(UsageError, match=r"if the last of its axes is time \(a volume is not read"):
+    with pytest.raises(UsageError, match=r"if its last axis is time \(a volume is not read"):
         read_matlab(path, {"m_per_px": "0.1mm"})
     assert len(read_matlab(path, {"m_per_px": "0.1mm", "rate": "10"}).frame("I").images) == 5
 
@@ -388,6 +389,6 @@ def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> Non
         matlab._unnamed(Path("x.mat"), word, {})
     curve = {"F": np.zeros(50), "d": np.zeros(9)}
     with pytest.raises(
-        UsageError, match=r"no array shows what it is; .* as --map force=PATH:N --map ra"
+        UsageError, match=r"no array's role is clear; .* as --map force=PATH:N --map ra"
     ):
         matlab._unnamed(Path("x.mat"), curve, {})

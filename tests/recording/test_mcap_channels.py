@@ -79,7 +79,7 @@ def test_any_times_in_order(tmp_path_factory: pytest.TempPathFactory, times: lis
     [
         ([NUMBER, NUMBER], [], "used twice: ['/a']"),
         ([NUMBER, WrittenChannel("/c", json_schema("own.Number", {}))], [], "'/c' differs"),
-        ([TEXT], MESSAGES, "message of '/a', declared are ['/b']"),
+        ([TEXT], MESSAGES, "topic '/a' is not one of ['/b']"),
         ([NUMBER, TEXT], MESSAGES[::-1], "'/b' at 5 ns, expected 7"),
         ([NUMBER], [WrittenMessage("/a", -1, b"{}")], "at -1 ns, expected 0"),
         ([NUMBER], [WrittenMessage("/a", LAST_NS + 1, b"{}")], "in order of time"),

@@ -238,7 +238,7 @@ def test_damaged_messages_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "says"), [("A", r"no base64 \("), (3.5, r"no bytes \("), ([300], r"no bytes \(")]
+    ("value", "says"), [("A", r"not base64 \("), (3.5, r"not bytes \("), ([300], r"not bytes \(")]
 )
 def test_fields_that_are_no_bytes_are_refused(value: object, says: str) -> None:
     assert decoders.binary("AQI=") == decoders.binary([1, 2]) == decoders.binary(b"\1\2") == b"\1\2"
@@ -269,8 +269,8 @@ def test_records_longer_than_their_chunk_and_short_messages_are_refused() -> Non
         ({"x": (0, 7), "y": (4, 7)}, 12, "a cloud without 'z' as a float"),
         ({"x": (0, 3)}, 12, "a cloud without 'x' as a float"),
         ({"x": (12, 7)}, 12, "a cloud without 'x' as a float"),
-        ({"x": (10, 7)}, 12, "24 bytes for 2 points of 12; cut"),
-        ({"x": (0, 7)}, 13, "24 bytes for 2 points of 13; cut"),
+        ({"x": (10, 7)}, 12, "24 bytes for 2 points of 12; truncated"),
+        ({"x": (0, 7)}, 13, "24 bytes for 2 points of 13; truncated"),
     ],
 )
 def test_clouds_that_are_cut_are_refused(

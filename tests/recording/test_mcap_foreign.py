@@ -89,7 +89,7 @@ def test_a_wrench_is_a_force_and_a_torque(tmp_path: Path) -> None:
     assert force.frame == "lab"
     assert got.signal("/x/torque", "N m").y[0].tolist() == [0.1, 0.2, 0.3]
     assert got.t0_ns == 100 * 10**9
-    assert "2 of 2 samples were not in order" in got.metadata["provenance"]["/x/force"]
+    assert "2 of 2 samples were not in the order" in got.metadata["provenance"]["/x/force"]
 
 
 def test_a_pose_is_a_rotation_and_a_translation(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_an_image_is_its_luma_and_needs_a_scale(encoding: str, tmp_path: Path) -
     path = ros(
         tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE, [raw(encoding, stored)]
     )
-    with pytest.raises(RecordingError, match=r"images without a scale; say --map m_per_px=0.1mm"):
+    with pytest.raises(RecordingError, match=r"images without a scale; give --map m_per_px=0.1mm"):
         read_all(path, {})
     frames = read_all(path, {"m_per_px": "0.2mm"}).frame("/x")
     assert (frames.images[0] == grey).all()
@@ -179,7 +179,7 @@ def test_16_bits_become_8_by_a_level_that_is_told(encoding: str, big: int, tmp_p
         got = read_all(path, {"m_per_px": "1mm", **options})
         assert (got.frame("/x").images[0] == np.rint(deep * (255 / white))).all()
         told = got.metadata["provenance"]["/x"]
-        assert told == f"16 bits made 8: 0 to {white} ({said}) became 0 to 255"
+        assert told == f"16 bits converted to 8: 0 to {white} ({said}) became 0 to 255"
 
 
 def test_a_mosaic_is_its_luma_and_pairs_are_their_brightness(tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ def test_a_mosaic_is_its_luma_and_pairs_are_their_brightness(tmp_path: Path) -> 
 def test_distances_are_no_image(tmp_path: Path) -> None:
     path = ros(tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE,
                [raw("32FC1", np.zeros((4, 24), np.uint8)) | {"width": 6}])  # fmt: skip
-    with pytest.raises(RecordingError, match=r"encoding '32FC1'; read are grey, colour and bayer"):
+    with pytest.raises(RecordingError, match=r"encoding '32FC1'; expected grey, colour or bayer"):
         read_all(path, {"m_per_px": "1mm"})
 
 
@@ -232,7 +232,7 @@ def test_a_packed_image_is_what_another_library_unpacks(tmp_path: Path) -> None:
     cut = {**message, "data": message["data"][:-40]}
     path = ros(tmp_path / "y.mcap", "sensor_msgs/msg/CompressedImage",
                HEADER + "string format\nuint8[] data", [cut])  # fmt: skip
-    with pytest.raises(RecordingError, match="damaged picture"):
+    with pytest.raises(RecordingError, match="damaged image"):
         read_all(path, {"m_per_px": "1mm"})
 
 
@@ -304,7 +304,7 @@ def test_a_number_of_any_message_comes_in_by_its_path(encoding: str, tmp_path: P
     got = read_all(path, {"/cell.cell.load.0": "N"}).signal("/cell.cell.load.0", "N")
     assert got.y.ravel().tolist() == [0, 0.5, 1]
     assert got.t.tolist() == [0, 1, 2]
-    with pytest.raises(RecordingError, match=r"comes in by --map /cell.FIELD=UNIT"):
+    with pytest.raises(RecordingError, match=r"import a number with --map /cell.FIELD=UNIT"):
         read_all(path, {})
     with pytest.raises(RecordingError, match=r"no field 'nothing' of 'cell.nothing'"):
         read_all(path, {"/cell.cell.nothing": "N"})

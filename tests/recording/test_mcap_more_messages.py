@@ -124,7 +124,7 @@ def test_a_time_may_be_text(tmp_path: Path, text: str, fraction: int) -> None:
 @pytest.mark.parametrize("stamp", ["yesterday", 5])
 def test_what_is_no_time_is_called_so(tmp_path: Path, stamp: Any) -> None:
     path = plain(tmp_path / "x.mcap", in_frame(stamp), "foxglove.Point3InFrame")
-    with pytest.raises(RecordingError, match="is no time"):
+    with pytest.raises(RecordingError, match="is not a time"):
         read_all(path, {})
 
 
@@ -139,7 +139,7 @@ def test_a_number_that_is_named_comes_in_si(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "why"),
     [("pos", r"'/x.pos' holds fields; name one: /x.pos.x, /x.pos.y"),
-     ("name", r"'/x.name' is 'cell', no numbers")],
+     ("name", r"'/x.name' is 'cell', not numbers")],
 )  # fmt: skip
 def test_a_field_that_is_no_number_says_what_it_is(tmp_path: Path, field: str, why: str) -> None:
     path = plain(tmp_path / "x.mcap", {"pos": {"x": 1, "y": 2}, "name": "cell"})
@@ -183,7 +183,10 @@ def test_stamps_that_were_never_set_are_no_times(tmp_path: Path) -> None:
     got = read_all(poses(tmp_path / "x.mcap", {}, {}), {})
     assert got.t0_ns == 1_700_000_000 * 10**9
     assert got.signal("/x/translation", "m").t.tolist() == [0, 1]
-    assert got.metadata["provenance"]["/x/translation"] == "2 stamps of 0: when published"
+    assert (
+        got.metadata["provenance"]["/x/translation"]
+        == "2 stamps of 0: replaced by the publish time"
+    )
     some = read_all(poses(tmp_path / "y.mcap", {}, at), {}).signal("/x/translation", "m")
     assert some.t.tolist() == [0, 9]
 

@@ -158,12 +158,12 @@ CONTOUR = {"stamp": _stamp(T0), "frame": "w", "x": [0, 1, 1], "y": [0, 0, 1], "s
         (_at(0, frame=3), "field 'frame' is int, expected text"),
         (_at(1, z=None), r"message 1 holds \(2, 2\) numbers, the first \(2, 3\)"),
         (_at(0, x=[0, 10**400]), "field 'x' holds a number beyond float64"),
-        (_at(0, stamp={"sec": 1}), "stamp sec 1, nsec None: no int64 nanoseconds"),
-        (_at(0, stamp={"sec": 1, "nsec": 10**9}), "no int64 nanoseconds"),
-        (_at(0, stamp={"sec": 10**10, "nsec": 0}), "no int64 nanoseconds"),
-        (_at(0, stamp={"sec": 1.0, "nsec": 0}), "no int64 nanoseconds"),
-        (_at(0, stamp=5), "no int64 nanoseconds"),
-        ([*_markers(2), ("/m", M, T0, markers_json(None))], "2 of 3 messages are stamped"),
+        (_at(0, stamp={"sec": 1}), "stamp sec 1, nsec None: not int64 nanoseconds"),
+        (_at(0, stamp={"sec": 1, "nsec": 10**9}), "not int64 nanoseconds"),
+        (_at(0, stamp={"sec": 10**10, "nsec": 0}), "not int64 nanoseconds"),
+        (_at(0, stamp={"sec": 1.0, "nsec": 0}), "not int64 nanoseconds"),
+        (_at(0, stamp=5), "not int64 nanoseconds"),
+        ([*_markers(2), ("/m", M, T0, markers_json(None))], "2 of 3 messages have a stamp"),
         (_signal(1) + [("/s", S, T0 + 1, signal_json(T0 + 1, unit="mN"))], "unit changes at mess"),
         (
             _signal(1) + [("/s", S, T0 + 1, signal_json(T0 + 1, values=[1, 2]))],
@@ -171,23 +171,23 @@ CONTOUR = {"stamp": _stamp(T0), "frame": "w", "x": [0, 1, 1], "y": [0, 0, 1], "s
         ),
         (_signal(1, unit=""), "signal: no unit declared"),
         (_signal(1, values=[None]), "field 'values' holds NoneType, expected numbers"),
-        ([("/\n", M, T0, b"")], r"'/\\n' message 0: no readable JSON"),
+        ([("/\n", M, T0, b"")], r"'/\\n' message 0: not readable JSON"),
         ([("/c", C, T0, CONTOUR)], "no record 'pose//c' with T_frame_from_image, 16 numbers"),
         ([("/c", C, T0, CONTOUR | {"own_sd": 1e-4})], "field 'confidence' is missing"),
         (
             [("/c", C, T0, CONTOUR | {"own_sd": 1e-4, "confidence": 1.5})],
             r"confidence 1\.5: 0 or above, to 1",
         ),
-        (_raw(b'{"x":[NaN]}'), "NaN is no JSON number; write null"),
-        (_raw(b'{"x":[-Infinity]}'), "-Infinity is no JSON number"),
+        (_raw(b'{"x":[NaN]}'), "NaN is not a JSON number; write null"),
+        (_raw(b'{"x":[-Infinity]}'), "-Infinity is not a JSON number"),
         (_raw(b'{"frame":"w","names":["a"],"x":[1e999],"y":[0],"z":[0],"sd":0}'), "beyond float64"),
         (_raw(b'{"sd":1,"sd":2}'), "a field occurs twice"),
         (_raw(b"[]"), "JSON list, expected an object"),
-        (_raw(b"{"), "no readable JSON"),
-        (_raw(b"\xff\xfe"), "no readable JSON"),
-        (_raw(b'{"x":' + b"[" * 100_000), "no readable JSON"),
-        (_raw(b'{"x":' + b"9" * 5000 + b"}"), "no readable JSON"),
-        (_raw(b""), "no readable JSON"),
+        (_raw(b"{"), "not readable JSON"),
+        (_raw(b"\xff\xfe"), "not readable JSON"),
+        (_raw(b'{"x":' + b"[" * 100_000), "not readable JSON"),
+        (_raw(b'{"x":' + b"9" * 5000 + b"}"), "not readable JSON"),
+        (_raw(b""), "not readable JSON"),
         ([("/i", "foxglove.Grid", T0, b"")], r"schemas found: \['foxglove.Grid'\]; see `validate"),
     ],
 )
@@ -242,7 +242,7 @@ def test_outlines_have_their_own_sd_all_or_none(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "f.mcap", messages[:2], metadata=pose)
     assert read_recording(path).contour("/c").each == pytest.approx(np.array([[1e-4, 0.9]] * 2))
     path = write_foreign(tmp_path / "g.mcap", messages, metadata=pose)
-    with pytest.raises(RecordingError, match="only some outlines have their own sd"):
+    with pytest.raises(RecordingError, match="only some outlines have an sd"):
         read_recording(path)
     assert any("only some outlines" in d for d in inspect_recording(path).defects)
 
@@ -276,5 +276,5 @@ def test_statistics_that_claim_more_are_refused(
     path = tmp_path / "a.mcap"
     write_recording(sample_recording(), path)
     monkeypatch.setattr("validate.recording.mcap.integrity.statistics_messages", lambda _: 99)
-    with pytest.raises(RecordingError, match="claim 99 messages, it holds 27; see `validate insp"):
+    with pytest.raises(RecordingError, match="claim 99 messages, it has 27; see `validate insp"):
         read_recording(path)

@@ -60,7 +60,7 @@ def test_what_is_recovered_is_a_prefix_bit_for_bit(tmp_path: Path, options: dict
         assert kept == every[:count]
         seen, saved = inspect_recording(cut), inspect_recording(out)
         assert seen.messages == saved.messages == count
-        assert f"{count} messages; the writer was ended" in seen.defects[0]
+        assert f"{count} messages; the writer was stopped" in seen.defects[0]
         assert saved.source.integrity == "verified"
         assert all(line.endswith("no messages") for line in saved.defects)
         whole = int(lines[1].split("the first ")[1].split(" of ")[0])
@@ -99,14 +99,14 @@ def test_a_cut_summary_misses_no_message(tmp_path: Path) -> None:
     data = _file(tmp_path / "whole.mcap", chunk_size=1000)
     path = tmp_path / "cut.mcap"
     path.write_bytes(data[:-4])
-    assert "only the summary is cut" in recover(path, tmp_path / "out.mcap").lines[2]
+    assert "only the summary is truncated" in recover(path, tmp_path / "out.mcap").lines[2]
     assert _messages(tmp_path / "out.mcap") == _messages(tmp_path / "whole.mcap")
     assert inspect_recording(path).defects[0].startswith("no end of the file, behind its data,")
 
 
 def test_only_a_file_that_stops_short_is_recovered(tmp_path: Path) -> None:
     data, out = _file(tmp_path / "whole.mcap", chunk_size=1000), tmp_path / "out.mcap"
-    with pytest.raises(UsageError, match="is whole; nothing to recover"):
+    with pytest.raises(UsageError, match="the file is complete"):
         recover(tmp_path / "whole.mcap", out)
     cut = _cut(tmp_path)
     with pytest.raises(UsageError, match="is the file to recover"):
@@ -135,7 +135,7 @@ def test_the_command_saves_and_a_run_still_refuses(tmp_path: Path) -> None:
     assert "missing:" in said
     assert read_recording(out).signals["/s"].y[0, 0] == 0.0
     wrong = refused("import", str(path), "--recover", "-o", str(out), "--force", "--rate", "5")
-    assert "FILE and -o only" in wrong
+    assert "only one FILE and -o" in wrong
 
 
 def test_a_file_that_shrinks_while_it_is_copied_is_refused() -> None:

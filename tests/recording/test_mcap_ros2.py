@@ -170,7 +170,7 @@ def test_what_rosbags_wrote_is_read_bit_for_bit(kind: str, little: bool, tmp_pat
     got = read_all(bag(tmp_path, kind, make, little), {"m_per_px": "0.1mm"})
     same(got, wanted)
     assert got.t0_ns == 100 * 10**9 + 7
-    assert "mean nothing here (diagnostic_msgs/msg/KeyValue)" in got.unread["/unknown"]
+    assert "unknown meaning (diagnostic_msgs/msg/KeyValue)" in got.unread["/unknown"]
 
 
 @pytest.mark.parametrize("order", ["<", ">"])

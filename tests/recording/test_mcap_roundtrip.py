@@ -180,8 +180,11 @@ _FRAMES = Frames(_T, (np.zeros((2, 2), np.uint8),) * 2, (1e-4, 1e-4), np.eye(4),
             r"metadata names \['pose//c'\] are reserved",
         ),
         ({"signals": {"/s": _SIGNAL}, "metadata": {"validate.recording": {}}}, "are reserved"),
-        ({"signals": {"/s": _SIGNAL}, "metadata": {"m": {"a": 1}}}, "holds more than texts"),
-        ({"signals": {"/s": _SIGNAL}, "metadata": {"m": {"a": "\ud800"}}}, "text that is no UTF-8"),
+        ({"signals": {"/s": _SIGNAL}, "metadata": {"m": {"a": 1}}}, "has values that are not text"),
+        (
+            {"signals": {"/s": _SIGNAL}, "metadata": {"m": {"a": "\ud800"}}},
+            "text that is not UTF-8",
+        ),
         (
             {"signals": {"/s": _SIGNAL}, "t0_ns": 2**63 - 10},
             "ns are outside 0 .. 9223372036854775807",

@@ -64,14 +64,14 @@ def test_what_the_table_does_not_say_is_asked_for(tmp_path: Path) -> None:
     frame.to_csv(path, index=False)
     with pytest.raises(UsageError, match="--map unit=mm"):
         read(path)
-    asks = "if its rows are instants, say --map rate=HZ; if they are points at one instant, name"
+    asks = "if its rows are instants, give --map rate=HZ; if they are points at one instant, name"
     with pytest.raises(UsageError, match=asks):
         read(path, {"unit": "mm"})
     assert read(path, {"unit": "mm", "rate": "10"}).t[1] == 0.1
     frame.rename(columns={"frame": "t"}).to_csv(path, index=False)
-    with pytest.raises(UsageError, match="'t' has no unit; say it: --map time=s"):
+    with pytest.raises(UsageError, match="'t' has no unit; give --map time=s"):
         read(path, {"unit": "mm"})
-    with pytest.raises(UsageError, match="have a z of their own"):
+    with pytest.raises(UsageError, match="already have a z"):
         read(path, {"unit": "mm", "time": "s", "z": "0mm"})
     frame[[c for c in frame if not c.endswith("z")]].to_csv(path, index=False)
     with pytest.raises(UsageError, match="--map z=0mm"):
@@ -96,7 +96,7 @@ def test_points_not_seen_and_damage(tmp_path: Path) -> None:
     path.write_text(top + "0,1,2,3\n0.1,,,\n0.2,nan,nan,nan\n", "utf-8")
     assert np.isnan(read(path).x[1:]).all()
     odd = {"0.1,1,,3": "line 3: point 'tip' has 2 of 3", "0,1,2,3": "line 3: its time",
-           "0.1,1,two,3": "line 3: 'two' is no number"}  # fmt: skip
+           "0.1,1,two,3": "line 3: 'two' is not a number"}  # fmt: skip
     for row, why in odd.items():
         path.write_text(f"{top}0,1,2,3\n{row}\n0.2,1,2,3\n", "utf-8")
         with pytest.raises(RecordingError, match=why):
@@ -199,14 +199,14 @@ def test_deeplabcuts_tables_are_markers_in_pixels(tmp_path: Path) -> None:
     path = tmp_path / "dlc.csv"
     path.write_text(DEEPLABCUT)
     assert recognised(path).name == "points"
-    with pytest.raises(UsageError, match="in pixels; say the size of one: --map m_per_px="):
+    with pytest.raises(UsageError, match="in pixels; give the pixel size, as --map m_per_px="):
         read(path)
     found = read(path, PLACED)
     assert found.names == ("tip", "base")
     assert np.allclose(found.t, [0, 0.04, 0.08])
     assert np.allclose(found.x[:, 0, 0], [1.05e-3, np.nan, 1.25e-3], equal_nan=True)
     told = read_point_table(path, PLACED).metadata["provenance"]
-    assert "likelihood below 0.6 as not seen (1 of 6)" in told["assumed"]
+    assert "likelihood below 0.6 is taken as missing (1 of 6)" in told["assumed"]
     sure = read(path, {**PLACED, "likelihood": "0.9"})
     assert np.isnan(sure.x[:, 0, 0]).tolist() == [False, True, True]
 
@@ -273,7 +273,7 @@ def test_a_displacement_field_is_no_motion_of_one_point(
             reader.read(path, options)
         assert str(raised.value) == (
             f"p.csv: 20 rows of {columns}: a field of displacements or strains at one instant, not "
-            "the motion of one point; export chosen points over time, a row an instant, as time "
+            "the motion of one point; export chosen points over time, one row per instant, as time "
             "(s), p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
         )
 
@@ -342,8 +342,12 @@ PLAIN = "time (s),tip_x (mm),tip_y (mm),tip_z (mm)\n0,1,2,3\n0.1,1,2,3\n0.2,1,2,
     [
         (PLAIN, {"likelihood": "0.9"}, "--map likelihood: the table has none for each point"),
         (PLAIN, {"m_per_px": "0.1mm"}, "--map m_per_px: coordinates are in mm"),
-        (PLAIN, {"m_per_px": "0.1mm", "unit": "px"}, "--map unit and m_per_px; say one of them"),
-        (PLAIN.replace("0.1,1", ",1"), {}, "line 3: it has no time; mend it"),
+        (
+            PLAIN,
+            {"m_per_px": "0.1mm", "unit": "px"},
+            "--map unit and m_per_px exclude each other; give one",
+        ),
+        (PLAIN.replace("0.1,1", ",1"), {}, "line 3: it has no time; correct it"),
         (PLAIN.replace("0.2,1", "1e12,1"), {}, "markers: a time of 1e.12 s; damaged"),
         (
             "name,x (mm),y (mm),z (mm)\na,1,2,3\nb,1,,3\nc,3,2,1\n",
@@ -376,5 +380,7 @@ def test_many_short_tracks_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_cell_longer_than_any_table_has_is_no_table() -> None:
-    with pytest.raises(RecordingError, match=r"x.csv: no table of cells .field larger than field"):
+    with pytest.raises(
+        RecordingError, match=r"x.csv: not a table of cells .field larger than field"
+    ):
         rows_of("x.csv", b"time,x\n0," + b"1" * 140_000)

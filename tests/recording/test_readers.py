@@ -377,10 +377,10 @@ def test_a_standard_deviation_below_zero_or_none_is_refused(sd: float) -> None:
         (b"SQLite format 3\0", "an SQLite database.*sqlite3 -header -csv x.dat"),
         (b"GIF89a", "a GIF.*ffmpeg -i x.dat"),
         (b"TDSm", "LabVIEW.*CSV"),
-        (b"\x93NUMPY", r"an array of NumPy.*savemat\('x.mat', dict\(x=numpy.load\('x.dat'\)\)\)"),
-        (b"PK\3\4" + bytes(26) + b"V.npy", r"NumPy's arrays.*dict\(numpy.load\('x.dat'\)\)\)"),
+        (b"\x93NUMPY", r"a NumPy array.*savemat\('x.mat', dict\(x=numpy.load\('x.dat'\)\)\)"),
+        (b"PK\3\4" + bytes(26) + b"V.npy", r"of NumPy arrays.*dict\(numpy.load\('x.dat'\)\)\)"),
         (b"PK\3\4" + bytes(26) + b"V.txt", "a ZIP archive.*unzip x.dat -d x"),
-        (b"\x28\xb5\x2f\xfd", "Zstandard.*unzstd -k x.dat -o x; of a bag"),
+        (b"\x28\xb5\x2f\xfd", "Zstandard.*unzstd -k x.dat -o x; for a ROS bag"),
     ],
 )
 def test_a_file_that_is_known_but_not_read_is_called_so(

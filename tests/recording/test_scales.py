@@ -31,11 +31,11 @@ def outlines(size: float) -> Contours:
     [
         (1e-4, ""),
         (1e-2, ""),
-        (8.0, "8 m a pixel is outside 1e-06 to 0.01 m: an image of 3.2e+03 x 2.4e+03 m; a factor "
+        (8.0, "8 m per pixel is outside 1e-06 to 0.01 m: an image of 3.2e+03 x 2.4e+03 m; a factor "
               "1000 (8mm) or 1000000 (8um)?"),
-        (0.1, "0.1 m a pixel is outside 1e-06 to 0.01 m: an image of 40 x 30 m; a factor 1000 "
+        (0.1, "0.1 m per pixel is outside 1e-06 to 0.01 m: an image of 40 x 30 m; a factor 1000 "
               "(0.1mm)?"),
-        (1e-8, "1e-08 m a pixel is outside 1e-06 to 0.01 m: an image of 4e-06 x 3e-06 m"),
+        (1e-8, "1e-08 m per pixel is outside 1e-06 to 0.01 m: an image of 4e-06 x 3e-06 m"),
     ],
 )  # fmt: skip
 def test_a_pixel_and_the_image_it_makes(side: float, says: str) -> None:
@@ -44,7 +44,7 @@ def test_a_pixel_and_the_image_it_makes(side: float, says: str) -> None:
 
 def test_a_wide_image_of_plausible_pixels_is_odd() -> None:
     assert odd_pixel((9e-3, 9e-3), (4000, 4000)) == (
-        "0.009 m a pixel: an image of 36 x 36 m; a factor 1000 (0.009mm)?"
+        "0.009 m per pixel: an image of 36 x 36 m; a factor 1000 (0.009mm)?"
     )
     assert odd_pixel((9e-3, 9e-3)) == ""
     assert odd_pixel((1e-4, 1e-4), (1, 60_000)) == ""  # a line of pixels is no image
@@ -73,7 +73,7 @@ def test_asked_back_wherever_images_enter(tmp_path: Path) -> None:
     assert line.endswith("With its unit it is taken")
     code, _, err = here("import", str(folder), *to, "--m-per-px", "8m")  # meant, and asked
     assert (code, err.count("\n")) == (0, 1)
-    assert "'images': 8 m a pixel is outside" in err
+    assert "'images': 8 m per pixel is outside" in err
     code, _, err = here("import", str(folder), *to, "--m-per-px", "0.1mm")
     assert (code, err) == (0, "")
 
@@ -91,4 +91,4 @@ def test_a_recording_of_outlines_and_images_is_asked_back(tmp_path: Path) -> Non
     assert (code, err.count("\n")) == (0, 3)  # two scales, and that clocks are taken as one
     assert "a factor 1000 or 1000000?" in err
     defects = inspect_recording(path).defects
-    assert sum("m a pixel is outside" in d or "outlines of 20 m" in d for d in defects) == 2
+    assert sum("m per pixel is outside" in d or "outlines of 20 m" in d for d in defects) == 2

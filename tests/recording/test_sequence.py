@@ -63,7 +63,7 @@ def test_frames_that_are_not_ok_have_no_sample(tmp_path: Path) -> None:
     never = read_metaimage(written(tmp_path, tracked(2, lost=(0, 1))), {})
     assert not never.signals
     assert never.unread == {"StylusToReference": "never seen"}
-    with pytest.raises(RecordingError, match="never seen: StylusToReference"):
+    with pytest.raises(RecordingError, match="never visible: StylusToReference"):
         read_metaimage(written(tmp_path, tracked(2, lost=(0, 1), pixels=False)), {})
 
 
@@ -187,5 +187,7 @@ def test_an_nrrd_that_is_cut_in_its_packed_pixels_is_refused(tmp_path: Path) -> 
     with pytest.raises(RecordingError, match="over 999 bytes unpacked, more than its sizes hold"):
         nrrd_arrays._require_end(path, 999)
     path.write_bytes(path.read_bytes()[:-5])
-    with pytest.raises(RecordingError, match="cut: its pixels do not end with their checksum"):
+    with pytest.raises(
+        RecordingError, match="truncated: its pixels do not end with their checksum"
+    ):
         nrrd_arrays._require_end(path, 1000)

@@ -60,7 +60,7 @@ def test_16_bits_become_8_by_a_level_that_is_said(ending: str, itk: Path) -> Non
     shown = np.rint(PIXELS[:2] * (255 / top)).astype(np.uint8)
     np.testing.assert_array_equal(np.array(got.frame("images").images), shown)
     said = got.metadata["provenance"]["levels"]
-    assert said == f"16 bits made 8: 0 to {top} (the largest) became 0 to 255"
+    assert said == f"16 bits converted to 8: 0 to {top} (the largest) became 0 to 255"
     half = READ[ending](path, {"white": "510"}).frame("images").images
     np.testing.assert_array_equal(np.array(half), np.rint(PIXELS[:2] / 2).astype(np.uint8))
 

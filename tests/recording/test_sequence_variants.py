@@ -40,7 +40,9 @@ def test_images_lie_as_their_transforms_have_them(
     expected = [image[turn] for image in images(3)]
     np.testing.assert_array_equal(got.frame("images").images, expected)
     told = got.metadata["provenance"].get("images", "")
-    assert told.endswith(f"as {way}, its transforms are for MF") == (way[0] == "U" or way[1] == "N")
+    assert told.endswith(f"as {way}, but its transforms need MF") == (
+        way[0] == "U" or way[1] == "N"
+    )
 
 
 def test_lines_along_rows_are_no_image(tmp_path: Path) -> None:
@@ -75,7 +77,7 @@ def test_a_list_of_images_before_their_axes_is_one_of_times(tmp_path: Path) -> N
     }  # fmt: skip
     path = tmp_path / "x.seq.nrrd"
     nrrd.write(str(path), stored, header)
-    with pytest.raises(UsageError, match="say --map rate=HZ"):
+    with pytest.raises(UsageError, match="give --map rate=HZ"):
         read_nrrd(path, {})  # values without a unit of time, as numbers of frames
     for unit in ({"axis 0 index unit": "s"}, {"units": ["s", "", "", ""]}):
         nrrd.write(str(path), stored, header | unit)
@@ -112,7 +114,7 @@ def test_an_nrrd_with_three_axes_of_space_is_no_film(
     nrrd.write(str(path), images(3).transpose(2, 1, 0).copy(), header)
     if not why:
         assert len(read_nrrd(path, BY).frame("images").images) == 3
-        with pytest.raises(UsageError, match=r"say --map rate=HZ \(a volume is not read\)"):
+        with pytest.raises(UsageError, match=r"give --map rate=HZ \(a volume is not read\)"):
             read_nrrd(path, {"m_per_px": "0.1mm"})
         return
     for options in ({}, BY):

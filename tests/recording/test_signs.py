@@ -29,7 +29,7 @@ def test_the_other_signal_follows_the_sign_that_is_said(
 ) -> None:
     found = signs(displacement, force, None, None, None)
     assert (found.displacement, found.force) == expected
-    assert found.why == "sign given by the user"
+    assert found.why == "sign given by --map"
     pressed = displacement.values[-1] * expected[0] > 0
     assert found.kind is not None
     assert found.kind.name == ("compression" if pressed else "tension")

@@ -24,16 +24,16 @@ def test_a_unit_for_each_axis_of_a_list_is_one(tmp_path: Path) -> None:
     path.write_text(text % "cm" + f'"controlPoints": {points}}}]}}')
     assert read_markups(path, {}).marker("landmarks").x.tolist() == [[[0.01, 0.02, 0.03]]]
     path.write_text(text % "mm" + f'"controlPoints": {points}}}]}}')
-    with pytest.raises(RecordingError, match=r"\['cm', 'mm'\]; save them apart"):
+    with pytest.raises(RecordingError, match=r"\['cm', 'mm'\]; save them in separate files"):
         read_markups(path, {})
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('{"markups": []}', "its 'markups' is no list of lists"),
-        ('{"markups": [3]}', "its 'markups' is no list of lists"),
-        ('{"markups": [{"controlPoints": [7]}]}', "a control point that is no object; damaged"),
+        ('{"markups": []}', "its 'markups' is not a list of lists"),
+        ('{"markups": [3]}', "its 'markups' is not a list of lists"),
+        ('{"markups": [{"controlPoints": [7]}]}', "a control point that is not an object; damaged"),
     ],
 )
 def test_damaged_markups_are_refused(text: str, says: str, tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_8_bits_are_bit_for_bit(how: dict[str, Any], tmp_path: Path) -> None:
 def test_dots_a_centimetre_of_others_are_a_printers(tmp_path: Path) -> None:
     path = tmp_path / "x.tif"
     tifffile.imwrite(path, BYTES[0], resolution=(100, 100), resolutionunit="CENTIMETER")
-    with pytest.raises(UsageError, match=r"x\.tif: states no scale; say it"):
+    with pytest.raises(UsageError, match=r"x\.tif: has no scale; give it"):
         read_image_stack(path, {"rate": "2"})
 
 
@@ -79,9 +79,9 @@ def test_ome_states_its_scale_and_its_times(tmp_path: Path) -> None:
     frames = recording.frame("images")
     assert frames.m_per_px == pytest.approx((6.5e-6, 6.6e-6), rel=1e-9)
     assert frames.t.tolist() == [0, 0.5, 1]
-    assert "stated by OME" in recording.metadata["provenance"]["m_per_px"]
+    assert "declared by OME" in recording.metadata["provenance"]["m_per_px"]
     tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", "PhysicalSizeX": 6.5})
-    with pytest.raises(UsageError, match="states no scale"):
+    with pytest.raises(UsageError, match="has no scale"):
         read_image_stack(path, {"rate": "2"})
 
 
@@ -129,5 +129,5 @@ def test_a_damaged_number_of_ome_is_none(tmp_path: Path) -> None:
     path = tmp_path / "x.ome.tif"
     tifffile.imwrite(path, BYTES, ome=True, metadata={"axes": "TYX", **SIZED})
     path.write_bytes(path.read_bytes().replace(b'SizeX="6.5"', b'SizeX="6,5"'))
-    with pytest.raises(UsageError, match="states no scale"):
+    with pytest.raises(UsageError, match="has no scale"):
         read_image_stack(path, {"rate": "2"})

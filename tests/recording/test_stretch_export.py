@@ -21,7 +21,7 @@ def test_a_curve_is_read_in_pascal(tmp_path: Path) -> None:
     found = read_stretch_stress(written(tmp_path, f"stretch_[-],nominal_stress_[MPa]\n{ROWS}"))
     assert found.signal("stretch", "1").y[:, 0].tolist() == [1, 1.25, 1.5, 2, 2.5]
     assert found.signal("stress", "Pa").y[:, 0] == pytest.approx([0, 2e5, 3.1e5, 4.8e5, 7e5])
-    assert found.record("provenance")["stress unit"] == "MPa, of the header"
+    assert found.record("provenance")["stress unit"] == "MPa, from the header"
 
 
 def test_a_unit_that_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
@@ -29,7 +29,7 @@ def test_a_unit_that_the_file_does_not_state_is_asked_for(tmp_path: Path) -> Non
     with pytest.raises(RecordingError, match=r"'nominal_stress' has no unit; .* --set unit=MPa"):
         read_stretch_stress(path)
     assert read_stretch_stress(path, "kPa").signal("stress", "Pa").y.max() == pytest.approx(700)
-    with pytest.raises(RecordingError, match="'mm' is no unit of stress"):
+    with pytest.raises(RecordingError, match="'mm' is not a unit of stress"):
         read_stretch_stress(path, "mm")
 
 
@@ -68,5 +68,7 @@ def test_compression_is_negative(tmp_path: Path) -> None:
 
 def test_two_curves_in_one_file_are_refused(tmp_path: Path) -> None:
     table = f"stretch,stress_[kPa]\n{ROWS}"
-    with pytest.raises(RecordingError, match=r"rubber_uniaxial.csv: 2 tables; one curve a file"):
+    with pytest.raises(
+        RecordingError, match=r"rubber_uniaxial.csv: 2 tables; export one curve per file"
+    ):
         read_stretch_stress(written(tmp_path, f"{table}\nstretch,stress_[MPa]\n{ROWS}"))

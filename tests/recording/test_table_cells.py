@@ -46,7 +46,7 @@ def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None
 
 
 def test_a_line_that_is_no_csv_is_reported_with_its_length() -> None:
-    with pytest.raises(RecordingError, match="no CSV text: a line of 140001 characters: field l"):
+    with pytest.raises(RecordingError, match="not CSV text: a line of 140001 characters: field l"):
         cells._cells("1" * 140_000 + ",", ",")
 
 
@@ -59,7 +59,7 @@ def test_a_number_of_a_header_has_either_sign_but_where_it_may_group(
     text: str, decimal: str, expected: float | None
 ) -> None:
     if expected is None:
-        says = f"header: 'width' is '{re.escape(text)}', no plain number; write it without"
+        says = f"header: 'width' is '{re.escape(text)}', not a plain number; write it without"
         with pytest.raises(RecordingError, match=says):
             geometry._number("width", text, decimal)
     else:

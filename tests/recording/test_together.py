@@ -66,7 +66,7 @@ def test_a_drift_that_stays_adds_a_ramp_of_its_height(
 def test_a_drift_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_left", lambda *_: (1.0, 1.0))
     with pytest.raises(
-        RecordingError, match=f"the drift does not settle within {module._TURNS} tu"
+        RecordingError, match=f"the drift does not converge within {module._TURNS} it"
     ):
         drift_of(signal(T, motion(T)), signal(T, motion(T)), NO_OFFSET)
 

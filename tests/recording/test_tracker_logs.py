@@ -47,7 +47,7 @@ def test_what_was_never_seen_is_told_with_its_states(tmp_path: Path) -> None:
     path = log(tmp_path / "x.csv", "time,state,q0,qx,qy,qz,tx,ty,tz", f"0,Far,{POSE.format(1)}")
     with pytest.raises(
         RecordingError,
-        match=r"no tool was seen: .*; of the states \['Far'\] say which is seen: --map ok=",
+        match=r"no tool is visible: .*; name the state that means visible, of \['Far'\]: --map ok=",
     ):
         read_ndi(path, {})
 
@@ -161,7 +161,7 @@ def test_what_counts_as_seen_is_known_or_asked_for(
     path = log(tmp_path / "x.csv", head, *rows)
     said = {}
     if seen == "1":  # of NDI's numbers 0, of others 1 is good
-        with pytest.raises(RecordingError, match=r"\['0', '1'\] say which is seen: --map ok="):
+        with pytest.raises(RecordingError, match=r"\['0', '1'\]: --map ok="):
             read_ndi(path, {})
         said = {"ok": "1"}
     assert read_ndi(path, said).signal("tool1/translation", "m").t.tolist() == [0, 2]
@@ -194,7 +194,7 @@ def test_a_trajectory_of_words_and_numbers_at_spaces(tmp_path: Path) -> None:
     """It was called no table; its lengths are in m, where a tracker of NDI writes mm."""
     path = log(tmp_path / "t.txt", "# timestamp tx ty tz qx qy qz qw", *TUM)
     assert recognised(path).name == "ndi"
-    with pytest.raises(UsageError, match="no unit of length; say it: --map unit=m, as"):
+    with pytest.raises(UsageError, match=r"no unit of length; give --map unit=m \(as"):
         read_ndi(path, {})
     got = read_ndi(path, {"unit": "m"}).signal("tool1/translation", "m")
     assert np.allclose(got.y, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])

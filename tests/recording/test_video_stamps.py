@@ -53,7 +53,7 @@ def test_uneven_stamps_of_the_container_are_the_times(
     np.testing.assert_allclose(greys, 20 + 20 * np.arange(7), atol=3)
     assert frames.images[0].shape == (48, 64)
     said = got.metadata["provenance"]["times"]
-    assert said == "the container's, uneven: 30 to 170 ms apart"
+    assert said == "from the container, uneven: steps of 30 to 170 ms"
 
 
 def test_some_of_uneven_frames_keep_their_stamps(tmp_path: Path) -> None:
@@ -107,10 +107,10 @@ def test_a_matroska_file_that_was_cut_is_refused(tmp_path: Path) -> None:
     whole = path.read_bytes()
     assert VIDEO.recognises(path)
     path.write_bytes(whole[:-100])
-    with pytest.raises(RecordingError, match=rf"its parts need {len(whole)}: cut"):
+    with pytest.raises(RecordingError, match=rf"its parts need {len(whole)}: truncated"):
         read_video(path, SCALE)
     path.write_bytes(whole[:40])
-    with pytest.raises(RecordingError, match="cut"):
+    with pytest.raises(RecordingError, match="truncated"):
         read_video(path, SCALE)
 
 
@@ -138,7 +138,7 @@ def test_a_box_shorter_than_its_head_is_damage(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [0.0, -25.0, float("inf"), float("nan")])
 def test_frames_without_times_and_without_a_rate_ask_for_one(rate: float) -> None:
     still = np.zeros(3)
-    with pytest.raises(UsageError, match=r"x.avi: 3 frames without times; say --rate HZ"):
+    with pytest.raises(UsageError, match=r"x.avi: 3 frames without times; give --rate HZ"):
         video._times(Path("x.avi"), still, rate, 1, {})
     t, words = video._times(Path("x.avi"), still, 10.0, 2, {})
     assert (t.tolist(), words) == ([0.0, 0.2, 0.4], "10 Hz as declared; frames have no times")
@@ -152,6 +152,6 @@ def test_frames_beyond_all_bytes_of_a_film_are_refused(
     monkeypatch.setattr(video_arrays, "MOST", 3 * 48 * 64)
     assert len(video_arrays.arrays(path, every=3)["images"]) == 3
     with pytest.raises(
-        RecordingError, match="frames of 64 x 48 beyond 9216 bytes after 4; take few"
+        RecordingError, match="frames of 64 x 48 beyond 9216 bytes after 4; read few"
     ):
         video_arrays.arrays(path)

@@ -96,5 +96,5 @@ def test_a_fit_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(anisotropic, "_MOST", 1)
     points = np.random.default_rng(3).normal(size=(5, 3))
     turn = Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix()
-    with pytest.raises(RegistrationError, match="did not settle in 1 steps: check the noise"):
+    with pytest.raises(RegistrationError, match="did not converge in 1 steps: check the noise"):
         fit_weighted(points, points @ turn.T, np.eye(3), Similarity(np.eye(3), np.zeros(3)))

@@ -338,7 +338,7 @@ def test_markers_that_are_missing_at_rest_are_named() -> None:
     assert (late.names, unseen, fewest) == (("a", "b"), (), 1)
     only = replace(seen, names=("b",), x=seen.x[:, 1:])
     with pytest.raises(
-        RegistrationError, match=r"none of 1 markers is seen in the first 0.5 s, at"
+        RegistrationError, match=r"none of 1 markers is visible in the first 0.5 s, at"
     ):
         from_rest_module.rested(only, 0.5)
 

@@ -74,7 +74,7 @@ def test_a_tip_is_seen_from_a_reference_that_moves() -> None:
     at, x = tip_path(("a", "b"), (t, arm), (t[1:], arm[1:]), tip)
     np.testing.assert_array_equal(at, t[1:])
     np.testing.assert_allclose(x, np.tile(tip, (4, 1)), atol=1e-12)
-    with pytest.raises(RegistrationError, match="never seen at one time"):
+    with pytest.raises(RegistrationError, match="never visible at the same time"):
         tip_path(("a", "b"), (t, arm), (t + 9, arm), tip)
 
 
@@ -130,5 +130,5 @@ def test_a_short_disturbance_parts_no_dwell() -> None:
 
 
 def test_more_places_than_can_be_landmarks_are_refused() -> None:
-    with pytest.raises(RegistrationError, match="61 places for 7 landmarks; at most 60"):
+    with pytest.raises(RegistrationError, match="61 places for 7 landmarks; expected at most 60"):
         match_landmarks(ODD, np.zeros((61, 3)), 2e-3)

@@ -114,7 +114,7 @@ def test_what_leaves_the_plane_open_is_refused() -> None:
     with pytest.raises(RegistrationError, match="2 points tell 6 numbers of 8 unknown ones"):
         image_plane(landmarks(rng, 1, 2))
     still = wired(rng, 1)
-    with pytest.raises(RegistrationError, match=r"mark targets that lie apart|leave a motion"):
+    with pytest.raises(RegistrationError, match=r"mark targets at larger distances|do not fix"):
         image_plane(SeenPoints(np.tile(still.px[:3], (3, 1)), np.repeat([0, 1, 2], 3),
                                still.targets[:3] * 3, np.tile(still.R[:3], (3, 1, 1)),
                                np.tile(still.t[:3], (3, 1))))  # fmt: skip
@@ -158,9 +158,9 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
     assert frames.m_per_px == pytest.approx(SCALE, rel=0.02)
     assert frames.pose[:3, 3] == pytest.approx(TRUTH.t, abs=5e-4)
     record = read_recording(out).record("image_plane/images")
-    assert "each image by the others" in record["predicted"]
+    assert "each image from the others" in record["predicted"]
     assert "mm at the middle" in record["sd"]
-    assert "no poses of 'Stylus'; there are ProbeToReference" in refused(
+    assert "no poses of 'Stylus'; tools with poses: ProbeToReference" in refused(
         *given, "--probe", "Stylus"
     )
     (tmp_path / "points.csv").write_text("image,u,v,target\n0,1,1,q\n")
@@ -168,24 +168,24 @@ def test_the_command_writes_images_that_know_where_they_lie(tmp_path: Path) -> N
         *given, "--probe", "ProbeToReference"
     )
     (tmp_path / "points.csv").write_text("image,u,v,target\n99,1,1,a0\n")
-    assert "image 99: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
+    assert "image 99: expected 0 to 7" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u,v,target\n1.7,1,1,a0\n")
-    assert "image 1.7: there are 0 to 7" in refused(*given, "--probe", "ProbeToReference")
+    assert "image 1.7: expected 0 to 7" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u,v,target\n1,one,1,a0\n")
-    assert "points.csv: u = 'one' is no number" in refused(*given, "--probe", "ProbeToReference")
+    assert "points.csv: u = 'one' is not a number" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u,v,target\n0,1\n")
     assert "no target ''" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u,v,target\n0,1,1,a0\n")
     for rows, why in (
         ("x,y,z,target\n1,2,3\n", "no target 'a0'"),
-        ("target,x,y,z,x2\na0,0,0,0,5\n", "y2 = '' is no number"),
-        (f"target,x,y,z\na0,{'1' * 200000},0,0\n", "no table with commas (field"),
+        ("target,x,y,z,x2\na0,0,0,0,5\n", "y2 = '' is not a number"),
+        (f"target,x,y,z\na0,{'1' * 200000},0,0\n", "not a comma-separated table (field"),
     ):
         (tmp_path / "wires.csv").write_text(rows)
         assert why in refused(*given, "--probe", "ProbeToReference")
     files(tmp_path, wired(np.random.default_rng(3), 2))
     (tmp_path / "points.csv").write_text("image;u;v;target\n")
-    assert "with commas between them" in refused(*given, "--probe", "ProbeToReference")
+    assert "separated by commas" in refused(*given, "--probe", "ProbeToReference")
     (tmp_path / "points.csv").write_text("image,u\n")
     assert "expected image, u, v, target" in refused(*given, "--probe", "ProbeToReference")
 
@@ -203,7 +203,7 @@ def test_a_mistaken_unit_and_outlines_of_before_are_refused(tmp_path: Path) -> N
     x = tmp_path / "x.mcap"
     assert here("calibrate", str(x), *given, "--unit", "mm")[0] == 0
     (tmp_path / "y.mcap").unlink()
-    assert "wires.csv: a table states no unit" in refused("calibrate", str(x), *given)
+    assert "wires.csv: the table has no unit" in refused("calibrate", str(x), *given)
     assert "a pixel would be 110 mm wide" in refused("calibrate", str(x), *given, "--unit", "m")
     ring = np.array([[0, 0], [0.01, 0], [0, 0.01]])
     drawn = Contours(np.zeros(1), (ring,), 1e-4, np.eye(4), "image", "images")
@@ -234,7 +234,7 @@ def test_targets_are_taken_from_landmarks_as_from_a_table(tmp_path: Path) -> Non
         found.append(read_recording(tmp_path / "y.mcap").frame("images").pose)
         (tmp_path / "y.mcap").unlink()
     assert found[1] == pytest.approx(found[0], abs=1e-8)
-    assert "whose points are metres" in refused(
+    assert "with points in metres" in refused(
         *given, "--targets", str(tmp_path / "t.mcap"), "--unit", "mm"
     )
     assert "0 streams of points at one instant" in refused(
@@ -250,13 +250,13 @@ def test_swapped_targets_are_doubted_and_named_twice_refused(tmp_path: Path) -> 
              "-o", str(tmp_path / "y.mcap")]  # fmt: skip
     lines = wires.read_text().splitlines()
     wires.write_text("\n".join([*lines, lines[1]]))
-    assert "target a0 stands there twice" in refused(*given)
+    assert "target a0 occurs twice" in refused(*given)
     other = {"a0": "c2", "c2": "a0"}
     swapped = [f"{other.get(line[:2], line[:2])}{line[2:]}" for line in lines]
     wires.write_text("\n".join(swapped))
     code, _, err = here(*given)
     assert code == 0
-    assert "most: are targets swapped" in err
+    assert "check for swapped targets" in err
 
 
 def test_one_image_that_alone_tells_a_motion_leaves_no_prediction_of_itself() -> None:
@@ -280,5 +280,5 @@ def test_wires_along_one_direction_leave_a_motion_open() -> None:
     there = np.einsum("nij,nj->ni", R, TRUTH.apply(flat)) + seen.t
     along = np.array([0.0, 0.0, 1.0])
     wires = tuple(KnownTarget(f"w{i}", x, along) for i, x in enumerate(there))
-    with pytest.raises(RegistrationError, match="leave a motion of the image plane open: turn"):
+    with pytest.raises(RegistrationError, match="do not fix the image plane: turn"):
         image_plane(replace(seen, targets=wires, R=R))

@@ -35,5 +35,5 @@ def test_a_stray_marker_is_no_swap(far: float) -> None:
 def test_a_marker_that_changed_places_is_named() -> None:
     rest, x = seen(0)
     x[[3, 7]] = x[[7, 3]]
-    with pytest.raises(RegistrationError, match=r"m07 look swapped at t = 0\.00 s"):
+    with pytest.raises(RegistrationError, match=r"m07 seem swapped at t = 0\.00 s"):
         require(rest, x)

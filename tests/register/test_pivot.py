@@ -67,7 +67,7 @@ def test_poses_before_the_tip_stands_are_left_out() -> None:
     assert 220 <= len(got.used) <= 230
     assert got.used.min() >= 70
     assert np.abs(got.tip - TIP).max() < 4 * got.sd.max()
-    with pytest.raises(RegistrationError, match=r"does not stand on a point|fewer than half"):
+    with pytest.raises(RegistrationError, match=r"does not stay on one point|fewer than half"):
         pivot(*turned(np.random.default_rng(2), WIDE, noise=3e-4, coming=200))
 
 
@@ -88,7 +88,7 @@ def test_too_few_poses_and_a_tip_that_wanders_are_refused() -> None:
     with pytest.raises(RegistrationError, match="10 poses, at least 20"):
         pivot(R[:10], T[:10], point[:10])
     moved = T + 0.05 * np.sin(np.linspace(0, 40, N))[:, None] * [1, 0.5, -0.7]
-    with pytest.raises(RegistrationError, match=r"does not stand on a point|fewer than half"):
+    with pytest.raises(RegistrationError, match=r"does not stay on one point|fewer than half"):
         pivot(R, moved, point)
 
 
@@ -124,14 +124,14 @@ def test_the_command_tells_the_tip_and_writes_its_path(reference: bool, tmp_path
 
 def test_what_the_command_cannot_use_is_told(tmp_path: Path) -> None:
     x, out = recording(tmp_path), str(tmp_path / "y.mcap")
-    assert "there are Stylus" in refused("calibrate", str(x), "--pivot", "Pen", "-o", out)
+    assert "tools with poses: Stylus" in refused("calibrate", str(x), "--pivot", "Pen", "-o", out)
     both = refused("calibrate", str(x), "--pivot", "Stylus", "--unit", "mm", "-o", out)
-    assert "--unit: of an image plane, not of --pivot Stylus" in both
+    assert "--unit: for an image plane; leave out with --pivot Stylus" in both
     lone = refused("calibrate", str(x), "--tip", "1mm,2mm,3mm", "-o", out)
-    assert "--reference and --tip are of --pivot TOOL" in lone
+    assert "--reference and --tip need --pivot TOOL" in lone
     odd = ("calibrate", str(x), "--pivot", "Stylus", "-o", out, "--tip")
     assert "expected three lengths" in refused(*odd, "1mm")
-    assert "never stands" in refused(*odd, "500mm,0mm,0mm")
+    assert "never stays" in refused(*odd, "500mm,0mm,0mm")
     assert "Missing option '--points'" in refused("calibrate", str(x), "-o", out)
 
 
@@ -154,14 +154,14 @@ def test_a_stylus_on_eight_landmarks_against_its_published_tip(
     assert tip == pytest.approx([0.1096, 0.00677, 0.00285], abs=1e-4)
     assert 2 * ERROR < np.linalg.norm(tip - PUBLISHED) < 4 * ERROR
     whole = refused("calibrate", str(x), *given)
-    assert "does not stand on a point" in whole
+    assert "does not stay on one point" in whole
 
 
 def test_a_tip_that_stands_in_few_poses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     R, T, point = turned(np.random.default_rng(0), WIDE)
     module = sys.modules[pivot.__module__]  # its package exports the function by the same name
     monkeypatch.setattr(module, "_standing", lambda *_: np.arange(149))
-    with pytest.raises(RegistrationError, match="in 149 of 300 poses, fewer than half: cut"):
+    with pytest.raises(RegistrationError, match="in 149 of 300 poses, fewer than half: shorten"):
         pivot(R, T, point)
     monkeypatch.setattr(module, "_standing", lambda *_: np.arange(150))
     assert len(pivot(R, T, point).used) == 150

@@ -163,8 +163,8 @@ def test_proper_pose_is_accepted():
     ("change", "message"),
     [
         (lambda R: R * [1, 1, -1], "pose 'probe' mirrors the image; give T_frame_from_image"),
-        (lambda R: R * 1.01, "pose 'probe' is off orthogonal by 2.0e-02"),
-        (lambda R: R + np.eye(3, k=1) * 1e-3, "is off orthogonal by"),
+        (lambda R: R * 1.01, "pose 'probe' is not orthogonal: error 2.0e-02"),
+        (lambda R: R + np.eye(3, k=1) * 1e-3, "is not orthogonal: error"),
     ],
 )
 def test_improper_poses_are_refused(change, message):

@@ -44,7 +44,7 @@ def test_defaults_change_nothing() -> None:
 
 def test_a_sensor_that_reads_nothing_is_refused() -> None:
     for gain in (0.0, -1.0, float("nan")):
-        with pytest.raises(UsageError, match="of a sensor: above 0"):
+        with pytest.raises(UsageError, match="of a sensor: expected above 0"):
             Sensing(gain=gain)
 
 

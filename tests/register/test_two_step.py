@@ -95,7 +95,7 @@ def test_plane_is_the_total_least_squares_one():
 @pytest.mark.parametrize(
     ("x", "up", "said"),
     [
-        (np.vstack([np.eye(3), -np.eye(3)]), None, "no plane .spread 577, 577, 577 mm"),
+        (np.vstack([np.eye(3), -np.eye(3)]), None, "not a plane .spread 577, 577, 577 mm"),
         (flat(1) * [1, 0, 1], None, "20 collinear points"),
         (flat(1)[:2], None, "2 points, a fit in 3-D needs 3"),
         (flat(1)[:, :2], None, r"shape \(20, 2\)"),

@@ -54,4 +54,4 @@ def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
     one, other = found.values
     assert set(one.parts) == set(other.parts) == {"noise"}
     assert "correlation with nu" in one.correlation
-    assert "not in this interval" in one.correlation
+    assert "does not include inputs and mesh" in one.correlation

@@ -85,7 +85,9 @@ def test_a_value_is_taken_as_it_is_and_then_nothing_is_fitted() -> None:
 def test_a_figure_that_would_serve_twice_is_an_error() -> None:
     for quantities in (("force",), ("force@0.3mm",)):
         twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(quantities),)),))
-        with pytest.raises(ComparisonError, match=r"calibrates 'fem': a figure serves once"):
+        with pytest.raises(
+            ComparisonError, match=r"calibrates 'fem': each value can be used only once"
+        ):
             compare(twice, Options({}))
 
 
@@ -93,7 +95,7 @@ def test_the_judged_recording_under_another_name_serves_once_too() -> None:
     on = Calibrates(("force@0.3mm",), lambda p: replace(p, nu=0.3), "another")
     twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (on,)),))
     hashed = replace(twice, load=_hashed)
-    with pytest.raises(ComparisonError, match="what is judged is the same recording"):
+    with pytest.raises(ComparisonError, match="the checks use the same recording"):
         compare(hashed, Options({}))
 
 
@@ -131,7 +133,7 @@ def test_a_load_that_is_not_there_is_named_with_those_that_are() -> None:
     assert there.name == "force@0.3mm"
     assert (not_there.name, not_there.count) == ("force@9mm", 0)
     assert not_there.why == (
-        "compared nothing: no such load of force; there are 0.1mm, 0.2mm, 0.3mm"
+        "compared nothing: unknown load of force; there are 0.1mm, 0.2mm, 0.3mm"
     )
 
 
@@ -153,7 +155,7 @@ def test_a_marker_that_is_never_seen_calibrates_nothing() -> None:
 def test_what_repeats_the_model_is_not_said_to_have_served_to_fit() -> None:
     repeats = replace(OPEN, accept=OPEN.accept[:1])
     sentence = compare(repeats, Options({})).sentence
-    assert "predicted: nothing, for 3 of 3 checks only repeat the model itself. " in sentence
+    assert "predicted: nothing, because 3 of 3 checks only repeat the model. " in sentence
 
 
 @pytest.mark.slow

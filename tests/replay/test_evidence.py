@@ -82,9 +82,9 @@ def test_another_models_twin_is_evidence_but_no_measurement() -> None:
 @pytest.mark.slow
 def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
     result = judged(other_model(), sd="1e-6")
-    assert result.notes[0].startswith("The twin was recorded anew")
+    assert result.notes[0].startswith("The twin was simulated again")
     assert [c.verdict for c in result.checks] == ["same model"]
-    assert "made again from this run's own parameters" in result.checks[0].why
+    assert "simulated again with this run's parameters" in result.checks[0].why
 
 
 def unsaid(card: Card, folder: Path) -> tuple[Recording, ...]:
@@ -184,7 +184,7 @@ def test_the_terminals_first_line_says_what_was_judged(
 
 
 @pytest.mark.parametrize(
-    ("doubts", "word"), [((), "good enough;"), (("50 m?",), "good enough, in doubt;")]
+    ("doubts", "word"), [((), "good enough;"), (("50 m?",), "good enough, with warnings;")]
 )
 def test_the_first_line_doubts_what_the_warnings_doubt(
     doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]

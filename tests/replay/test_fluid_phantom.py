@@ -194,7 +194,7 @@ SPOILED: tuple[tuple[str, Spoil, type[ValidateError], str], ...] = (
         "swapped at a load",
         lambda r: with_markers(r, swapped_late),
         RegistrationError,
-        "m04, m05 look swapped at t = ",
+        "m04, m05 seem swapped at t = ",
     ),
     ("shuffled", lambda r: with_markers(r, shuffled), RegistrationError, "relabel|permut|swap"),
     ("mirrored", lambda r: with_markers(r, mirrored), RegistrationError, "mirror"),
@@ -261,7 +261,7 @@ def test_bad_recordings_are_refused_in_one_line(
     ("setting", "says"),
     [
         ({"loads": "0.0,0.003"}, "above 0"),
-        ({"loads": "0.003,0.003"}, "stand once"),
+        ({"loads": "0.003,0.003"}, "occur once"),
         ({"mesh.order": "3"}, "one of 1, 2"),
         ({"methods.p2_fluid.order": "0"}, "one of 1, 2"),
         ({"mesh.nodes_x": "100000"}, "expected at most 100000"),

@@ -105,9 +105,7 @@ def test_without_it_the_verdict_is_wrong_and_the_doubt_comes_first(tmp_path: Pat
     assert not any("machine" in w for w in result.warnings)  # 8 N/mm is soft for any machine
     stiff = recorded(T * 1e-4, T * 20.0)  # 2e5 N/m
     said = doubt(replace(BLOCK, machine=Machine()), stiff, 0.5)
-    assert said.startswith(
-        "machine.compliance is not stated. The specimen yields 5e-06 m/N at 80 N"
-    )
+    assert said.startswith("machine.compliance is not set. The specimen yields 5e-06 m/N at 80 N")
     assert "shifts the force by 2 to 20 % (16 N; the limit is 0.5 N)" in said
 
 
@@ -227,7 +225,7 @@ def refused(p: MeasuredBody) -> None:
         (lambda: Machine(-1.0), "both must be 0 or above"),
         (lambda: Machine(1e-6, measured="x.mcap"), "both set"),
         (lambda: refused(replace(BLOCK, indenter=Indenter("cylinder", 1e-3, axis="+z"))),
-         "lies across the direction"),
+         "must lie across its direction"),
         (lambda: refused(replace(BLOCK, indenter=Indenter("sphere", 1e-3, tip=(1.0, 1.0, 1.0)))),
          "no node of moved.place"),
         (lambda: refused(replace(SPHERE, body=Solid(cylinder=(0.02, 0.003)),

@@ -70,7 +70,8 @@ def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> N
     """The time step is neither the default nor the one that the experiment gives."""
     plain = Method("m", Newmark())
     with pytest.raises(
-        UsageError, match=r"dt = 0.5 of 'm': the experiment sets 0.01; change its own parameter"
+        UsageError,
+        match=r"dt = 0.5 of 'm': the experiment sets 0.01; change the experiment's parameter",
     ):
         Method("m", Newmark(dt=0.5)).given({"dt": 0.01})
     assert plain.given({"dt": 0.01, "colour": 3}).dt == 0.01
@@ -96,14 +97,14 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
         (
             lambda: asked._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
             UsageError,
-            "x accepts nothing: declare a calibration in its file",
+            "x has no accepted methods: declare a calibration in its file",
         ),
         (
             lambda: calibrated.problem_of(
                 bare(calibrations=(SimpleNamespace(method="fine"),)), 0, (), None, {"m": None}, ()
             ),
             UsageError,
-            "calibration by 'fine': no such method; m",
+            "calibration by 'fine': unknown method; expected one of m",
         ),
         (
             lambda: _executed(Path("x.unknown")),
@@ -113,7 +114,7 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
         (
             lambda: turned(Material(1.0, 0.3), 4),
             SceneError,
-            "nothing moves without a density; give the material rho kg/m3",
+            "a motion needs a density; set the material's rho, kg/m3",
         ),
         (
             lambda: PressedOutline(holds=0),
@@ -156,14 +157,16 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
 def test_an_inclusion_without_loads_compares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inclusion, "driving", lambda *_: None)
     streams = SimpleNamespace(stage="stage")
-    with pytest.raises(ComparisonError, match="no loads: nothing would be compared; set stage po"):
+    with pytest.raises(ComparisonError, match="no loads: nothing can be compared; set stage po"):
         inclusion.placed(None, None, None, None, streams, {}, (), ())  # type: ignore[arg-type]
 
 
 def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
     with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from a file"):
         folder_of(bare(path=None))  # type: ignore[arg-type]
-    with pytest.raises(ComparisonError, match="experiment 'x' has no twin to replay a loop with"):
+    with pytest.raises(
+        ComparisonError, match="experiment 'x' has no twin, which replaying a loop needs"
+    ):
         as_given(bare(twin=None), None)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
         prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
@@ -175,7 +178,7 @@ def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> 
     recording = Recording("r", Source("r", "", 0, ""), 0)
     remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
     with pytest.raises(
-        UsageError, match=r"r: --set dt=.* would be ignored: the recording does not"
+        UsageError, match=r"r: --set dt=.* would have no effect: the recording does not"
     ):
         remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
 

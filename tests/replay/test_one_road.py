@@ -124,7 +124,7 @@ def test_without_a_twin_nothing_is_scored_or_drawn_against_a_truth(untold: Resul
 
 def test_a_case_that_nobody_can_record_is_refused() -> None:
     case = Case("stiff", "no twin makes it", stiffer)
-    with pytest.raises(ComparisonError, match="case 'stiff' is not shipped, and no twin"):
+    with pytest.raises(ComparisonError, match="case 'stiff' is not shipped, and no declared twin"):
         compare(declared(TINY, twin=None, uncertainty=FINER, cases=(case,)), Options({}))
 
 
@@ -292,7 +292,10 @@ def test_a_check_that_compared_nothing_carries_the_unit_of_its_quantity() -> Non
     assert all("compared nothing: refused: told so" in c.why for c in result.checks)
     unknown = declared(AT_HOLDS, accept=(Accept("nowhere", 1.0, "ours"),), uncertainty=FINER)
     (check,) = compare(unknown, Options({})).checks
-    assert (check.unit, check.why) == ("-", "compared nothing: no such quantity in the recording")
+    assert (check.unit, check.why) == (
+        "-",
+        "compared nothing: the recording does not have this quantity",
+    )
 
 
 def test_a_signal_whose_trace_no_method_has_is_a_note_and_a_failed_check() -> None:

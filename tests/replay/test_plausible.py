@@ -53,7 +53,7 @@ def test_what_is_plausible_is_not_doubted() -> None:
 @pytest.mark.parametrize(
     ("value", "unit", "path", "factor"),
     [
-        (50.0, "m", "block", "50 m is 1000 times 50 mm: were millimetres meant?"),
+        (50.0, "m", "block", "50 m is 1000 times 50 mm: check its unit"),
         (10.0, "Pa", "material.E", "modulus of 10 Pa, 1/10 of 100 Pa, the least"),
         (2e8, "Pa", "material.E_slip", "modulus of 2e+08 Pa, 20 times 1e+07 Pa, the largest"),
         (-5.0, "Pa", "material.E", "modulus of -5 Pa"),
@@ -91,4 +91,6 @@ def test_a_run_doubts_images_beyond_reason() -> None:
         "m", "m", "", replace(SCENE, drives=()), (Registered((stage,)),), (), {}
     )  # fmt: skip
     (found,) = doubts((), {}, (recording,), point)
-    assert found.startswith("r: 'us': 8 m a pixel is outside 1e-06 to 0.01 m: an image of 3.2e+03")
+    assert found.startswith(
+        "r: 'us': 8 m per pixel is outside 1e-06 to 0.01 m: an image of 3.2e+03"
+    )

@@ -108,7 +108,7 @@ def test_a_uniformly_pressed_cylinder_has_the_outline_it_should(body: Mesh) -> N
 def test_what_places_the_images_is_asked_for(body: Mesh) -> None:
     with pytest.raises(UsageError, match=r"where the images of 'seen' lie .* outline\.origin"):
         registered(body, replace(PLACE, origin=()))
-    with pytest.raises(UsageError, match=r"outline\.sd is not set"):
+    with pytest.raises(UsageError, match=r"outline\.sd \(standard uncertainty"):
         registered(body, replace(PLACE, sd=None))
     with pytest.raises(UsageError, match="two directions at right angles"):
         registered(body, replace(PLACE, image_y="+x"))
@@ -137,17 +137,17 @@ def test_outlines_named_after_the_declaration_are_refused(body: Mesh) -> None:
     card = Compression(specimen=Specimen(D, H), mesh=CylinderGrid(2, 2))
     late = replace(card, outline=PLACE)
     one = experiment(card)
-    with pytest.raises(UsageError, match="name them in its file"):
+    with pytest.raises(UsageError, match="name the topic there"):
         one.place(recorded(), late, one.build(recorded(), late, one.methods["slip"].scene))
 
 
 def test_fluid_in_a_body_wants_its_modulus_and_the_linear_law() -> None:
-    with pytest.raises(UsageError, match="fluid is for the linear law, not svk"):
+    with pytest.raises(UsageError, match="fluid needs the linear law, not svk"):
         pressed("x", law="svk", fluid=True)
     card = Compression(specimen=Specimen(D, H, fluid="wall"), material=Gel())
     one = experiment(card, fluid=True)
     assert one.identify is not None
-    with pytest.raises(UsageError, match=r"material\.E is not set, and a body with fluid inside"):
+    with pytest.raises(UsageError, match=r"material\.E is not set: a body with fluid inside"):
         one.identify((recorded(),), card, one.methods)
 
 

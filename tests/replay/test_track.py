@@ -177,7 +177,7 @@ def test_a_marker_that_is_not_there_is_compared_with_nothing_and_fails() -> None
     one, two = result.checks
     assert one.verdict == "same model"
     assert one.count == STEPS
-    assert two.why == "compared nothing: no such quantity in the recording"
+    assert two.why == "compared nothing: the recording does not have this quantity"
     assert two.verdict == "nothing compared"
     assert not result.passed
 

@@ -116,7 +116,7 @@ def test_measured_points_fade_between_loads(animation: Animation) -> None:
 
 def test_words(animation: Animation) -> None:
     assert "interpolated linearly in the drive" in animation.caption
-    assert "The still picture shows 9 mm." in animation.caption
+    assert "The still image shows 9 mm." in animation.caption
     assert "mm" in animation.caption
     assert animation.alt.startswith("Animation: the measured outline points over the simulated")
 

@@ -191,7 +191,7 @@ def test_rounding_is_named_and_not_drawn(result: Result) -> None:
     assert ax.get_ylim()[0] >= 1e-9
     assert [t.get_text() for t in ax.texts] == ["below 1e−9 mm: exact"]
     assert (
-        "Not drawn, below 1e−9 mm, a billionth of the scale: exact"
+        "Not drawn, as below 1e−9 mm, a billionth of the scale: exact"
         in charts.picture(result, made).caption
     )
 

@@ -172,10 +172,10 @@ def test_lines_hide_each_other_within_a_share_of_the_largest_range(
 
 
 def test_what_was_assumed_of_a_file_stands_apart_and_unfolded() -> None:
-    records = {"assumed": {"test": "tension: said by the user"}, "header": {"a": "b"}}
+    records = {"assumed": {"test": "tension: given by --map"}, "header": {"a": "b"}}
     recording = Recording("gel", Source("x", "", 0, "x"), 0, metadata=records)
     assumed = _assumed(recording)
-    assert (assumed.rows, assumed.folded) == ((("test", "tension: said by the user"),), False)
+    assert (assumed.rows, assumed.folded) == ((("test", "tension: given by --map"),), False)
     assert _metadata(recording).rows == (("header", "a", "b"),)
 
 

@@ -308,7 +308,7 @@ def test_replay_shows_frames_at_their_own_times(folder: Path) -> None:
     assert np.isnan(replay.markers["/markers/measured"].x).any()
     assert replay.signals["/push/measured"].unit == "N"
     told = replay.metadata["validate.replay"]
-    assert told["interpolated"] == "nothing: output frames at their own times"
+    assert told["interpolated"] == "nothing: output frames keep their times"
     assert f"of {len(AT)} output frames" in told["thinned"]
 
 

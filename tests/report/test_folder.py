@@ -63,7 +63,7 @@ def test_a_failure_leaves_the_old_folder_and_its_studies(
 def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("", encoding="utf-8")
-    with pytest.raises(UsageError, match="1 entries and no"):
+    with pytest.raises(UsageError, match="1 entries but no"):
         replace_folder(tmp_path / "mine", fill(""), (STUDIES,))  # type: ignore[arg-type]
 
 
@@ -219,7 +219,7 @@ def test_two_renames_are_undone_where_the_second_fails(
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", second_fails)
-    with pytest.raises(UsageError, match="disk is gone; what was there stays"):
+    with pytest.raises(UsageError, match="disk is gone; its old content is kept"):
         replace_folder(folder, fill("new"), (STUDIES,))  # type: ignore[arg-type]
     assert (folder / MARK).read_text("utf-8") == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["kf"]

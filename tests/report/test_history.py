@@ -95,7 +95,7 @@ def test_a_line_that_was_edited_or_damaged_is_told_and_left_out(
         caplog.clear()
         (folder / LINES).write_text(damage, "utf-8")
         assert len(history(tmp_path, "cube")) == 1
-        assert "cube/history.jsonl, line 1: not believed" in caplog.text
+        assert "cube/history.jsonl, line 1: ignored" in caplog.text
 
 
 def test_an_edited_result_is_told_and_no_run(
@@ -106,7 +106,7 @@ def test_an_edited_result_is_told_and_no_run(
     (folder / MARK).write_text(text.replace('"quick": false', '"quick": true'), "utf-8")
     assert (folder / MARK).read_text("utf-8") != text
     assert history(tmp_path, "cube") == ()
-    assert "cube/results.json: not believed (its content does not fit its checksum" in caplog.text
+    assert "cube/results.json: ignored (its content does not match its checksum" in caplog.text
 
 
 def pair(tmp_path: Path, value: float, *, hashed: str | None = None, u_num: float = 0.01) -> Any:

@@ -157,7 +157,7 @@ def test_the_command_writes_what_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(json.dumps(sealed(content(check("a", "good enough")))))
     run = CliRunner()
     nothing = run.invoke(cli, ["export", str(tmp_path)])
-    assert "say what: --junit" in str(nothing.exception)
+    assert "give --junit" in str(nothing.exception)
     files = ["--junit", str(tmp_path / "x.xml"), "--latex", str(tmp_path / "x.tex")]
     done = run.invoke(cli, ["export", str(tmp_path), *files])
     assert done.exit_code == 0, done.output
@@ -169,7 +169,7 @@ def test_the_command_writes_what_is_asked_for(tmp_path: Path) -> None:
 def test_what_is_no_stored_run_is_one_line(broken: str, tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(broken)
     done = CliRunner().invoke(cli, ["export", str(tmp_path), "--junit", str(tmp_path / "x.xml")])
-    assert re.search(r"results\.json: not believed \(.*\); run it again", str(done.exception))
+    assert re.search(r"results\.json: ignored \(.*\); run it again", str(done.exception))
 
 
 def test_a_run_of_an_earlier_schema_says_so(tmp_path: Path) -> None:

@@ -157,8 +157,8 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
 def test_sentences_say_what_can_and_cannot_be_told_apart() -> None:
     found, _ = made(small_result())
     first, second = found["discrimination"].exhibit.words
-    assert "can tell it apart, by force.plate" in first
-    assert "cannot be told apart" in second
+    assert "can distinguish it, by force.plate" in first
+    assert "cannot be distinguished" in second
     assert "would decide: a better cell" in second
 
 
@@ -184,4 +184,4 @@ def test_a_line_on_another_is_named() -> None:
     twin = replace(result.methods[0], name="twin", label="the same again", accepted=False)
     found, _ = made(replace(result, methods=(*result.methods, twin)))
     picture, _ = found["curves"].pictures
-    assert "lying on another line: the same again (on soft <cube>)" in picture.caption
+    assert "as they coincide with another line: the same again (on soft <cube>)" in picture.caption

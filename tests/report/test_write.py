@@ -98,7 +98,7 @@ def test_failing_figure_leaves_the_old_report(
 
 def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(UsageError, match=r"holds 1 entries and no results\.json"):
+    with pytest.raises(UsageError, match=r"holds 1 entries but no results\.json"):
         write_report(small_result(), tmp_path, created=CREATED)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 

@@ -183,4 +183,4 @@ def test_a_place_that_is_no_number_is_one_line(old: str, new: str, tmp_path: Pat
 def test_a_wrong_suffix_is_named_with_what_is_read(tmp_path: Path) -> None:
     (tmp_path / "x.step").write_text("ISO-10303-21;")
     done = CliRunner().invoke(cli, ["body", str(tmp_path / "x.step"), "--unit", "mm"])
-    assert "no body that is read; one of npz, .inp" in str(done.exception)
+    assert "this format is not read; expected npz, .inp" in str(done.exception)

@@ -201,7 +201,7 @@ def test_two_bodies_without_a_common_node_are_told(tmp_path: Path) -> None:
     path = gmsh2(tmp_path / "x.msh", both)
     shown = CliRunner().invoke(cli, ["body", str(path), "--unit", "mm"])
     assert shown.exit_code == 0
-    assert "x.msh: 2 bodies without a common node" in shown.output
+    assert "x.msh: 2 bodies share no node" in shown.output
     assert "--part 1 (the largest)" in shown.output
 
 
@@ -257,7 +257,7 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
     path = gmsh2(tmp_path / "x.msh", linear())
     run = CliRunner()
     refused = run.invoke(cli, ["body", str(path)])
-    assert "states no unit; say it: --unit mm" in str(refused.exception)
+    assert "has no unit; give it, as --unit mm" in str(refused.exception)
     shown = run.invoke(cli, ["body", str(path), "--unit", "mm", "-o", str(tmp_path / "b.npz")])
     assert shown.exit_code == 0, shown.output
     assert "10 x 20 x 30 mm" in shown.output

@@ -97,4 +97,4 @@ def test_faces_are_named_by_words(tmp_path: Path) -> None:
     (tmp_path / "b.unv").write_text("    -1\n", "utf-8")
     odd = CliRunner().invoke(cli, ["body", str(tmp_path / "b.unv"), "--unit", "mm"])
     assert isinstance(odd.exception, UsageError)
-    assert "no body that is read; one of npz, .inp" in str(odd.exception)
+    assert "this format is not read; expected npz, .inp" in str(odd.exception)

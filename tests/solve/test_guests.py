@@ -170,7 +170,7 @@ def test_an_honest_guest_is_a_run(tmp_path: Path) -> None:
             "1 of 2 times, although its state is 'finish"),
         ("del fields['u']", "invalid", r"arrays \['reactions', 't'\], expected t and u"),
         ("fields['u'] = u.astype(str)", "invalid", "unpacked|of type|limit"),
-        ("fields['u'] = np.zeros((2, 12, 3), dtype=object)", "invalid", "no archive of arrays"),
+        ("fields['u'] = np.zeros((2, 12, 3), dtype=object)", "invalid", "not an archive of arrays"),
         ("fields['more'] = np.zeros(10**6)", "invalid", "bytes"),
         ("answer['setup_s'] = float('nan')", "invalid", "NaN is not a number"),
         ("answer = [answer]", "invalid", "not an object of schema"),

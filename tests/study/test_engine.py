@@ -42,7 +42,7 @@ def test_every_cell_is_kept_and_a_second_call_runs_only_what_is_missing(
     (kept / "c2.json").unlink()
     again = finish(waiting(tmp_path, cells), kept, HERE)
     assert again.reused == 2
-    assert re.search(r"c1\.json: not believed .* computed again", caplog.text)
+    assert re.search(r"c1\.json: ignored .* computed again", caplog.text)
     assert [row.key for row in logged(tmp_path)[4:]] == ["c1", "c2"]
     assert {r.value for r in again.records.values()} == {Waited(os.getpid(), 0.0)}
 
@@ -95,7 +95,7 @@ def test_a_record_is_believed_where_its_seal_and_its_code_hold(tmp_path: Path) -
     file.write_text(written.replace('"seconds": 0.5', '"seconds": 0.6'), encoding="utf-8")
     assert file.read_text("utf-8") != written
     assert read()[0] == {}
-    assert "not believed (its content does not fit its checksum" in read()[1]
+    assert "ignored (its content does not match its checksum" in read()[1]
     lacking = unsealed(json.loads(written))
     del lacking["record"]["value"]["pid"]
     file.write_text(json.dumps(sealed(lacking)), encoding="utf-8")

@@ -104,7 +104,7 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
     line = refused(*common, "--parameters", "E,E")
     assert "E stands twice" in line
     line = refused(*common, "--parameters", "methods.newton.tolerance=1e-9:1e-3")
-    assert "a setting of a method, which has nothing to identify" in line
+    assert "a setting of a method cannot be identified" in line
     line = refused(*common, "--seeds", "0")
     assert "--seeds 0: expected at least one start" in line
 
@@ -154,7 +154,7 @@ def test_what_is_stopped_goes_on_where_it_was(
     words = stopped.communicate()[1].decode()
     assert stopped.returncode == code
     if by == signal.SIGINT:
-        assert "finished cells are kept; the same command goes on from there" in words
+        assert "finished cells are kept; the same command resumes from there" in words
     written = {f: f.stat().st_mtime_ns for f in kept}
     found = identification(load_file(block), out=tmp_path, where=Where(0))
     assert 2 <= found.done.reused < len(found.done.records) == 8

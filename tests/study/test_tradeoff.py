@@ -437,7 +437,7 @@ def test_principal_strains_of_a_stretched_block() -> None:
 
 
 def test_steps_must_land_on_frames() -> None:
-    with pytest.raises(SceneError, match="do not land on the frames"):
+    with pytest.raises(SceneError, match="do not end on the frames"):
         replace(small(), steps=(0.03,))
 
 

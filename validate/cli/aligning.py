@@ -67,9 +67,7 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
     named = _by(files, by)
     for file in files[1:]:
         if file.exists() and files[0].exists() and file.samefile(files[0]):
-            raise UsageError(
-                f"align: {file} is given twice; its clock is its own, name another recording"
-            )
+            raise UsageError(f"align: {file} is given twice; name another recording")
     first, *others = (read_recording(file) for file in files)
     require_other_topics([first, *others])
     found, refused = list[Moved](), list[str]()
@@ -98,22 +96,23 @@ def _require_of_the_event(wanted: HowAligned) -> None:
              "--correlation": wanted.correlation != MIN_CORRELATION}  # fmt: skip
     if wanted.event and any(given.values()):
         said = ", ".join(name for name, is_given in given.items() if is_given)
-        raise UsageError(f"--event {wanted.event}: {said} is of the correlation; leave it away")
+        raise UsageError(f"--event {wanted.event}: {said} belongs to the correlation; leave it out")
 
 
 def _by(files: Sequence[Path], by: Sequence[str]) -> list[tuple[str, str]]:
     """What moves alike in the first file and each further one."""
     if len(files) < 2:
-        raise UsageError(f"align: {len(files)} file, at least 2 are needed")
+        raise UsageError(f"align: {len(files)} file; give at least 2")
     if len(by) != len(files) - 1:
         raise UsageError(
             f"--by: {len(by)} given for {len(files) - 1} further files; give one for each, in "
-            "their order"
+            "the order of the files"
         )
     for one in by:
         if not all(map(str.strip, one.partition("="))):
             raise UsageError(
-                f"--by {one}: expected CHANNEL=CHANNEL, of the first and a further file"
+                f"--by {one}: expected CHANNEL=CHANNEL, a channel of the first and one of a "
+                f"further file"
             )
     return [next(iter(pairs((one,), "--by").items())) for one in by]
 
@@ -131,8 +130,8 @@ def _aligned(
     elif drift is not None and drift.seen:
         offset = with_drift(offset, drift)
         complain(
-            f"{prefix}the clocks run apart by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s, "
-            "which stands in the offset's sd; --drift takes it out"
+            f"{prefix}the clocks drift by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s; "
+            "the offset's sd includes this drift. --drift corrects it"
         )
     _tell_offset(pair, offset, prefix)
     return pair, offset, drift if wanted.straighten else None
@@ -150,8 +149,8 @@ def _tell_offset(pair: _Pair, offset: Offset, prefix: str) -> None:
     together = correlation_at(pair.reference, pair.stream, offset.seconds)
     say(
         f"{prefix}offset: {offset.seconds:+.6g} s, sd {offset.sd:.2g} s, by {offset.method}; "
-        f"{offset.count} samples meet the first file, {100 * offset.coverage:.0f} % of them; "
-        f"they correlate by {together:.3f}",
+        f"{offset.count} samples ({100 * offset.coverage:.0f} %) lie within the first file's time; "
+        f"correlation {together:.3f}",
         indent="  ",
     )
 
@@ -163,7 +162,7 @@ def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
         say(f"{prefix}drift: {told}", indent="  ")
         return drift
     except RecordingError as error:
-        why = f"not known, half of the recording does not tell it ({error})"
+        why = f"not known: half of the recording is not enough ({error})"
         say(f"{prefix}drift: {why}", indent="  ")
         return None
 
@@ -174,4 +173,4 @@ def _drawn(pair: _Pair, offset: Offset, out: Path, *, several: bool) -> None:
     picture = out.with_name(f"{out.stem}{own}-aligned.png")
     drawing = aligned(pair.reference, pair.stream, pair.names, offset.seconds)
     picture.write_bytes(png(drawing))
-    say(f"{picture}: both channels on one clock: look at it", indent="  ")
+    say(f"{picture}shows both channels on one clock: check it", indent="  ")

@@ -30,7 +30,7 @@ def detailed(command: Callable[..., Any]) -> Any:
         from validate.cli.progress import quiet as without_progress
 
         if quiet and verbose:
-            raise UsageError("-q and --verbose: give one of them")
+            raise UsageError("-q and --verbose exclude each other: give one")
         if not quiet:
             return command(detail="full" if verbose else "screen", **given)
         with without_progress():
@@ -102,6 +102,8 @@ def require_new(outputs: Iterable[Path], inputs: Iterable[Path] = (), *, force: 
     for out in outputs:
         there = out.exists() or out.is_symlink()
         if there and any(source.samefile(out) for source in sources if out.exists()):
-            raise UsageError(f"-o {out}: it is an input of this command; name another file")
+            raise UsageError(f"-o {out}: this file is an input of the command; name another output")
         if there and not force:
-            raise UsageError(f"-o {out}: it exists; name another file, or replace it with --force")
+            raise UsageError(
+                f"-o {out}: this file exists; name another output, or replace it with --force"
+            )

@@ -49,9 +49,9 @@ class Question:
         """The answer, stripped; raises `UsageError` that names the question for a wrong one."""
         answer = answer.strip()
         if self.open and not answer:
-            raise UsageError(f"{self.key}: {self.text}; no answer is given")
+            raise UsageError(f"{self.key}: the answer is missing; {self.text}")
         if self.choices and answer not in self.choices:
-            raise UsageError(f"{self.key} = {answer}: one of {', '.join(self.choices)}")
+            raise UsageError(f"{self.key} = {answer}: expected one of {', '.join(self.choices)}")
         if answer and answer != self.default:
             try:
                 self.check(answer)
@@ -74,7 +74,7 @@ def read_answers(path: Path) -> dict[str, str]:
         raise UsageError(str(error)) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         why = " ".join(str(error).split())[:100]
-        raise UsageError(f'{path}: no TOML ({why}); a line is key = "answer"') from None
+        raise UsageError(f'{path}: not TOML ({why}); write each line as key = "answer"') from None
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -152,8 +152,8 @@ def listed(asks: Asks, given: Answers) -> str:
         lines += [f"# {line}" for line in _explained(question)]
         lines.append(f'{question.key} = "{answer}"')
     if odd := [key for key in given if key not in found]:
-        lines.append(f"# answers to no question, left out: {', '.join(odd)}")
-    lines.append("# further questions may follow from these answers: list them with --answers")
+        lines.append(f"# left out, as no question has this key: {', '.join(odd)}")
+    lines.append("# these answers may lead to further questions: list them with --answers")
     return "\n".join(lines)
 
 
@@ -162,7 +162,7 @@ def _explained(question: Question) -> list[str]:
     if question.choices:
         lines.append("one of: " + ", ".join(question.choices))
     if question.open:
-        lines.append("open: nothing tells it")
+        lines.append("open: the recording does not answer it")
     elif question.why:
         lines.append(f"'{question.default}': {question.why}")
     return lines
@@ -185,7 +185,7 @@ def _missing(left: Sequence[Question]) -> str:
     named = "; ".join(f"{q.key} ({q.text})" for q in left)
     return (
         f"{len(left)} question{'s are' if len(left) > 1 else ' is'} open: {named}. Answer in a "
-        "terminal, or with --answers FILE, which --questions writes out"
+        "terminal, or with --answers FILE; --questions prints such a file"
     )
 
 
@@ -193,5 +193,5 @@ def _require_known(given: Answers, found: Answers) -> None:
     odd = [key for key in given if key not in found]
     if odd:
         raise UsageError(
-            f"answers to no question: {', '.join(odd)}; {nearest_names(odd[0], set(found))}"
+            f"no question has the key {', '.join(odd)}; {nearest_names(odd[0], set(found))}"
         )

@@ -45,13 +45,14 @@ def body(
     worst = quality(mesh)
     if worst.min() < POOR:
         complain(
-            f"{file.name}: {int((worst < POOR).sum())} elements of a quality below {POOR:g}, down "
-            f"to {worst.min():.2g}: they shorten explicit steps; mesh it again"
+            f"{file.name}: {int((worst < POOR).sum())} elements have a quality below {POOR:g}, "
+            f"down "
+            f"to {worst.min():.2g}: they shorten explicit steps; improve the mesh"
         )
     if (separate := pieces(mesh).max()) > 1:
         complain(
-            f"{file.name}: {separate} bodies without a common node; whatever holds one does not "
-            "hold the others: choose one, --part 1 (the largest), or join them in what made them"
+            f"{file.name}: {separate} bodies share no node, so a support of one does not "
+            "hold the others: choose one, as --part 1 (the largest), or join them in your mesher"
         )
     if out is not None:
         told = "; ".join(f"{k} {v}" for k, v in found.told.items())
@@ -71,18 +72,19 @@ def _read(file: Path, unit: str | None, edge: str | None, part: str | None) -> F
         raise UsageError(f"{file.name}: {SURFACE}")
     if suffix not in (*FOREIGN, *SURFACES, ".npz"):
         raise UsageError(
-            f"{file.name}: no body that is read; one of npz, {', '.join((*FOREIGN, *SURFACES))}: "
-            "export it as one of these, as Gmsh and meshio do"
+            f"{file.name}: this format is not read; expected npz, "
+            f"{', '.join((*FOREIGN, *SURFACES))}: "
+            "convert the file, for example with Gmsh or meshio"
         )
     if edge is not None and suffix not in SURFACES:
         raise UsageError(
             f"{file.name}: --edge {edge}: only a surface ({', '.join(SURFACES)}) is filled with "
-            "elements of an edge; leave it away"
+            "elements; leave --edge out"
         )
     if suffix == ".npz":
         return _part(file, ForeignBody(read_mesh(file, unit), {}), part)
     if unit is None:
-        raise UsageError(f"{file.name}: a file of this kind states no unit; say it: --unit mm")
+        raise UsageError(f"{file.name}: this format has no unit; give it, as --unit mm")
     if suffix in FOREIGN:
         return read_foreign(file, unit, part)
     return _part(file, filled(file, unit, _metres("edge", edge) if edge else 0.0), part)
@@ -94,7 +96,7 @@ def _require_size(file: Path, mesh: Mesh, unit: str | None, size: str | None) ->
     if size is not None:
         if abs(_metres("size", size) / side - 1) > SAME:
             raise UsageError(
-                f"{file.name}: --size {size}: its largest side is {1e3 * side:.4g} mm in "
+                f"{file.name}: --size {size}: the largest side is {1e3 * side:.4g} mm in "
                 f"{unit or 'm'}; check --unit and --size"
             )
         return

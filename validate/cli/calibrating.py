@@ -56,7 +56,7 @@ def _require_no_outlines(recording: Recording, topic: str) -> None:
     old = [name for name, c in recording.contours.items() if c.images in ("", topic)]
     if old:
         raise UsageError(
-            f"outlines {old} would keep the place that '{topic}' had: calibrate first, then "
+            f"outlines {old} would keep the old pose of '{topic}': calibrate first, then run "
             "`validate outline`"
         )
 
@@ -73,7 +73,7 @@ def _require_plausible(found: ImagePlane) -> None:
 def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
     table(
         f"{len(seen.px)} points in {len(np.unique(seen.image))} images",
-        ["target", "points", "rms off, mm"],
+        ["target", "points", "rms error, mm"],
         [[name, str(n), f"{1e3 * off:.3g}"] for name, n, off in by_target(seen, found.off)],
     )
     for key, text in _record(seen, found, frames).items():
@@ -82,8 +82,9 @@ def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
     wide = float(np.hypot(*(np.array(frames.images[0].shape[::-1]) * found.m_per_px)))
     if found.rms > _GROSS * wide:
         complain(
-            f"the points miss by {1e3 * found.rms:.3g} mm in an image of {1e3 * wide:.3g} mm, "
-            f"'{far[0]}' most: are targets swapped, or their frame another than the poses lead to?"
+            f"the residual of the points is {1e3 * found.rms:.3g} mm in an image of "
+            f"{1e3 * wide:.3g} mm, "
+            f"largest at '{far[0]}': check for swapped targets and for the frame of the targets"
         )
 
 
@@ -95,7 +96,7 @@ def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, st
     predicted = f"{1e3 * found.predicted:.3g} mm" if np.isfinite(found.predicted) else "not known"
     return {
         "fitted": f"rms {1e3 * found.rms:.3g} mm of {len(seen.px)} points in {images} images",
-        "predicted": f"rms {predicted}, each image by the others",
+        "predicted": f"rms {predicted}, each image from the others",
         "pixel": " x ".join(f"{1e3 * s:.6g} mm" for s in found.m_per_px),
         "sd": ", ".join(sds),
     }
@@ -106,7 +107,7 @@ def _seen(
 ) -> SeenPoints:
     rows = rows_of(file, ("image", "u", "v", "target"))
     if not rows:
-        raise UsageError(f"{file.name}: no points are marked")
+        raise UsageError(f"{file.name}: the file has no marked points; add one row per point")
     turns, shifts = _poses(recording, frames, probe)
     px, image, targets = [], [], []
     for row in rows:
@@ -117,8 +118,8 @@ def _seen(
         at = int(said)
         if said != at or not (0 <= at < len(frames.t) and np.isfinite(shifts[at]).all()):
             raise UsageError(
-                f"{file.name}: image {said:g}: there are 0 to {len(frames.t) - 1}, and "
-                f"{int(np.isfinite(shifts[:, 0]).sum())} of them have a pose of '{probe}'"
+                f"{file.name}: image {said:g}: expected 0 to {len(frames.t) - 1}, with a pose; "
+                f"{int(np.isfinite(shifts[:, 0]).sum())} images have a pose of '{probe}'"
             )
         px.append([number(file, row, c) for c in "uv"])
         image.append(at)

@@ -75,7 +75,7 @@ def _numbers(check: Json) -> str:
     factor, unit = scale(check["unit"]), shown_unit(check["unit"])
     if unit == "Pa" and max(abs(v or 0.0) for v in (check["value"], doubt, limit)) >= 1000:
         factor, unit = 1e-3, "kPa"
-    error = "0" if error_shown(check) == "within noise" else significant(check["value"] * factor)
+    error = "0" if error_shown(check) == "below noise" else significant(check["value"] * factor)
     bound = "no bound" if doubt is None else significant(doubt * factor)
     of = "" if limit is None else f" of {significant(limit * factor)}"
     return f"{error} ± {bound}{of} {unit}".strip()

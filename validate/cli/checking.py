@@ -65,9 +65,9 @@ def _stored(experiment: Experiment, out: Path | None) -> Json | None:
     content, why = stored_run(experiment, folder)
     if content is not None:
         when, where = content["created"], relative(folder)
-        say(f"{experiment.name}: stored run of {when} ({where}); --fresh makes it anew", error=True)
+        say(f"{experiment.name}: stored run of {when} ({where}); --fresh repeats it", error=True)
     elif why:
-        say(f"{experiment.name}: made anew: {why}", error=True)
+        say(f"{experiment.name}: run again: {why}", error=True)
     return content
 
 
@@ -117,12 +117,12 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
     fallen = [p for p in content["published"] if p["fault"]]
     moved, overall = content["moved"], content["overall"]
     parts = [f"the verdict is {overall['verdict']}"]
-    parts += [f"{len(moved)} verdicts moved"] if moved else []
-    parts += [f"{len(fallen)} printed figures no longer stand"] if fallen else []
+    parts += [f"{len(moved)} verdicts changed"] if moved else []
+    parts += [f"{len(fallen)} printed figures no longer hold"] if fallen else []
     holds = "holds" if document["holds"] else "does not hold"
     warnings = [f"{m['method']}: {m['check']} is {m['found']}; expected: "
                 f"{m['expected'] or 'not declared'}" for m in moved]  # fmt: skip
-    known = [f"expected: {e['check']} of {e['method']} is {e['verdict']}, for {e['why']}"
+    known = [f"expected: {e['check']} of {e['method']} is {e['verdict']}, because of {e['why']}"
              for e in content["expected"]]  # fmt: skip
     checks = document["checks"]
     figures = sorted(results, key=lambda p: (not p["fault"], _CLAIMS.index(p["claim"])))

@@ -45,7 +45,7 @@ def compare(paths: tuple[Path, ...], wanted: Shown, out: Path | None, *, as_json
     if out or not as_json:
         page = _drawn(found, paths, wanted, out)
         if page and not as_json:
-            say(f"pictures and all scores: {relative(page)}")
+            say(f"charts and all scores: {relative(page)}")
 
 
 def _drawn(
@@ -60,7 +60,7 @@ def _drawn(
     except UsageError as error:
         if out:
             raise
-        complain(f"no pictures: {error}")
+        complain(f"no charts: {error}")
         return None
     return write_comparison(found, document(found), folder)
 
@@ -86,7 +86,7 @@ def _show(found: SideBySide, *, everything: bool) -> None:
         say(line)
     more += len(shown) - drawn
     left = sum(len(p.rows) for p in shown) - rows
-    counts = {"scores": left, "pairs of methods": more, "scores that no pair has": unseen}
+    counts = {"scores": left, "pairs of methods": more, "scores without a pair": unseen}
     if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
         say(f"left out: {what}; --all, --method, --score or --json show them")
 
@@ -156,7 +156,7 @@ def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[st
         while len(lines) > 2 * _PARAMETERS and count > 1:
             count -= 1
             lines = laid(["path", *names], rows[:count], columns)
-    more = [f"{len(rows) - count} more, see --all"] if len(rows) > count else []
+    more = [f"{len(rows) - count} more: see --all"] if len(rows) > count else []
     return ["Parameters that differ", *lines, *more]
 
 

@@ -51,7 +51,7 @@ def _passages(found: Coverage) -> list[Passage]:
         f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
         for q in found.quantities if q.finding.words
     ]  # fmt: skip
-    title = "A perfect model under these verdicts"
+    title = "Verdicts on a perfect model"
     return [
         sentences([f"{quick}{coverage_page.sentence(found)}"], None),
         Passage(title, rows(["", *HEAD[2:4], "finding"], cells), 4),

@@ -18,18 +18,18 @@ def show(as_json: bool) -> None:
         return
     rows = [[s.name, s.title, s.licence, _size(s), _state(s)] for s in data_sets()]
     table("", ["name", "what", "licence", "files", "here"], rows)
-    say("\n`validate data get NAME` brings one; each stays under its own licence.")
+    say("\n`validate data get NAME` downloads one; the licence of each applies.")
 
 
 def get(name: str) -> None:
     """Brings a data set into the cache, unless it is here already; says what to cite."""
     data_set = named(name)
     if here := _where(data_set):
-        say(f"{data_set.name} is here already: {relative(here / data_set.folder)}", indent="  ")
+        say(f"{data_set.name} is already here: {relative(here / data_set.folder)}", indent="  ")
     elif data_set.brought:
         _bring(data_set)
     else:
-        raise RecordingError(f"{data_set.name} cannot be brought: {_made(data_set)}")
+        raise RecordingError(f"{data_set.name} cannot be downloaded: {_made(data_set)}")
     say(f"licence {data_set.licence}; cite: {data_set.citation} {data_set.page}", indent="  ")
 
 
@@ -40,16 +40,20 @@ def _bring(data_set: DataSet) -> None:
         came = bring(data_set, told)
     place = relative(cache_folder() / data_set.folder)
     kept = len(data_set.brought) - len(came)
-    say(f"{place}: {len(came)} files came, {kept} were there; every hash is right", indent="  ")
+    say(
+        f"{place}: {len(came)} files downloaded, {kept} already present; every hash is correct",
+        indent="  ",
+    )
     if data_set.made:
-        say(f"{len(data_set.files) - len(data_set.brought)} did not come: {_made(data_set)}",
+        say(f"{len(data_set.files) - len(data_set.brought)} files are not downloadable: "
+            f"{_made(data_set)}",
             indent="  ")  # fmt: skip
 
 
 def _made(data_set: DataSet) -> str:
     return (
-        f"{data_set.made} ({data_set.page}); put such files into {data_set.folder}/ of a folder "
-        "that VALIDATE_SHARED_DATA names"
+        f"{data_set.made} ({data_set.page}); put such files into {data_set.folder}/ in the "
+        "folder that VALIDATE_SHARED_DATA names"
     )
 
 
@@ -70,7 +74,7 @@ def _where(data_set: DataSet) -> Path | None:
 def _state(data_set: DataSet) -> str:
     place, count = max(_counts(data_set).items(), key=lambda found: found[1])
     if not count:
-        return "no" if data_set.brought else "no; made by hand"
+        return "no" if data_set.brought else "no; not downloadable"
     return relative(place) if count == len(data_set.files) else f"{count} in {relative(place)}"
 
 

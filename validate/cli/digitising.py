@@ -53,7 +53,7 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
     standing = dwells(t, x, RADIUS, LEAST)
     if not standing:
         raise UsageError(
-            f"the tip of '{how.tool}' never stands within {1e3 * RADIUS:g} mm for {LEAST:g} s: "
+            f"the tip of '{how.tool}' never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s: "
             "check --tip"
         )
     _told_unseen(recording, how, t, standing)
@@ -62,7 +62,7 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
         found = _numbered(how, standing, parts)
     else:
         found = _named(how, (t, x), standing, parts, known_places(how.known, how.unit))
-    table(f"{len(standing)} places on which the tip stood", found.columns, found.rows)
+    table(f"{len(standing)} places where the tip stood still", found.columns, found.rows)
     for key, text in found.record.items():
         say(f"{key}: {text}", indent="  ")
     streams = {
@@ -83,15 +83,15 @@ def _told_unseen(
     if len(t) < poses:
         complain(
             f"{poses - len(t)} of {poses} poses of '{how.tool}' are left out: '{how.reference}' "
-            "was not seen then"
+            "was not visible then"
         )
     step = float(np.median(np.diff(t)))
     for d in standing:
         stood, seen = float(np.ptp(d.t)), step * (len(d.t) - 1)
         if seen < _SEEN * stood:
             complain(
-                f"where the tip stood from {d.t[0]:.2f} s on it was seen for {seen:.2g} of "
-                f"{stood:.3g} s: it may have been elsewhere meanwhile"
+                f"from {d.t[0]:.2f} s on, the tip was visible for only {seen:.2g} of "
+                f"{stood:.3g} s: it may have moved in between"
             )
 
 
@@ -110,7 +110,9 @@ class _Touched:
 def _numbered(how: HowDigitised, standing: tuple[Dwell, ...], parts: tuple[Dwell, ...]) -> _Touched:
     """By numbers, in the order in which they were touched."""
     if how.unit:
-        raise UsageError(f"--unit {how.unit}: of the landmarks of --known; say those")
+        raise UsageError(
+            f"--unit {how.unit}: it is the unit of --known, which is missing; give --known"
+        )
     sd = sd_of_mean(parts, standing)
     places = np.array([d.centre for d in parts])
     rows = [
@@ -128,7 +130,8 @@ def _named(
     """By the distances between them, each also predicted from the others."""
     if wires := [k.name for k in known if k.along is not None]:
         raise UsageError(
-            f"{', '.join(wires)}: wires; the tip stands on landmarks, which are points"
+            f"{', '.join(wires)}: wires cannot be touched at a point; give landmarks that are "
+            f"points"
         )
     names, body = tuple(k.name for k in known), np.array([k.place for k in known])
     match = match_landmarks(body, np.array([d.centre for d in parts]), _MATCH)
@@ -139,7 +142,7 @@ def _named(
         [name, *_shown(x, d), f"{1e3 * a:.3g}", f"{1e3 * b:.3g}"]
         for name, x, d, a, b in zip(found.touched, found.places, whole, off, left, strict=True)
     ]
-    columns = ("landmark", *_COLUMNS, "off, mm", "left out, mm")
+    columns = ("landmark", *_COLUMNS, "residual, mm", "left out, mm")
     return _Touched(found.touched, found.places, found.sd, columns, rows, _record(how, found))
 
 
@@ -164,10 +167,10 @@ def _record(how: HowDigitised, found: Digitised) -> dict[str, str]:
         "tip": how.tip,
         "sd": f"{1e3 * found.sd:.2g} mm per axis",
         "fitted": f"rms {_distance(found.residuals)} of {len(found.touched)} landmarks",
-        "predicted": f"rms {_distance(found.left_out)}, each landmark by the others",
+        "predicted": f"rms {_distance(found.left_out)}, each landmark from the others",
         "not touched": ", ".join(untouched) or "none",
         "places that are no landmark": str(none),
-        "pose": f"{matrix} (of the landmarks in the frame of the tip, m, by rows)",
+        "pose": f"{matrix} (from the landmarks' frame to the tip's frame, m, row by row)",
     }
 
 

@@ -65,7 +65,7 @@ def shown(value: float | None, unit: str) -> str:
 def error_shown(check: Mapping[str, Any]) -> str:
     """The error of a check, as in results.json; that noise explains all of it is no zero."""
     value, raw = check["value"], check["raw"]
-    return "within noise" if value == 0 < raw else shown(value, check["unit"])
+    return "below noise" if value == 0 < raw else shown(value, check["unit"])
 
 
 def relative(path: Path) -> str:

@@ -13,7 +13,9 @@ def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:
     """Writes what was asked for; raises `UsageError` where nothing was."""
     wanted = [(f, make) for f, make in ((junit_file, junit), (latex_file, latex)) if f is not None]
     if not wanted:
-        raise UsageError("export: say what: --junit checks.xml, --latex checks.tex")
+        raise UsageError(
+            "export: no output is named; give --junit checks.xml or --latex checks.tex"
+        )
     for file, make in wanted:
         try_file(file)
         write_whole(file, read_as(run, make))

@@ -54,7 +54,7 @@ def job(
     """Writes what a guest is given of one method's scene to an empty `folder`; `force`: to any."""
     if folder.exists() and any(folder.iterdir()) and not force:
         raise UsageError(
-            f"-o {folder}: it is not empty; name another folder, or write there with --force"
+            f"-o {folder}: this folder is not empty; name another one, or write there with --force"
         )
     own = own_body(find(name, Path.cwd(), experiments))
     experiment, key = own.experiment, method or own.experiment.accepted[0]
@@ -74,7 +74,7 @@ def job(
 
 
 def _print(found: Sequence[OffBy]) -> None:
-    head = ["scene", "can it", "quantity", "error", "exact", "unit"]
+    head = ["scene", "capable", "quantity", "error", "exact", "unit"]
     table("", head, [_row(row) for row in found])
     for row in found:
         if row.why:

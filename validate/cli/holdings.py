@@ -24,7 +24,7 @@ def channels(recording: Recording) -> list[str]:
     for topic, c in recording.contours.items():
         lines.append(_line(topic, f"outlines in m, sd {c.sd:.3g}", c.t))
     for topic, f in recording.frames.items():
-        lines.append(_line(topic, f"images, {f.m_per_px[0]:.3g} m a pixel", f.t))
+        lines.append(_line(topic, f"images, {f.m_per_px[0]:.3g} m per pixel", f.t))
     for record, values in recording.metadata.items():
         lines.append(plain(f"record '{record}', {len(values)} entries"))
         lines += [plain(f"  {key}: {value}") for key, value in list(values.items())[:8]]
@@ -35,7 +35,7 @@ def channels(recording: Recording) -> list[str]:
 
 def _line(topic: str, what: str, t: np.ndarray) -> str:
     duration = float(t[-1] - t[0])
-    rate = f"{(len(t) - 1) / duration:.4g} Hz" if duration > 0 else "one moment"
+    rate = f"{(len(t) - 1) / duration:.4g} Hz" if duration > 0 else "one instant"
     return plain(f"{topic}: {what}; {len(t)} in {duration:.4g} s, {rate}")
 
 

@@ -33,14 +33,18 @@ def known_places(file: Path, unit: str | None) -> tuple[KnownTarget, ...]:
             return _landmarks(file, dict(reader.read(file, said).markers))
     if file.suffix.lower() == ".xml":
         if unit:
-            raise UsageError(f"--unit {unit}: {file.name} is a device set of PLUS, in millimetres")
+            raise UsageError(
+                f"--unit {unit}: {file.name} is a PLUS device set, in millimetres; leave --unit out"
+            )
         return _declared(file)
     if MCAP.recognises(file):
         if unit:
-            raise UsageError(f"--unit {unit}: {file.name} is a recording, whose points are metres")
+            raise UsageError(
+                f"--unit {unit}: {file.name} is a recording, with points in metres: leave it out"
+            )
         return _landmarks(file, dict(read_recording(file).markers))
     if not unit:
-        raise UsageError(f"{file.name}: a table states no unit: say it, as --unit mm")
+        raise UsageError(f"{file.name}: the table has no unit; give it, as --unit mm")
     return _table(file, unit)
 
 
@@ -60,19 +64,21 @@ def _landmarks(file: Path, markers: dict[str, Markers]) -> tuple[KnownTarget, ..
 def _declared(file: Path) -> tuple[KnownTarget, ...]:
     held = read_device_set(file).landmarks
     if not held:
-        raise UsageError(f"{file.name}: no landmarks in its PhantomDefinition")
+        raise UsageError(
+            f"{file.name}: its PhantomDefinition has no landmarks; export them with it"
+        )
     return tuple(KnownTarget(name, place) for name, place in held.items())
 
 
 def _table(file: Path, unit: str) -> tuple[KnownTarget, ...]:
     factor = in_si(1.0, unit, "m")
     if factor is None:
-        raise UsageError(f"--unit {unit}: expected a length, as mm")
+        raise UsageError(f"--unit {unit}: expected a unit of length, as mm")
     found: dict[str, KnownTarget] = {}
     for row in rows_of(file, ("target", "x", "y", "z")):
         name = row["target"].strip()
         if name in found:
-            raise RecordingError(f"{file.name}: target {name} stands there twice")
+            raise RecordingError(f"{file.name}: target {name} occurs twice; keep one row")
         place = factor * np.array([number(file, row, c) for c in "xyz"])
         found[name] = KnownTarget(name, place, _along(file, row, factor, place))
     return tuple(found.values())
@@ -84,7 +90,9 @@ def _along(file: Path, row: dict[str, str], factor: float, place: Floats) -> Flo
         return None
     way = factor * np.array([number(file, row, c) for c in ("x2", "y2", "z2")]) - place
     if not np.linalg.norm(way):
-        raise RecordingError(f"{file.name}: wire {row['target']} has one place twice")
+        raise RecordingError(
+            f"{file.name}: wire {row['target']} has two equal ends; give two different points"
+        )
     return np.asarray(way / np.linalg.norm(way))
 
 
@@ -97,13 +105,13 @@ def rows_of(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
         names = [str(n).strip().lower() for n in rows.fieldnames or ()]
         if not set(wanted) <= set(names):
             raise UsageError(
-                f"{file.name}: columns {names}, expected {', '.join(wanted)}, with commas "
-                "between them, as text in UTF-8"
+                f"{file.name}: columns {names}, expected {', '.join(wanted)}, separated "
+                "by commas, as UTF-8 text"
             )
         rows.fieldnames = names
         return list(rows)
     except csv.Error as error:
-        raise RecordingError(f"{file.name}: no table with commas ({error})") from None
+        raise RecordingError(f"{file.name}: not a comma-separated table ({error})") from None
 
 
 def number(file: Path, row: dict[str, str], name: str) -> float:
@@ -114,5 +122,7 @@ def number(file: Path, row: dict[str, str], name: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise RecordingError(f"{file.name}: {name} = {said[:40]!r} is no number")
+        raise RecordingError(
+            f"{file.name}: {name} = {said[:40]!r} is not a number; correct it in the file"
+        )
     return value

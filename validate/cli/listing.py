@@ -75,7 +75,7 @@ def _in_full(experiment: Experiment) -> None:
     say(f"{experiment.name}: {experiment.title}", "bold")
     say(experiment.source)
     rows_ = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
-    table("Parameters", ["path", "default", "what it is (type)"], rows_)
+    table("Parameters", ["path", "default", "description (type)"], rows_)
     methods = [
         [k, m.label, "checked" if k in experiment.accepted else ""]
         for k, m in experiment.methods.items()
@@ -86,7 +86,7 @@ def _in_full(experiment: Experiment) -> None:
          "none" if a.required is None else f"{a.required:g}", a.why]
         for a in experiment.accept
     ]  # fmt: skip
-    table("Requirements", ["quantity", "at", "of many", "limit (SI)", "why"], required)
+    table("Requirements", ["quantity", "at", "statistic", "limit (SI)", "why"], required)
     known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
     table("Expected verdicts", ["method", "check", "verdict", "why"], known)
 

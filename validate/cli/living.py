@@ -39,7 +39,7 @@ def run(
 ) -> int:
     """Runs, tells of its ticks and writes what it did; 0 whenever it ran."""
     if seconds is not None and not 0 < seconds < np.inf:
-        raise UsageError(f"--seconds {seconds:g}: a number above 0")
+        raise UsageError(f"--seconds {seconds:g}: expected a number above 0")
     experiment = find(name, Path.cwd(), named)
     options = Options(pairs(values, "--set"))
     ask_about(experiment, options.values)
@@ -106,13 +106,13 @@ def _told(done: Lived, said: dict[str, Any]) -> None:
     table("Times of a tick", heads, rows)
     if jumps := said["findings"].get("resynchronised"):
         complain(
-            f"resynchronised {jumps} times, each after {RESYNC} packets in a row that were late or "
-            "out of order: a clock that jumped, or a device that was restarted"
+            f"resynchronised {jumps} times, each after {RESYNC} late or out-of-order packets "
+            "in a row: the clock jumped, or the device restarted"
         )
     if said["findings"]:
         table("Found", ["what", "count"], [[k, str(v)] for k, v in said["findings"].items() if v])
     if said["recording"]:
         file = relative(Path(said["recording"]))
-        say(f"\nwritten: {file}; replay it by `{said['replay']}`")
+        say(f"\nwritten: {file}; replay it with `{said['replay']}`")
     else:
-        say("\nnothing was answered, so that nothing is recorded")
+        say("\nno packet was answered, so there is no recording")

@@ -67,7 +67,7 @@ def run(argv: list[str]) -> int:
             complain(f"the output cannot be written: {error.strerror}")
         else:
             place = Path(error.filename)
-            complain(f"{place}: {why_not(error, place)}; make room there, or use another place")
+            complain(f"{place}: {why_not(error, place)}; free space there, or use another folder")
     except MemoryError as error:
         said = f" ({error})" if str(error) else ""
         complain(f"out of memory{said}: take a coarser mesh or fewer steps")
@@ -177,7 +177,10 @@ def run_(names: tuple[str, ...], everything: bool, **options: Any) -> int:
     from validate.cli import running
 
     if everything == bool(names):
-        raise UsageError("name one or more experiments, or --all; see 'validate list'")
+        raise UsageError(
+            "no experiment is named: name one or more experiments, or give --all; see 'validate "
+            "list'"
+        )
     return running.run(names, **options)
 
 
@@ -247,10 +250,12 @@ def summary_(out: Path | None, as_json: bool) -> None:
     default="change", show_default=True, help="Order of the scores; default: largest change first.",
 )  # fmt: skip
 @click.option(
-    "--all", "-v", "--verbose", "everything", is_flag=True, help="Everything, not one screen of it."
+    "--all", "-v", "--verbose", "everything", is_flag=True, help="Print everything, not one screen."
 )
-@click.option("--out", type=FOLDER, help="Where the page goes (default: beside the first run).")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document; a page only with --out.")
+@click.option("--out", type=FOLDER, help="Folder of the page (default: next to the first run).")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON document; write a page only with --out."
+)
 def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
     """Compare stored runs side by side, without new runs.
 

@@ -21,7 +21,9 @@ def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...
     experiment = find(name, Path.cwd(), named)
     twin = experiment.twin
     if twin is None:
-        raise UsageError(f"experiment '{name}' has no synthetic recording; its data are measured")
+        raise UsageError(
+            f"experiment '{name}' has no synthetic recording, as its data are measured; name a twin"
+        )
     given = pairs(values, "--set")
     parameters = with_values(experiment.parameters, given)
     ask_about(experiment, given)

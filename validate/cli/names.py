@@ -50,4 +50,4 @@ def _hides(file: Path) -> str:
     """What a file of the user's stands for, when the package has one of that name."""
     theirs = shipped() / file.name
     other = file.resolve() != theirs.resolve() and theirs.is_file()
-    return "is meant by this name, not the shipped one" if other else ""
+    return "this file replaces the shipped experiment of this name" if other else ""

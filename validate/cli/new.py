@@ -68,7 +68,7 @@ def new(
     for line in kind.assumed(recording, found):
         complain(line)
     for topic in _unused(recording, kind.used(recording, found)):
-        complain(f"'{topic}' is not used by the experiment that was written")
+        complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
 
 
@@ -80,10 +80,12 @@ def _unused(recording: Recording, used: Collection[str]) -> list[str]:
 
 def _checked_path(name: str, out: Path | None) -> Path:
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in {*sys.stdlib_module_names, "validate"}:
-        raise UsageError(f"experiment '{name}': a name of a-z, 0-9, _ that no Python module has")
+        raise UsageError(
+            f"experiment '{name}': expected a name of a-z, 0-9 and _ that no Python module has"
+        )
     path = out or Path("experiments") / f"{name}.py"
     if path.name != f"{name}.py":
-        raise UsageError(f"-o {path}: an experiment's file is called as it is, {name}.py")
+        raise UsageError(f"-o {path}: the file must have the experiment's name, {name}.py")
     return path
 
 
@@ -95,12 +97,10 @@ def fitting(recording: Recording) -> tuple[NewKind, ...]:
     held = f"{recording.name} holds {topics(recording)} and records {sorted(recording.metadata)}"
     if recording.frames:
         raise UsageError(
-            f"{held}: images alone say nothing of a body; find the outlines in them first: "
+            f"{held}: images alone do not define a body; find their outlines first: "
             f"validate outline {Path(recording.source.path).name} -o outlined.mcap"
         )
-    raise UsageError(
-        f"{held}; an experiment is written from {', or from '.join(k.needs for k in KINDS)}"
-    )
+    raise UsageError(f"{held}; an experiment needs {', or '.join(k.needs for k in KINDS)}")
 
 
 def _asked(
@@ -110,7 +110,11 @@ def _asked(
     if len(kinds) > 1:
         doc = "; ".join(f"{kind.name}: {kind.doc}" for kind in kinds)
         which = Question(
-            "experiment", f"what was done ({doc})", names[0], "the first that fits", choices=names
+            "experiment",
+            f"kind of test ({doc})",
+            names[0],
+            "the first kind that fits the recording",
+            choices=names,
         )
         if which.key not in found:
             return (which,)

@@ -60,7 +60,7 @@ from validate.scene.named_place import axis_of
 _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
 _SHAPES = ("file", "block", "cylinder")
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
-             "contour": ("m", "distance of the outlines, as 0.5mm")}  # fmt: skip
+             "contour": ("m", "distance between outlines, as 0.5mm")}  # fmt: skip
 _MOVED = "from validate.replay.measured_body import measured_body, solid"
 _PRESSED = """from validate.replay.measured_body import measured_body
 from validate.replay.measured_contact import touching"""
@@ -90,7 +90,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and unit_of(recording, found.get("moved.by", "")) == "m":
-        asked.append(by_topic("seen.force", "force on the moved place that is judged", forces))
+        asked.append(by_topic("seen.force", "force on the moved place to compare", forces))
     asked += _of_the_material(recording, found)
     asked += motion_questions(recording, found, mesh, _values(found))
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
@@ -100,11 +100,11 @@ def _of_the_body(found: Answers) -> list[Question]:
     shape, file = found.get("body.shape"), found.get("body.file", "")
     asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
     if shape == "file":
-        asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (of a surface: "
-                              "`validate body` fills it)", open=True, check=there,
+        asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (`validate "
+                              "body` fills a surface)", open=True, check=there,
                               words=()))  # fmt: skip
         if Path(file).suffix.lower() in FOREIGN:
-            asked.append(Question("body.unit", "unit of its lengths, as mm", open=True))
+            asked.append(Question("body.unit", "unit of the file's lengths, as mm", open=True))
     elif shape == "block":
         asked.append(
             by_path("body.block", "sizes along x, y, z from the origin, as 60mm,45mm,70mm")
@@ -117,16 +117,16 @@ def _of_the_body(found: Answers) -> list[Question]:
 def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
     """The modulus is open only under a displacement with a force that is judged."""
     sought = found.get("seen.force", NONE) != NONE
-    way = f"; {UNKNOWN}: identified on the lower part of the load" if sought else ""
+    way = f"; {UNKNOWN}: identify it on the lower part of the load" if sought else ""
     pressed = unit_of(recording, found.get("moved.by", "")) == "Pa"
     return [
         Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
                  check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
         by_path("material.nu", "Poisson ratio"),
-        Question("law", "law of the material", "linear", "a pressure acts on the undeformed "
-                 "surface", choices=("linear",)) if pressed else
-        Question("law", "law of the material", "neo_hooke", "large strain; the linear one stands "
-                 "beside it", choices=tuple(_LAWS)),
+        Question("law", "law of the material", "linear", "the pressure acts on the "
+                 "undeformed surface", choices=("linear",)) if pressed else
+        Question("law", "law of the material", "neo_hooke", "large strain; the linear law is run "
+                 "in addition", choices=tuple(_LAWS)),
     ]  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
     asked = [
         Question(
             "moved.by",
-            f"what loads the body; {NOTED}: a place was moved, by what was written down alone; "
+            f"what loads the body; {NOTED}: a place was moved, and only notes record its motion; "
             f"{RELEASE}: a place was held and let go",
             open=True,
             choices=_movers(recording),
@@ -144,24 +144,25 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
     if by is None:
         return asked
     if by != "markers" and unit_of(recording, by) != "Pa":
-        asked.append(Question("moved.along", "direction of it, as -z (force and displacement are "
-                              "positive along it)", open=True, check=axis_of))  # fmt: skip
+        asked.append(Question("moved.along", "direction of the load, as -z (force and displacement "
+                              "are positive along it)", open=True, check=axis_of))  # fmt: skip
     if by == "gravity":
         return [*asked, by_path("material.rho", "density, kg/m3")]
-    asked.append(named_place("moved.place", "place that is moved or pulled", mesh, is_open=True))
+    asked.append(named_place("moved.place", "place that is moved or loaded", mesh, is_open=True))
     if by == "markers":
         names = [n for m in recording.markers.values() for n in m.names]
-        text = f"markers on it, three or more, of {', '.join(names)}"
+        text = f"three or more markers on this place, of {', '.join(names)}"
         asked.append(Question("moved.markers", text, open=True, check=three_of(names)))
     elif unit_of(recording, by) == "m":
         if by == NOTED:
-            asked.append(by_path("moved.noted", "its motion as it was noted, evenly from the first "
-                               "instant to the last, straight between, as 0,2mm,5mm"))  # fmt: skip
+            asked.append(by_path("moved.noted", "noted displacements, evenly spaced from the "
+                                                "first to "
+                               "the last instant, linear between, as 0,2mm,5mm"))  # fmt: skip
         asked += of_the_indenter(recording, found)
         if found.get("indenter.shape", "none") != "none":
             return asked
-        asked.append(Question("moved.sideways", "whether the moved place is held across its "
-                              "direction (glued, gripped), or slides", open=True,
+        asked.append(Question("moved.sideways", "true: the moved place is held across its "
+                              "direction (glued, gripped); false: it slides", open=True,
                               choices=("true", "false")))  # fmt: skip
     return asked
 
@@ -175,11 +176,11 @@ def _movers(recording: Recording) -> tuple[str, ...]:
 def _of_the_supports(mesh: Mesh | None) -> list[Question]:
     return [
         named_place("held.all", "places held in every direction", mesh),
-        *(named_place(f"held.{c}", f"places held along {c} alone", mesh) for c in "xyz"),
+        *(named_place(f"held.{c}", f"places held along {c} only", mesh) for c in "xyz"),
         named_place(
             "held.slides",
-            "a flat place that slides on its plate, which it does not leave "
-            "(held along one axis alone a body can drift)",
+            "flat place that slides on its plate without lifting off "
+            "(a body held along one axis only can drift)",
             mesh,
         ),
     ]
@@ -188,19 +189,19 @@ def _of_the_supports(mesh: Mesh | None) -> list[Question]:
 def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
     if not recording.markers:
         return []
-    asked = [by_topic("seen.markers", "markers that are judged", list(recording.markers))]
+    asked = [by_topic("seen.markers", "markers to compare", list(recording.markers))]
     if found.get("seen.markers") == NONE and found.get("moved.by") != "markers":
         return asked
     known = "marker_layout" in recording.metadata
     return [
         *asked,
-        Question("seen.layout", f"where the markers sit in the body's frame: {RECORDED}, a file "
-                 f"of landmarks (four or more), or '{AS_SEEN}' (they were recorded in that frame; "
-                 "one will do)",
+        Question("seen.layout", f"marker positions in the body's frame: {RECORDED}, a file "
+                 f"of landmarks (four or more), or '{AS_SEEN}' (recorded in that frame; one marker "
+                 "is enough)",
                  RECORDED if known else "", "the record marker_layout", open=not known,
                  check=a_layout, words=(RECORDED, AS_SEEN)),
         by_path("seen.still", "seconds from the start in which the body is unloaded", "0",
-              "the first sample alone"),
+              "only the first sample"),
     ]  # fmt: skip
 
 
@@ -209,17 +210,17 @@ def _of_the_outlines(
 ) -> list[Question]:  # fmt: skip
     if not recording.contours:
         return []
-    asked = [by_topic("seen.outline", "outlines that are judged", list(recording.contours))]
+    asked = [by_topic("seen.outline", "outlines to compare", list(recording.contours))]
     topic = found.get("seen.outline")
     if topic is None or topic == NONE:
         return asked
     posed = not np.array_equal(recording.contour(topic).pose, np.eye(4))
     asked += [
-        Question("seen.surface", "facet set whose section the outlines are; surface: the whole "
-                 "body's", "surface", "the whole body's", check=facets_of(mesh)),
-        Question("seen.pose", "where the images lie: recorded, declared (origin and directions), "
-                 "fitted (directions; the outline at rest on the body's section through its "
-                 "middle)", "recorded" if posed else "", "the recording has a pose",
+        Question("seen.surface", "facet set whose section the outlines show; surface: the "
+                 "whole surface", "surface", "the whole surface", check=facets_of(mesh)),
+        Question("seen.pose", "pose of the images: recorded; declared (give origin and "
+                 "directions); fitted (give directions; the outline at rest is fitted to the "
+                 "body's middle section)", "recorded" if posed else "", "the recording has a pose",
                  open=not posed, choices=("recorded", "declared", "fitted")),
     ]  # fmt: skip
     pose = found.get("seen.pose", "recorded")
@@ -244,11 +245,13 @@ def _of_the_limits(found: Answers) -> list[Question]:
 
 
 def _of_the_ranges(found: Answers) -> list[Question]:
-    words = {"E": "relative, of the modulus", "nu": "of the Poisson ratio",
-             "load": "relative, of what loads the body"}  # fmt: skip
+    words = {"E": "modulus (relative)", "nu": "Poisson ratio",
+             "load": "load (relative)"}  # fmt: skip
     if found.get("material.E") == UNKNOWN:
         del words["E"]
-    return [by_path(f"ranges.{k}", f"standard uncertainty, {text}") for k, text in words.items()]
+    return [
+        by_path(f"ranges.{k}", f"standard uncertainty of the {text}") for k, text in words.items()
+    ]
 
 
 def _judged(found: Answers) -> set[str]:
@@ -281,9 +284,13 @@ def _read(said: tuple[tuple[str, str], ...]) -> Mesh:
 def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> Mapping[str, str]:
     mesh = _mesh_of(found)
     if not any(found.get(f"held.{c}") for c in ("all", "x", "y", "z", "slides")):
-        raise UsageError("held.all, .x, .y, .z and .slides are all empty: the body is not held")
+        raise UsageError(
+            "held.all, .x, .y, .z and .slides are all empty: name at least one held place"
+        )
     if not _judged(found):
-        raise UsageError("nothing is judged: seen.force, seen.markers and seen.outline are none")
+        raise UsageError(
+            "seen.force, seen.markers and seen.outline are all none: choose at least one to compare"
+        )
     require_dynamic(found)
     order = (
         2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= FEW_CELLS else 1
@@ -385,7 +392,7 @@ def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
 
 BODY = NewKind(
     "body",
-    "any body, held and moved where you say, judged by force, markers or outlines",
+    "any body, held and moved at places that you name; compares force, markers or outlines",
     "markers, outlines, or signals in m and N",
     "FEM",
     "new_body.py.txt",

@@ -26,8 +26,8 @@ def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
 
 def a_known_modulus(text: str) -> None:
     if text == UNKNOWN:
-        raise UsageError("it is identified on a force that is judged under a displacement "
-                         "(seen.force, moved.by a signal in m), which is not here")  # fmt: skip
+        raise UsageError("identifying it needs a compared force (seen.force) and a displacement "
+                         "(moved.by a signal in m); give a value")  # fmt: skip
     parsed("material.E")(text)
 
 
@@ -38,7 +38,7 @@ def parsed(path: str, skip: str = "") -> Callable[[str], Any]:
 def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
     """The first of them says what words there are; it is asked in every interview."""
     named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
-    words = f": {GRAMMAR}{named}; several joined by +" if key == "held.all" else ""
+    words = f": {GRAMMAR}{named}; join several with +" if key == "held.all" else ""
     return Question(
         key, f"{text}{words}{'' if is_open else '; empty: none'}",
         open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
@@ -46,23 +46,23 @@ def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False
 
 
 def by_topic(key: str, text: str, topics: list[str]) -> Question:
-    return Question(key, text, topics[0], "the first recorded", choices=(*topics, NONE))
+    return Question(key, text, topics[0], "the first in the recording", choices=(*topics, NONE))
 
 
 def three_of(names: Sequence[str]) -> Callable[[str], Any]:
     def check(text: str) -> None:
         chosen = [part.strip() for part in text.split(",")]
         if absent := [n for n in chosen if n not in names]:
-            raise UsageError(f"{', '.join(absent)} not among {', '.join(names)}")
+            raise UsageError(f"no marker {', '.join(absent)}; there are {', '.join(names)}")
         if len(set(chosen)) < FEWEST:
-            raise UsageError(f"{len(set(chosen))} markers, at least {FEWEST} are needed")
+            raise UsageError(f"{len(set(chosen))} markers; at least {FEWEST} are needed")
 
     return check
 
 
 def there(text: str) -> None:
     if not Path(text).is_file():
-        raise UsageError("no such file here")
+        raise UsageError("no such file; paths start from the current folder")
 
 
 def a_layout(text: str) -> None:
@@ -78,9 +78,12 @@ def known_size(key: str, mesh: Mesh | None, unit: str) -> list[Question]:
 
     def check(text: str) -> None:
         if abs(quantity_in("m")(text) / side - 1) > SAME:
-            raise UsageError(f"the largest side is {1e3 * side:.4g} mm; change the unit instead")
+            raise UsageError(
+                f"the file's largest side is {1e3 * side:.4g} mm; if that is wrong, change the unit"
+            )
 
-    return [Question(key, f"largest side of the body, as 3mm, if its unit is right: it is {odd}",
+    return [Question(key, f"largest side of the body, as 3mm, to confirm its unit: the body is "
+                          f"{odd}",
                      open=True, check=check)]  # fmt: skip
 
 

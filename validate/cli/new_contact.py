@@ -27,7 +27,7 @@ _ENDS = 3.0  # a parabola is as much less certain at its end than in the mean
 def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
     """Return the questions about what presses on the place that a displacement moves."""
     asked = [Question("indenter.shape", "rigid body that presses on the place; none: the place is "
-                      "glued or gripped", "none", "a place that is moved itself",
+                      "glued or gripped", "none", "the place itself is moved",
                       choices=_SHAPES)]  # fmt: skip
     shape = found.get("indenter.shape", "none")
     if shape == "none":
@@ -39,18 +39,23 @@ def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
                               check=axis_of))  # fmt: skip
     touch = _first_touch(recording, found, shape)
     gap, sd = touch or (0.0, 0.0)
-    why = "where the force leaves zero" if touch else "it touches at the first sample"
+    why = (
+        "the displacement at which the force leaves zero"
+        if touch
+        else "the indenter touches at the first sample"
+    )
     return [
         *asked,
-        Question("indenter.friction", f"{FRICTIONLESS}, {BONDED} while it presses, or Coulomb's "
-                 "coefficient", open=True, check=_friction,
+        Question("indenter.friction", f"contact: {FRICTIONLESS}, {BONDED} while it presses, or "
+                                      f"Coulomb's "
+                 "friction coefficient", open=True, check=_friction,
                  words=(FRICTIONLESS, BONDED)),
-        Question("indenter.tip", "point below its middle, as 20mm,20mm,12mm; empty: the middle of "
-                 "the place", check=parsed("indenter.tip")),
-        by_path("indenter.gap", "way from the first sample to the first touch, as 0.3mm",
+        Question("indenter.tip", "point below the indenter's middle, as 20mm,20mm,12mm; empty: "
+                 "the middle of the place", check=parsed("indenter.tip")),
+        by_path("indenter.gap", "displacement from the first sample to first contact, as 0.3mm",
                 f"{1e3 * gap:.4g}mm", why),
-        by_path("ranges.contact", "standard uncertainty of that way, as 0.01mm",
-                f"{1e3 * sd:.1g}mm", "of the fit that found it" if touch else "not known"),
+        by_path("ranges.contact", "standard uncertainty of that displacement, as 0.01mm",
+                f"{1e3 * sd:.1g}mm", "from the fit of the first contact" if touch else "not known"),
         *of_the_machine(found),
     ]  # fmt: skip
 
@@ -58,12 +63,13 @@ def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
 def of_the_machine(found: Answers) -> list[Question]:
     """Return the questions about the compliance of the testing machine."""
     asked = [Question("machine.compliance", "compliance of frame, load cell and grips, m/N, as "
-                      f"2e-6; {UNKNOWN}: the report says how much it may matter", UNKNOWN,
-                      "nobody stated it", check=parsed("machine.compliance", UNKNOWN),
+                      f"2e-6; {UNKNOWN}: the report estimates its effect", UNKNOWN,
+                      "the recording does not contain "
+                      "it", check=parsed("machine.compliance", UNKNOWN),
                       words=(UNKNOWN,))]  # fmt: skip
     if found.get("machine.compliance", UNKNOWN) == UNKNOWN:
         return asked
-    return [*asked, by_path("machine.sd", "its standard uncertainty, m/N, as 1e-7")]
+    return [*asked, by_path("machine.sd", "standard uncertainty of the compliance, m/N, as 1e-7")]
 
 
 def contact_values(recording: Recording, found: Answers) -> Mapping[str, str]:
@@ -151,5 +157,5 @@ def _metres(text: str) -> float:
     found = split(text)
     value = in_si(found[0], found[1] or "m", "m") if found else None
     if value is None:
-        raise UsageError(f"'{text[:40]}': no length; as 5mm")
+        raise UsageError(f"'{text[:40]}': expected a length, as 5mm")
     return value

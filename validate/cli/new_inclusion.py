@@ -21,7 +21,9 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     length = quantity_in("m")
     along = {"x": "from the fixed plate to the moving one", "y": "height", "z": "lateral size"}
     return [
-        Question(f"block.{c}", f"{what} of the block, m or as 60mm; empty: left open", check=length)
+        Question(
+            f"block.{c}", f"{what} of the block, in m or as 60mm; empty: left open", check=length
+        )
         for c, what in along.items()
     ]
 

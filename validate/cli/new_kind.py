@@ -39,8 +39,8 @@ def limit_question(name: str, what: str, unit: str) -> Question:
     """Which error is good enough, or that none is required."""
     given = quantity_in(unit)
     return Question(
-        f"accept.{name}", f"largest error that is good enough, {unit}: {what}; {NOTHING}: only the "
-        "difference from zero is tested", open=True,
+        f"accept.{name}", f"largest acceptable error, {unit}: {what}; {NOTHING}: test only the "
+        "difference from zero", open=True,
         check=lambda text: None if text == NOTHING else given(text),
     )  # fmt: skip
 
@@ -48,8 +48,8 @@ def limit_question(name: str, what: str, unit: str) -> Question:
 def reason_question(name: str, default: str = "") -> Question:
     """Why the limit is what it is: without a reason it is no requirement."""
     return Question(
-        f"why.{name}", "why such an error is good enough for your purpose, a source or your own "
-        "choice; empty: it is no requirement", default,
+        f"why.{name}", "reason why this error is good enough: your purpose or a source; "
+        "empty: the limit is not a requirement", default,
     )  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def accept_line(name: str, unit: str, found: Answers, each: tuple[str, ...] = ()
     else:
         reason = found.get(f"why.{name}", "")
         call = f"Accept({what}, {quantity_in(unit)(answer):.6g}, {reason!r}{whole})"
-        note = unit + ("" if reason else "; write why, or it is no requirement")
+        note = unit + ("" if reason else "; add a reason, or it is not a requirement")
     return f"{f'*({call} for name in {each!r})' if many else call},  # {note}"
 
 
@@ -75,7 +75,7 @@ def quantity_in(unit: str) -> Callable[[str], float]:
         found = split(text)
         value = in_si(found[0], found[1] or unit, unit) if found else None
         if value is None or not 0 < value < float("inf"):
-            raise UsageError(f"a number above 0 in {unit}, or with its own unit, is expected")
+            raise UsageError(f"expected a number above 0 in {unit}, or with another unit")
         return value
 
     return check

@@ -55,7 +55,7 @@ def proposal(recording: Recording, p: MeasuredBody, folder: Path) -> Proposal:
     first = _first(recording, p, folder) if p.material.E else None
     facts = against_mode(shown, first, p)
     if shown.inertia_matters(first):
-        return Proposal(DYNAMIC, f"{facts}: inertia matters from {FRACTION:.2g} of it on")
+        return Proposal(DYNAMIC, f"{facts}: inertia matters above {FRACTION:.2g} of it")
     return Proposal(STATIC, f"{facts}: slow enough for statics")
 
 
@@ -91,8 +91,8 @@ def motion_questions(
         proposed = Proposal(DYNAMIC, "a release is a motion in time")
     else:
         proposed = _proposed(recording, tuple(sorted(values.items())))
-    asked = [Question("motion.how", "whether the motion in time is solved (dynamic), or states of "
-                      "rest (static: no inertia)", proposed.how, proposed.why,
+    asked = [Question("motion.how", "dynamic: solve the motion in time; static: solve states of "
+                      "rest, without inertia", proposed.how, proposed.why,
                       choices=(STATIC, DYNAMIC))]  # fmt: skip
     if found.get("motion.how") != DYNAMIC:
         return asked
@@ -102,37 +102,39 @@ def motion_questions(
     asked += _of_the_filters(recording, with_values(MeasuredBody(), dict(values)))
     return [
         *asked,
-        by_path("ranges.rho", "standard uncertainty, relative, of the density"),
+        by_path("ranges.rho", "standard uncertainty of the density (relative)"),
         *([] if found.get("motion.damping") == IDENTIFIED else
-          [by_path("ranges.damping", "standard uncertainty, relative, of the damping")]),
+          [by_path("ranges.damping", "standard uncertainty of the damping (relative)")]),
     ]  # fmt: skip
 
 
 def _of_the_start(found: Answers) -> list[Question]:
     asked = [
-        Question("motion.start", "when the motion starts, s of the recording's clock; empty: found "
+        Question("motion.start", "start of the motion, s on the recording's clock; empty: detected "
                  "in the recording", check=parsed("motion.start")),
-        Question("motion.length", "seconds from then on that are solved; empty: to the end",
+        Question("motion.length", "seconds to solve from the start; empty: to the end",
                  check=parsed("motion.length")),
     ]  # fmt: skip
     if found["moved.by"] == RELEASE:
-        asked.append(Question("moved.held", "what held the place until then, along moved.along: a "
-                              "force as 0.2N, or the place's displacement as 5mm", open=True,
+        asked.append(Question("moved.held", "load that held the place before the release, along "
+                              "moved.along: a force, as 0.2N, or a displacement, as 5mm", open=True,
                               check=held))  # fmt: skip
     if found["moved.by"] != "gravity":
-        asked.append(Question("motion.gravity", "direction of a weight that acts all the time, as "
-                              "-z (it changes the motion at large strain alone); empty: none",
+        asked.append(Question("motion.gravity", "direction of gravity, as -z (it changes the "
+                              "motion at large strain only); empty: none",
                               check=axis_of))  # fmt: skip
     return asked
 
 
 def _of_the_damping(found: Answers) -> list[Question]:
-    asked = [Question("motion.damping", "damping: of the stiffness as a time (beta, 3ms), a share "
-                      f"of the critical one at the first mode (0.03), or {IDENTIFIED} on the first "
-                      "part of a ring-down", open=True, check=damping)]  # fmt: skip
+    asked = [Question("motion.damping", "damping: stiffness-proportional (beta, 3ms), a ratio to "
+                                        "the "
+                      f"critical damping of the first mode (0.03), or {IDENTIFIED} on the first "
+                      f"part "
+                      "of a ring-down", open=True, check=damping)]  # fmt: skip
     if found.get("motion.damping") == IDENTIFIED:
-        asked.append(by_path("motion.fit_window", "seconds from the start on which it is "
-                             "identified; only what comes later is evidence"))  # fmt: skip
+        asked.append(by_path("motion.fit_window", "seconds from the start used for "
+                             "identification; only later samples are evidence"))  # fmt: skip
     return asked
 
 
@@ -141,10 +143,10 @@ def _of_the_filters(recording: Recording, p: MeasuredBody) -> list[Question]:
     names = judged_markers(recording, p)
     if len(names) < 2:
         return []
-    return [Question(GIVEN, f"markers that filters are given, of {', '.join(names)}; the others "
-                     "show how well filters predict", ",".join(_given(recording, p, names)),
-                     "every second marker by size of motion, two at least where three move; the "
-                     "one that moves most is predicted", check=_among(names))]  # fmt: skip
+    return [Question(GIVEN, f"markers that filters use, of {', '.join(names)}; the others "
+                     "test their prediction", ",".join(_given(recording, p, names)),
+                     "every second marker by size of motion, at least two if three move; the "
+                     "marker that moves most is predicted", check=_among(names))]  # fmt: skip
 
 
 def _among(names: Sequence[str]) -> Callable[[str], None]:
@@ -153,7 +155,7 @@ def _among(names: Sequence[str]) -> Callable[[str], None]:
         if absent := [n for n in chosen if n not in names]:
             raise UsageError(f"no marker {', '.join(absent)}; there are {', '.join(names)}")
         if not chosen or len(set(chosen)) < len(chosen):
-            raise UsageError(f"each marker once, one at least of {', '.join(names)}")
+            raise UsageError(f"expected at least one of {', '.join(names)}, each once")
 
     return check
 
@@ -168,7 +170,7 @@ def held(text: str) -> tuple[str, str]:
     for unit, name in (("N", "motion.held_force"), ("m", "motion.held_displacement")):
         if parts and parts[1] and in_si(parts[0], parts[1], unit) is not None:
             return name, text
-    raise UsageError("a force as 0.2N or a displacement as 5mm is expected, with its unit")
+    raise UsageError("expected a force, as 0.2N, or a displacement, as 5mm, with its unit")
 
 
 def damping(text: str) -> tuple[str, str]:

@@ -34,10 +34,11 @@ def asks(recording: Recording, found: Answers) -> Sequence[Question]:
         return []
     topics = tuple(recording.contours)
     asked = [
-        Question("outline.topic", "outlines that are judged", topics[0], "the first recorded",
+        Question("outline.topic", "outlines to compare", topics[0], "the first in the recording",
                  choices=topics),
-        Question("outline.shows", f"what they are of: {_EDGE} (the specimen's own), {_WALL} (one "
-                 f"inside, of a mesh file), {_OTHER} (nothing that the model has: not judged)",
+        Question("outline.shows", f"what the outlines show: {_EDGE} (the specimen's edge), "
+                 f"{_WALL} (an inclusion in a mesh file), {_OTHER} (not in the model: not "
+                 f"compared)",
                  open=True, choices=(_EDGE, _WALL, _OTHER)),
     ]  # fmt: skip
     shows = found.get("outline.shows", _OTHER)
@@ -54,13 +55,16 @@ def _of_the_inclusion(found: Answers) -> list[Question]:
                  '"lower_plate", "upper_plate" and the inclusion\'s wall', open=True, check=there,
                  words=()),
         Question("outline.surface", "facet set of the inclusion's wall", open=True),
-        Question("outline.fluid", "whether fluid fills it, of constant volume", open=True,
+        Question("outline.fluid", "whether a fluid of constant volume fills the "
+                                  "inclusion", open=True,
                  choices=("true", "false")),
-        Question("material.E", "Young's modulus, as 15kPa: the log's slope is that of a specimen "
-                 "without a hole", open=True, check=quantity_in("Pa")),
+        Question("material.E", "Young's modulus, as 15kPa (the log's slope holds for a specimen "
+                 "without inclusion)", open=True, check=quantity_in("Pa")),
     ]  # fmt: skip
     if Path(found.get("specimen.mesh", "")).suffix.lower() in FOREIGN:
-        asked.insert(1, Question("specimen.mesh_unit", "unit of its lengths, as mm", open=True))
+        asked.insert(
+            1, Question("specimen.mesh_unit", "unit of the file's lengths, as mm", open=True)
+        )
         if unit := found.get("specimen.mesh_unit"):
             mesh = read_mesh(Path(found["specimen.mesh"]), unit)
             asked[2:2] = known_size("specimen.mesh_size", mesh, unit)
@@ -71,8 +75,8 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
     pose = recording.contour(found.get("outline.topic", next(iter(recording.contours)))).pose
     posed = not np.array_equal(pose, np.eye(4))
     asked = [
-        Question("outline.origin", f"the images' first pixel {_FRAME}, as -12mm,0mm,30mm; "
-                 f"{_RECORDED}: by the recorded pose", _RECORDED if posed else "",
+        Question("outline.origin", f"position of the images' first pixel {_FRAME}, as "
+                 f"-12mm,0mm,30mm; {_RECORDED}: take the recorded pose", _RECORDED if posed else "",
                  "the recording has a pose", open=not posed, check=_path("outline.origin")),
     ]  # fmt: skip
     if found.get("outline.origin", _RECORDED) not in ("", _RECORDED):
@@ -83,9 +87,9 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
         ]  # fmt: skip
     return [
         *asked,
-        Question("outline.sd", "how well that place is known along x and y of the images, one "
-                 "standard uncertainty, as 0.3mm", open=True, check=quantity_in("m")),
-        limit_question("contour", "distance of the outlines", "m"),
+        Question("outline.sd", "standard uncertainty of that position along x and y of the "
+                 "images, as 0.3mm", open=True, check=quantity_in("m")),
+        limit_question("contour", "distance between outlines", "m"),
         reason_question("contour"),
     ]  # fmt: skip
 
@@ -104,11 +108,11 @@ def used(recording: Recording, found: Answers) -> set[str]:
 
 def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
     if recording.frames and not recording.contours:
-        return ("no outlines are recorded, so that nothing of the images is judged: find them "
+        return ("the images are not compared, as the recording has no outlines: find them "
                 "with `validate outline`",)  # fmt: skip
     if (cells := _cells(found)) > FEW_CELLS:
-        return (f"{found['specimen.mesh']} has {cells} cells: linear ones are proposed (order=1), "
-                "as quadratic ones take over ten minutes on the two finer meshes",)  # fmt: skip
+        return (f"{found['specimen.mesh']} has {cells} cells: linear ones are proposed (order=1); "
+                "quadratic ones take over ten minutes on the two finer meshes",)  # fmt: skip
     return ()
 
 

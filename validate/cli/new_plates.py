@@ -32,7 +32,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
         asked.append(Question("test", "whether the test presses or pulls", open=True,
                               choices=tuple(_WORDS)))  # fmt: skip
     asked += [
-        Question(f"specimen.{name}", f"{_what(name, recording)}, m or as 25mm; empty: left open",
+        Question(f"specimen.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
                  check=length)
         for name in _SIZES if f"specimen.{name}" not in stated
     ]  # fmt: skip
@@ -42,7 +42,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
 def _accepts(recording: Recording, found: Answers) -> tuple[Question, Question]:
     """Without a height the force at the strain limit is not known yet, so that no number is shown
     that would stay when the height is answered."""
-    what, check = "largest error of the force that is good enough, N", quantity_in("N")
+    what, check = "largest acceptable error of the force, N", quantity_in("N")
     height, limit, judged = _judged(recording, found)[1:]
     if height is None:
         what += "; empty: a tenth of the force at the strain limit"
@@ -62,8 +62,8 @@ def _what(name: str, recording: Recording) -> str:
     lengths = [f"{_called(key)} {1e3 * float(value):.6g} mm" for key, value in said.items()
                if key.split("/")[0] in _SIDES]  # fmt: skip
     what = {
-        "diameter": "diameter of the specimen (not round: of the circle of its area)",
-        "height": "height of the specimen, pulled: its length between the grips",
+        "diameter": "diameter of the specimen (if not round: of a circle of the same area)",
+        "height": "height of the specimen (in tension: length between the grips)",
     }[name]
     return f"{what}{'; the header says ' + ', '.join(lengths) if lengths else ''}"
 
@@ -122,7 +122,7 @@ def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool 
         return f"{value:.6g},  # m, recorded: {how}"
     if said:
         return f"{quantity_in('m')(said):.6g},  # m, answered"
-    return "None,  # m, not in the recording: measure it, write it here"
+    return "None,  # m, not in the recording: measure it and write it here"
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:

@@ -223,9 +223,11 @@ def calibrate(
     """
     images = [f"--{name}" for name in ("points", "targets", "unit", "probe") if given[name]]
     if tool is not None and images:
-        raise click.UsageError(f"{', '.join(images)}: of an image plane, not of --pivot {tool}.")
+        raise click.UsageError(
+            f"{', '.join(images)}: for an image plane; leave out with --pivot {tool}."
+        )
     if tool is None and (reference or rough):
-        raise click.UsageError("--reference and --tip are of --pivot TOOL; say it.")
+        raise click.UsageError("--reference and --tip need --pivot TOOL; give it.")
     if tool is not None:
         from validate.cli import pivoting
 

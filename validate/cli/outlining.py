@@ -58,8 +58,8 @@ def _same(file: Path, recording: Recording) -> Path:
     """The recording itself, unless that would lose what is no stream here."""
     if recording.unread:
         raise UsageError(
-            f"{file.name} holds {len(recording.unread)} topics that are not read here and would be "
-            "lost: name another file, -o OUT.mcap"
+            f"{file.name} has {len(recording.unread)} topics that are not read and would be "
+            "lost: write to another file, -o OUT.mcap"
         )
     return file
 
@@ -67,7 +67,7 @@ def _same(file: Path, recording: Recording) -> Path:
 def _only(recording: Recording) -> str:
     if len(recording.frames) != 1:
         raise UsageError(
-            f"{recording.name}: images {sorted(recording.frames)}; say which: --topic NAME"
+            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
             if recording.frames
             else f"{recording.name}: no images; it has {sorted(recording.streams)}"
         )
@@ -77,7 +77,7 @@ def _only(recording: Recording) -> str:
 def _require_free(recording: Recording, name: str) -> None:
     """Outlines that this command made may be made again."""
     if name in recording.streams and f"found/{name}" not in recording.metadata:
-        raise UsageError(f"{recording.name} has a stream '{name}' already: choose --name OTHER")
+        raise UsageError(f"{recording.name} already has a stream '{name}': choose --name OTHER")
 
 
 def _found(
@@ -85,7 +85,7 @@ def _found(
 ) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
     for option in ("sd", "unit", "label"):
         if given[option]:
-            raise UsageError(f"--{option} is for outlines of others: with --from FILE")
+            raise UsageError(f"--{option} is for third-party outlines; give it with --from FILE")
     hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
                 given["shape"], given["bright"])  # fmt: skip
     with progress("outlines") as told:
@@ -97,7 +97,7 @@ def _found(
 def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
     """What was said, a radius alone about the outline, and the other regions."""
     first = found.contours.outlines[0].mean(axis=0)
-    said = PlaceSaid("as said", first if hint.centre is None else hint.centre, hint.radius, True)
+    said = PlaceSaid("as given", first if hint.centre is None else hint.centre, hint.radius, True)
     others = (
         PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
     )
@@ -108,11 +108,11 @@ def _warned(found: FollowedOutline) -> None:
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
-            f"as distinct as the outline (others: {len(found.rivals)}): {named}; is another one "
-            "meant, say --centre X,Y"
+            f"{len(found.rivals)} other regions are as distinct as the outline: {named}; to choose "
+            "one, give --centre X,Y"
         )
     if found.confidence.min() < _SURE:
-        complain(f"confidence falls to {found.confidence.min():.2f}: look at the picture")
+        complain(f"confidence falls to {found.confidence.min():.2f}: check the picture")
     if found.without:
         i, why = next(iter(found.without.items()))
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
@@ -125,10 +125,10 @@ def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
     told = {
         "confidence": f"{c.min():.2f} to {c.max():.2f}",
         "sd": f"{1e3 * sd:.3g} mm ({own.min():.3g} to {own.max():.3g}), {EXPERTS:.2f} times "
-        "that of the wall on twins, as far as experts' lines were off elsewhere: assumed, not "
+        "that of the wall on twins, the error of experts' outlines in other data: assumed, not "
         "measured on these images",
         "searched": f"{'bright' if hint.bright else 'dark'} region, {hint.shape}, from "
-        + ("the centre that was said" if hint.centre is not None else "the most distinct disc"),
+        + ("the given centre" if hint.centre is not None else "the most distinct disc"),
         "rivals": _named(found.rivals),
     }
     if found.beside:
@@ -147,16 +147,17 @@ def _drawn(
 ) -> tuple[Contours, dict[str, str]]:
     useless = [k for k in ("centre", "radius", "bright") if given[k]]
     if useless:
-        raise UsageError(f"--{useless[0]} is for outlines that are searched: not with --from")
+        raise UsageError(f"--{useless[0]} is for searched outlines; leave it out with --from")
     if given["sd"] is None:
         raise UsageError(
-            f"how far the outlines of {path.name} may be off along their normal is not in it: --sd "
-            "0.3mm or 2px"
+            f"{path.name} does not contain the uncertainty of its outlines along their normal; "
+            f"give "
+            "it, as --sd 0.3mm or 2px"
         )
     sd = _length("--sd", given["sd"], frames)
     unit, label = given["unit"] or "px", given["label"] or ""
     contours = foreign_outlines(path, frames, images, sd or 0.0, unit, label)
-    told = {"drawn by others": path.name, "sd": f"{given['sd']}, as said"}
+    told = {"drawn by others": path.name, "sd": f"{given['sd']}, as given"}
     return contours, {**told, "label": label} if label else told
 
 
@@ -187,8 +188,8 @@ def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[Place
     at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
     holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
     try:
-        picture = outlines_over(frames, contours, holds, "evenly over time", "", marks=marks)
+        picture = outlines_over(frames, contours, holds, "evenly spaced in time", "", marks=marks)
         file.write_bytes(png(picture))
     except OSError as error:
         raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error
-    say(f"{file}: {len(at)} of the images with their outlines: look at it", indent="  ")
+    say(f"{file}: {len(at)} images with their outlines: check them", indent="  ")

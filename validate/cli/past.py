@@ -29,7 +29,7 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
     reports = reports_of(files.get(name), out)
     runs = history(reports, name)
     if not runs:
-        first = f"`validate run {name}` makes one"
+        first = f"start one with `validate run {name}`"
         hint = first if name in files else nearest_names(name, {*files})
         raise UsageError(f"no run of '{name}' below {reports}; {hint}")
     changes = [since(*pair) for pair in pairwise(runs)]
@@ -76,7 +76,7 @@ def _figures(run: PastRun) -> str:
 
 
 def _figure(c: PastCheck) -> str:
-    error = "within noise" if c.within_noise else shown(c.value or 0, c.unit)
+    error = "below noise" if c.within_noise else shown(c.value or 0, c.unit)
     return f"{c.method}: {c.name} {error} (2 u_val {shown(2 * c.u_val, c.unit)})"
 
 
@@ -100,13 +100,13 @@ def _since(before: int, found: Since) -> None:
 
 
 def _moved(m: Move) -> str:
-    by = "no uncertainty of the numbers is known" if m.ratio is None else f"{m.ratio:.3g} u"
+    by = "the uncertainty of the numbers is not known" if m.ratio is None else f"{m.ratio:.3g} u"
     return f"moved: {m.method}: {m.name} {shown(m.one, m.unit)} -> {shown(m.other, m.unit)} ({by})"
 
 
 def _first(lines: list[str], most: int, what: str) -> list[str]:
     more = len(lines) - most
-    return [*lines[:most], f"{more} more {what}, see --json"] if more > 0 else lines
+    return [*lines[:most], f"{more} more {what}: see --json"] if more > 0 else lines
 
 
 def _hash(text: str) -> str:

@@ -51,7 +51,7 @@ def _record(found: Pivot) -> dict[str, str]:
     turns = ", ".join(f"{np.degrees(v):.3g}" for v in found.turns)
     return {
         "tip": listed(found.tip, ".5g"),
-        "sd": f"{listed(found.sd, '.2g')}, by leaving out each tenth of the poses",
+        "sd": f"{listed(found.sd, '.2g')}, from leaving out each tenth of the poses",
         "fitted": f"rms {1e3 * found.rms:.3g} mm per axis of {len(found.used)} of "
         f"{len(found.off)} poses about {len(found.points)} points",
         "turns": f"{turns} degrees rms in the three directions",
@@ -65,6 +65,8 @@ def _points(t: Floats, R: Floats, T: Floats, rough: str) -> tuple[Ints, Ints]:
     tip = tip_offset(rough)
     parts = dwells(t, R @ tip + T, RADIUS, LEAST)
     if not parts:
-        raise UsageError(f"the tip never stands within {1e3 * RADIUS:g} mm for {LEAST:g} s")
+        raise UsageError(
+            f"the tip never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s; check --tip"
+        )
     at = [np.arange(d.begin, d.end) for d in parts]
     return np.concatenate(at), np.repeat(np.arange(len(at)), [len(i) for i in at])

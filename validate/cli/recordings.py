@@ -67,7 +67,7 @@ def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recordi
     reader = named(kind) if kind else recognised(file)
     every = said.get("specimen") == ALL
     found = every_specimen(reader, file, said) if every else [reader.read(file, said)]
-    why = "as said" if kind else f"because {reader.sign}"
+    why = "as given by --as" if kind else f"because {reader.sign}"
     say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
     for recording in found:
         _tell(recording)
@@ -95,7 +95,7 @@ def recover_file(
     """Saves what of an MCAP file without an end is whole, and says what is missing."""
     more = mapping or any(v is not None for v in given.values())
     if kind not in (None, "mcap") or more or len(files) > 1:
-        raise UsageError("--recover copies messages as they are: it takes one FILE and -o only")
+        raise UsageError("--recover copies messages unchanged: it takes only one FILE and -o")
     try_file(out)
     found = recover(files[0], out)
     for line in found.lines:
@@ -124,8 +124,8 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
     written(merged, out)
     if not shifts and len(files) > 1:
         complain(
-            "the files' clocks are taken as one; where each recorder had its own, "
-            "`validate align` finds the offset, or --shift TOPIC=SECONDS says it"
+            "all files are assumed to share one clock. If each recorder had its own clock, "
+            "`validate align` measures the offset; --shift TOPIC=SECONDS sets a known one"
         )
     ask_back(merged)
 

@@ -70,7 +70,7 @@ def called(experiment: Experiment) -> str:
 def headline(result: Result) -> str:
     """The verdict in one sentence: both answers, and over how many checks."""
     found = result.overall
-    doubt = ", in doubt" if result.warnings and found.passed else ""
+    doubt = ", with warnings" if result.warnings and found.passed else ""
     required = len(found.met) + len(found.failed) + len(found.undecided)
     parts = [f"{len(found.met)} of {required} requirements are met"] if required else []
     if found.differs:
@@ -100,7 +100,7 @@ def _checks(result: Result) -> list[Json]:
 
 
 def _warnings(result: Result) -> list[str]:
-    moved = [f"the verdict moved: {m.words}" for m in result.moved] if result.expected else []
+    moved = [f"the verdict changed: {m.words}" for m in result.moved] if result.expected else []
     findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
     texts = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
     return [f"warning: {text}" for text in texts]
@@ -209,7 +209,7 @@ def _next(result: Result, name: str) -> Iterator[str]:
     if result.quick:
         steps.append((f"validate run {name}", "the full run"))
     if result.identified_values and not found.passed:
-        steps.append((f"validate identify {name}", "identify what is uncertain"))
+        steps.append((f"validate identify {name}", "identify uncertain parameters"))
     meshed = any(len(m.scene.mesh.nodes) for m in result.methods)
     if meshed and not found.passed:
         steps.append((f"validate study tradeoff {name}", "error of other solvers and meshes"))

@@ -84,8 +84,9 @@ def _reported(
         )  # fmt: skip
     if old := replaced(page.parent, created):
         complain(
-            f"{relative(page.parent)} held a run of {old['created']}, made otherwise; its line is "
-            f"kept, see `validate history {experiment.name}`"
+            f"{relative(page.parent)} held a run of {old['created']} with other settings; its "
+            f"history line is "
+            f"kept: see `validate history {experiment.name}`"
         )
     return result, page
 

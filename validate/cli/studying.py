@@ -179,7 +179,9 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
     try:
         numbers = tuple(int(part) for part in text.split(","))
     except ValueError:
-        raise UsageError(f"--seeds {text}: a number, or seeds between commas") from None
+        raise UsageError(
+            f"--seeds {text}: expected a number of seeds, or seeds separated by commas"
+        ) from None
     return numbers if len(numbers) > 1 else numbers[0]
 
 
@@ -206,7 +208,7 @@ def running(
         kind = place.partition("+")[0].replace("choose", "tradeoff")  # whose cells it climbs over
         cells = study_folder(experiment, kind, common.out) / CELLS
         kept = sum(1 for _ in cells.glob("*.json"))
-        say(f"{kept} finished cells are kept; the same command goes on from there", error=True)
+        say(f"{kept} finished cells are kept; the same command resumes from there", error=True)
         raise
 
 
@@ -223,7 +225,8 @@ def answer(passages: Sequence[Passage], done: Finished[Any], page: Path, detail:
     """Print a study on one screen, with the count of its cells and the place of its report."""
     where = f" on {done.workers}" if done.workers else ""
     ends = (
-        f"{len(done.records)} cells, {done.reused} of them finished before; {done.seconds:.1f} s"
+        f"{len(done.records)} cells, {done.reused} of them from an earlier run; "
+        f"{done.seconds:.1f} s"
         f"{where}; report: {relative(page)}"
     )
     show([*passages, sentences([ends], None)], detail)
@@ -351,12 +354,12 @@ def _choice_passages(choice: Choice) -> list[Passage]:
 
 def _choice_in_full(choice: Choice) -> None:
     facts = [[f.name, f.value, f.means] for f in choice.facts]
-    table("The scene's own numbers", ("what", "value", "asks for"), facts)
+    table("Key figures of the scene", ("quantity", "value", "suggests"), facts)
     evidence = [[c.rung, c.evidence] for c in choice.ladder]
     table("Evidence", ("candidate", "evidence"), evidence)
     if choice.excluded:
         cells = [[e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded]
-        table("Left out by a bound", ("candidate", "cell", "at least / µs", "why"), cells)
+        table("Excluded by a lower bound", ("candidate", "cell", "at least / µs", "why"), cells)
 
 
 def _warned(texts: Sequence[str]) -> Passage:

@@ -21,7 +21,7 @@ def show(out: Path | None, *, as_json: bool) -> None:
     say(sentence(found), "bold")
     _print("Measured recordings", found.kinds)
     if found.twins:
-        _print("Twins (models of ours, no measurement)", found.twins)
+        _print("Twins (simulated recordings, no measurement)", found.twins)
     counted = f"{len(found.taken)} of {len(found.runs)} stored runs count"
     whys = [f"{r.folder}: {r.why}" for r in found.runs if r.why]
     say(f"\n{counted}" + (":" if whys else ""))

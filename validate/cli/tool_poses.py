@@ -15,7 +15,7 @@ def tool_poses(recording: Recording, tool: str) -> tuple[Floats, Floats, Floats]
     turns = [t for t in recording.signals if t.endswith(f"/{ROTATION}")]
     tools = sorted(t.removesuffix(f"/{ROTATION}") for t in turns)
     if tool not in tools:
-        raise UsageError(f"no poses of '{tool}'; there are {', '.join(tools) or 'none'}")
+        raise UsageError(f"no poses of '{tool}'; tools with poses: {', '.join(tools) or 'none'}")
     turned = recording.signal(f"{tool}/{ROTATION}", "1")
     moved = recording.signal(f"{tool}/{TRANSLATION}", "m")
     return turned.t, turned.y.reshape(-1, 3, 3), moved.y
@@ -32,7 +32,7 @@ def in_reference(
     other, Q, P = tool_poses(recording, reference)
     _, i, j = np.intersect1d(np.rint(1e9 * t), np.rint(1e9 * other), return_indices=True)
     if not len(i):
-        raise UsageError(f"'{tool}' and '{reference}' are never seen at one time")
+        raise UsageError(f"'{tool}' and '{reference}' are never visible at the same time")
     frame = reference.partition("To")[0] or reference
     Qt = np.swapaxes(Q[j], 1, 2)
     return t[i], Qt @ R[i], np.einsum("nij,nj->ni", Qt, T[i] - P[j]), frame

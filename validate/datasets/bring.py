@@ -42,7 +42,9 @@ def bring(data_set: DataSet, told: Told) -> tuple[DataFile, ...]:
             wrong.append(str(error))
         done += file.size
     if wrong:
-        raise RecordingError(f"{len(wrong)} of {len(missing)} files did not come: {wrong[0]}")
+        raise RecordingError(
+            f"{len(wrong)} of {len(missing)} files could not be downloaded: {wrong[0]}"
+        )
     return missing
 
 
@@ -88,22 +90,23 @@ def _in_a_line(address: str, file: DataFile) -> Iterator[None]:
         yield
     except requests.HTTPError as error:
         raise _OtherFileError(
-            f"{file.name}: {error}; nothing of it was kept, try again later or look for it by hand"
+            f"{file.name}: {error}; the download is discarded. Try again later or download it "
+            f"manually"
         ) from error
     except requests.exceptions.ChunkedEncodingError as error:
         raise RecordingError(
-            f"{file.name}: the transfer from {host} was cut before its {file.size} bytes were "
-            "here; nothing of it was kept, run the command again"
+            f"{file.name}: the transfer from {host} ended before its {file.size} bytes were "
+            f"complete; the download is discarded, run the command again"
         ) from error
     except requests.RequestException as error:
         raise RecordingError(
-            f"{file.name}: {host} cannot be reached; look at the network and run the command "
-            f"again, or copy the file from {address} into a folder that VALIDATE_SHARED_DATA names"
+            f"{file.name}: {host} cannot be reached; check the network and run the command again, "
+            f"or copy the file from {address} into a folder that VALIDATE_SHARED_DATA names"
         ) from error
     except ValueError as error:
         raise _OtherFileError(
-            f"{file.name}: what lies at {address} is not the registered file (sha256 "
-            f"{file.sha256[:12]}..., {file.size} bytes); nothing of it was kept"
+            f"{file.name}: the file at {address} is not the registered one (sha256 "
+            f"{file.sha256[:12]}..., {file.size} bytes); the download is discarded"
         ) from error
 
 

@@ -20,7 +20,7 @@ def found(
     `folder` is the data set's, as in `markers/silicone-beam`; `beside` the folder of the experiment
     that asks, for a shared folder that lies next to its project; `own` a path that its user gave
     for the parameter `by`, which is taken as it is, or the bare name of another file of the data
-    set. Raises `RecordingError` naming the command that brings it.
+    set. Raises `RecordingError` naming the command that downloads it.
     """
     if own:
         sibling = sought(folder, own, beside) if name and Path(own).name == own else None
@@ -79,10 +79,10 @@ def _absent(folder: str, name: str | None, by: str) -> str:
     theirs = named(folder)
     what = f"{folder}/{name}" if name else f"{folder}/"
     own = f"--set {by}={'FILE' if name else 'FOLDER'}"
-    brings = f"`validate data get {theirs.name}` brings it"
+    brings = f"`validate data get {theirs.name}` downloads it"
     if not any(f.source for f in theirs.files if name in (None, f.name)):
-        brings = f"`validate data get {theirs.name}` says what it is made of"
+        brings = f"`validate data get {theirs.name}` describes how to make it"
     return (
-        f"{what} is not here: {brings} ({theirs.repository} {theirs.commit[:7]}, "
+        f"{what} is missing: {brings} ({theirs.repository} {theirs.commit[:7]}, "
         f"{theirs.licence}); or pass {own}, or set {SHARED} to a folder that holds it"
     )

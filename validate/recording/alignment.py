@@ -85,9 +85,11 @@ def declared_offset(recording: Recording, topic: str, seconds: float, sd: float)
     times = {k: s.t for k, s in recording.streams.items()}
     others = [t for k, t in times.items() if k != topic and len(np.unique(t)) > 1]
     if topic not in times or not others:
-        raise RecordingError(f"'{topic}' has no other stream to meet; there are {sorted(times)}")
+        raise RecordingError(
+            f"'{topic}' has no other stream to compare with; there are {sorted(times)}"
+        )
     inside = np.any([met(t, times[topic] + seconds) for t in others], axis=0)
-    offset = Offset(seconds, sd, "given by the user", int(inside.sum()), float(inside.mean()))
+    offset = Offset(seconds, sd, "given by --shift", int(inside.sum()), float(inside.mean()))
     _require_coverage(offset, len(inside), MIN_COVERAGE)
     return offset
 
@@ -123,7 +125,7 @@ def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
     name = RECORD + topic
     if name in recording.metadata:
         raise RecordingError(
-            f"'{topic}' was moved by {recording.metadata[name].get('seconds')} s before; "
+            f"'{topic}' was shifted by {recording.metadata[name].get('seconds')} s before; "
             "shift the stream of the first recording instead"
         )
     if topic not in recording.streams:
@@ -164,12 +166,12 @@ def _require_motion(signal: Signal, name: str) -> None:
     if signal.y.shape[1] != 1:
         raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
     if len(np.unique(signal.t)) < MIN_MATCHED:
-        raise RecordingError(f"{name}: {len(signal.t)} samples, at least {MIN_MATCHED} are needed")
+        raise RecordingError(f"{name}: {len(signal.t)} samples; at least {MIN_MATCHED} are needed")
     y = signal.y[:, 0]
     noise = noise_of(y)
     spread = float(np.std(y))
     if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
         raise RecordingError(
             f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of its noise "
-            f"({noise:.3g}); nothing to correlate, align by another stream"
+            f"({noise:.3g}); it cannot be correlated, align by another stream"
         )

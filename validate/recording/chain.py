@@ -88,11 +88,11 @@ def _improper(link: Link) -> Iterator[str]:
     off = float(np.abs(link.R @ link.R.swapaxes(1, 2) - np.eye(3)).max())
     if mirrored:
         yield (
-            f"{where}: {mirrored} of {len(link.t)} are left-handed (determinant -1): an axis was "
-            "turned on its own; export it right-handed"
+            f"{where}: {mirrored} of {len(link.t)} are left-handed (determinant -1): a single "
+            f"axis was reversed; export it right-handed"
         )
     elif off > _PROPER:
-        yield f"{where}: off a rotation by {off:.2g}: scaled, sheared, or of other columns"
+        yield f"{where}: off a rotation by {off:.2g}: scaled, sheared, or from other columns"
 
 
 def _way(tree: dict[str, list[Link]], start: str, end: str) -> list[Link] | None:

@@ -55,7 +55,7 @@ def _windowed(signal: Signal, window: Window | None) -> tuple[Floats, Floats]:
     inside = (signal.t >= low) & (signal.t <= high)
     if inside.sum() < _MIN_SAMPLES:
         raise RecordingError(
-            f"{int(inside.sum())} samples between {low:g} and {high:g} s, {_MIN_SAMPLES} are needed"
+            f"{int(inside.sum())} samples between {low:g} and {high:g} s; {_MIN_SAMPLES} are needed"
         )
     return signal.t[inside], signal.y[inside, 0]
 

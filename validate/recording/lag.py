@@ -46,7 +46,7 @@ def coarse_lag(
     if usable.sum() < 3:
         best = 100 * float(overlap[np.abs(tau) <= within + step].max(initial=0)) / b_seen.sum()
         raise RecordingError(
-            f"within {within:g} s the streams overlap by {best:.0f} % at most, at least "
+            f"within {within:g} s the streams overlap by {best:.0f} % at most; at least "
             f"{100 * min_coverage:.0f} % are needed; widen the search (--within) or record "
             "longer together"
         )
@@ -58,16 +58,17 @@ def _only_peak(tau: Floats, correlation: Floats, within: float, least: float) ->
     best = float(correlation[peak])
     if best < least:
         raise RecordingError(
-            f"the streams correlate by {best:.2f} at most (at {tau[peak]:+.4g} s), at least "
+            f"the streams correlate by {best:.2f} at most (at {tau[peak]:+.4g} s); at least "
             f"{least:g} is needed; widen the search (--within), align them by a "
-            "marked event (--event), or state what is enough (--correlation)"
+            "marked event (--event), or lower the limit (--correlation)"
         )
     rivals = 1 - correlation**2 <= AMBIGUITY * (1 - best**2) + 1e-9
     rivals &= correlation > 0
     if rivals[0] or rivals[-1]:
         raise RecordingError(
-            f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s goes on to the edge of the "
-            f"search ({tau[0]:+.4g}..{tau[-1]:+.4g} s), as ramps do or an offset beyond {within:g} "
+            f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s reaches the edge of the "
+            f"search ({tau[0]:+.4g}..{tau[-1]:+.4g} s), as for ramps or for an offset beyond "
+            f"{within:g} "
             "s; widen the search (--within) or align by a marked event (--event)"
         )
     at = np.flatnonzero(rivals)
@@ -93,7 +94,9 @@ def _on_grid(signal: Signal, step: float) -> tuple[Floats, Floats]:
     t = signal.t - signal.t[0]
     count = int(t[-1] / step) + 1
     if count > MAX_GRID:
-        raise RecordingError(f"{count} samples of {step:.3g} s, the limit is {MAX_GRID}; cut it")
+        raise RecordingError(
+            f"{count} samples of {step:.3g} s, the limit is {MAX_GRID}; shorten the recording"
+        )
     grid = np.arange(count, dtype=np.float64) * step
     seen = met(t, grid).astype(np.float64)
     return (np.interp(grid, t, signal.y[:, 0]) - signal.y.mean()) * seen, seen
@@ -140,7 +143,7 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
     usable = np.all([met(known.t, seen.t + start + w) for w in (-2 * width, 2 * width)], axis=0)
     if usable.sum() < MIN_MATCHED:
         raise RecordingError(
-            f"{int(usable.sum())} samples meet the reference, {MIN_MATCHED} are needed"
+            f"{int(usable.sum())} samples lie within the reference; {MIN_MATCHED} are needed"
         )
     t, y = seen.t[usable], seen.y[usable, 0]
     tries = np.linspace(-width, width, _TRIES)

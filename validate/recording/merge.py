@@ -18,7 +18,7 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
     stream with `alignment.shift`.
     """
     if len(recordings) < 2:
-        raise RecordingError(f"{len(recordings)} recordings to merge, at least 2 are needed")
+        raise RecordingError(f"{len(recordings)} recordings to merge; give at least 2")
     counts = Counter(topic for r in recordings for topic in r.streams)
     twice = sorted(topic for topic, n in counts.items() if n > 1)
     if twice:

@@ -191,9 +191,9 @@ def _cut(verified: Verified) -> list[str]:
         return []
     what = "the file, behind its data," if cut.ended else "the data section"
     return [
-        f"no end of {what}: whole up to byte {cut.at} of {source.bytes}, {verified.messages} "
-        "messages; the writer was ended; save them by "
-        f"`validate import {source.path} --recover -o X.mcap`"
+        f"no end of {what}: complete up to byte {cut.at} of {source.bytes}, {verified.messages} "
+        f"messages; the writer was stopped; save them with `validate import {source.path} "
+        f"--recover -o X.mcap`"
     ]
 
 

@@ -66,7 +66,7 @@ def no_mcap(path: Path, error: RecordingError) -> RecordingError:
         return RecordingError(said)
     may = INSTRON.recognises(path)
     way = f"; if it is {INSTRON.doc}: validate import {path.name} -o {path.stem}.mcap"
-    what = f"{path.name}: the first 8 bytes are no MCAP magic"
+    what = f"{path.name}: the first 8 bytes are not the MCAP magic"
     return RecordingError(f"{what} ({head(path, 8).hex()}){way}") if may else error
 
 
@@ -95,7 +95,7 @@ def _unknown(path: Path) -> str:
     """What a file is that no reader recognises: a folder, empty, text or other bytes."""
     names = ", ".join(r.name for r in READERS)
     if path.is_dir():
-        return f"a folder of no known format; name a file, or the format with --as ({names})"
+        return f"a folder of unknown format; name a file, or the format with --as ({names})"
     size = path.stat().st_size
     if size == 0:
         return "the file is empty (0 bytes); record or copy it again"

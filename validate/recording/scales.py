@@ -27,9 +27,9 @@ def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = Non
         return ""
     low, high = _PIXELS
     sides = " x ".join(f"{side:g}" for side in dict.fromkeys(m_per_px))
-    found = f"{sides} m a pixel is outside {low:g} to {high:g} m"
+    found = f"{sides} m per pixel is outside {low:g} to {high:g} m"
     if all(low <= side <= high for side in m_per_px):
-        found = f"{sides} m a pixel"
+        found = f"{sides} m per pixel"
     return f"{found}{_image(m_per_px, shape)}{_meant(m_per_px, shape)}"
 
 
@@ -100,7 +100,10 @@ def _odd_spread(x: Floats) -> str:
     low, high = _SPREADS
     if low <= size <= high or size == 0:
         return ""
-    return f"markers {size:.3g} m apart are outside {low:g} to {high:g} m{_factor(size, _SPREADS)}"
+    return (
+        f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
+        f"{_factor(size, _SPREADS)}"
+    )
 
 
 def _spread(x: Floats) -> float:

@@ -12,7 +12,7 @@ SHARE = "share"  # its key: sd of the mean over the mean, one relative standard 
 def repeats_share(recording: Recording) -> float:
     """The relative standard uncertainty of a mean of repeats; 0 for a recording of one log.
 
-    Raises `RecordingError` for a record whose share is no number of at least 0.
+    Raises `RecordingError` for a record whose share is not a number of at least 0.
     """
     said = recording.metadata.get(REPEATS, {}).get(SHARE)
     if said is None:
@@ -22,5 +22,7 @@ def repeats_share(recording: Recording) -> float:
     except ValueError:
         share = math.nan
     if not (math.isfinite(share) and share >= 0):
-        raise RecordingError(f"{recording.name}: record '{REPEATS}': {SHARE} '{said}' is no number")
+        raise RecordingError(
+            f"{recording.name}: record '{REPEATS}': {SHARE} '{said}' is not a number"
+        )
     return share

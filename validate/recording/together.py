@@ -52,7 +52,7 @@ def drift_of(reference: Signal, stream: Signal, offset: Offset) -> ClockDrift:
         found = ClockDrift(found.rate + more, sd, middle, span)
         if abs(more) < _SETTLED * sd:
             return found
-    raise RecordingError(f"the drift does not settle within {_TURNS} turns")
+    raise RecordingError(f"the drift does not converge within {_TURNS} iterations")
 
 
 def _left(reference: Signal, stream: Signal, start: float, middle: float) -> tuple[float, float]:

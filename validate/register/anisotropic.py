@@ -47,7 +47,7 @@ def fit_weighted(source: Floats, target: Floats, C: Floats, start: Similarity) -
         R, t = _turned(R, step[:3]), t + R @ step[3:]
         if np.abs(step[:3]).max() < _SMALL and np.abs(step[3:]).max() < _SMALL * size:
             return Similarity(R, t)
-    raise RegistrationError(f"the weighted fit did not settle in {_MOST} steps: check the noise")
+    raise RegistrationError(f"the weighted fit did not converge in {_MOST} steps: check the noise")
 
 
 def weighted_covariance(points: Floats, markers: Floats, C: Floats, T: Similarity) -> Floats:

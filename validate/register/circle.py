@@ -38,7 +38,8 @@ def fit_circle(points: Floats, sd: float) -> Circle:
     off = rms(residual)
     if off > 0.2 * x[2]:
         raise RegistrationError(
-            f"the outline is no circle: {1e3 * off:.2f} mm rms off a radius of {1e3 * x[2]:.2f} mm"
+            f"the outline is not a circle: {1e3 * off:.2f} mm rms off a radius of "
+            f"{1e3 * x[2]:.2f} mm"
         )
     k = len(points)
     noise = max(sd, off)

@@ -32,7 +32,8 @@ def clock_sd(recording: Recording, topic: str) -> float:
         sd = -1.0
     if not (np.isfinite(sd) and sd >= 0):
         raise RegistrationError(
-            f"record '{RECORD}{topic}': sd '{record.get('sd')}' is not a time >= 0 s; align anew"
+            f"record '{RECORD}{topic}': sd '{record.get('sd')}' is not a time >= 0 s; run "
+            f"`validate align` again"
         )
     return sd
 
@@ -42,8 +43,8 @@ def with_clock(found: Deviation, sd_t: float, speed: Floats) -> Deviation:
     seen = speed[np.isfinite(speed)]
     if len(seen) == 0:
         raise ComparisonError(
-            f"{found.quantity}: a clock uncertain by {sd_t:.3g} s, and too few samples to tell how "
-            "fast it moves; record more of them"
+            f"{found.quantity}: the clock is uncertain by {sd_t:.3g} s, and too few samples show "
+            f"how fast the value changes; record more samples"
         )
     moved = sd_t * float(np.sqrt(np.mean(seen**2)))
     return replace(found, systematic=float(np.hypot(found.systematic, moved)))

@@ -112,7 +112,7 @@ class TouchedLandmarks:
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         d = self.digitised
         at = selection.samples(self.t, run.t, self.name)
-        words = "predicted from all other landmarks less touched, along the frame's axes"
+        words = "predicted from all other landmarks minus touched, along the frame's axes"
         off = self._shown(run, at) - d.places[at]
         # Every pose has six numbers of all landmarks: so many of the differences are not free.
         freedom = max(off.size - 6, 1)

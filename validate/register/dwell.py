@@ -143,7 +143,7 @@ def tip_path(
     at, i, j = np.intersect1d(np.rint(1e9 * t), np.rint(1e9 * reference[0]), return_indices=True)
     if not len(at):
         raise RegistrationError(
-            f"'{names[0]}' and '{names[1]}' are never seen at one time: 0 of {len(t)} and "
+            f"'{names[0]}' and '{names[1]}' are never visible at the same time: 0 of {len(t)} and "
             f"{len(reference[0])} frames"
         )
     R = reference[1][j]

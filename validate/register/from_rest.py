@@ -25,8 +25,8 @@ def rested(markers: Markers, still: float) -> tuple[Markers, tuple[str, ...], in
     kept: Ints = np.flatnonzero(seen.any(axis=0))
     if len(kept) == 0:
         raise RegistrationError(
-            f"none of {len(markers.names)} markers is seen in the first {still:g} s, at rest; "
-            "--set seen.still=LONGER, or cut the recording where they are"
+            f"none of {len(markers.names)} markers is visible in the first {still:g} s, at rest; "
+            "--set seen.still=LONGER, or start the recording where they are visible"
         )
     first = np.array([early[seen[:, j], j].mean(axis=0) for j in kept])
     x = markers.x[:, kept].copy()

@@ -129,8 +129,8 @@ def _left_out(seen: SeenPoints) -> Floats:
 def _fitted(seen: SeenPoints) -> tuple[Similarity, tuple[float, float], Floats]:
     if seen.equations <= _UNKNOWN:
         raise RegistrationError(
-            f"{len(seen.px)} points tell {seen.equations} numbers of {_UNKNOWN} unknown ones; mark "
-            "more of them, in more images"
+            f"{len(seen.px)} points give {seen.equations} equations for {_UNKNOWN} unknowns; mark "
+            f"more points, in more images"
         )
     start = _started(seen)
 
@@ -144,8 +144,8 @@ def _fitted(seen: SeenPoints) -> tuple[Similarity, tuple[float, float], Floats]:
     singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
     if singular[-1] < _FLAT * singular[0]:
         raise RegistrationError(
-            "the points leave a motion of the image plane open: turn the probe further between "
-            "images, or mark targets that lie apart"
+            "the points do not fix the image plane: turn the probe further between images, or "
+            "mark targets at larger distances"
         )
     return pose, scale, J
 
@@ -164,8 +164,8 @@ def _started(seen: SeenPoints) -> Plane:
     across, down, shift = found.reshape(3, 3)
     if rank < 9 or not (np.linalg.norm(across) and np.linalg.norm(down)):
         raise RegistrationError(
-            f"the points fix {rank} of 9 numbers of the image plane: mark targets that lie apart "
-            "in images of which the probe was turned and moved between"
+            f"the points fix {rank} of 9 numbers of the image plane: mark targets at larger "
+            f"distances, in images between which the probe was turned and moved"
         )
     scale = float(np.linalg.norm(across) / size), float(np.linalg.norm(down) / size)
     axes = np.stack([across, down], axis=1) / (size * np.array(scale))

@@ -34,9 +34,9 @@ def require_steady_labels(
         if moved.any() and _mended(rest[seen], frame[seen], nearest):
             shown = ", ".join(names[i] for i in seen[moved][:6])
             raise RegistrationError(
-                f"markers {shown} look swapped at t = {ti:.2f} s: {1e3 * own[moved].max():.1f} mm "
-                f"from where the others put them, {1e3 * best[moved].max():.1f} mm after "
-                "relabelling; mend their names"
+                f"markers {shown} seem swapped at t = {ti:.2f} s: {1e3 * own[moved].max():.1f} mm "
+                f"from the positions predicted by the others, {1e3 * best[moved].max():.1f} mm "
+                f"after relabelling; correct their names"
             )
 
 

@@ -48,13 +48,15 @@ def match_landmarks(known: Floats, seen: Floats, within: float) -> Match:
     fit alike and neither is in order.
     """
     if len(seen) > _MOST:
-        raise RegistrationError(f"{len(seen)} places for {len(known)} landmarks; at most {_MOST}")
+        raise RegistrationError(
+            f"{len(seen)} places for {len(known)} landmarks; expected at most {_MOST}"
+        )
     found = _matches(known, seen, within)
     most = max((len(m.known) for m in found), default=0)
     if most < min(FEWEST, len(known)) or most < FEWEST:
         raise RegistrationError(
             f"{most} of {len(known)} landmarks lie among the {len(seen)} places touched, within "
-            f"{1e3 * within:g} mm: {FEWEST} are needed; check the tip's offset, the list of "
+            f"{1e3 * within:g} mm; {FEWEST} are needed: check the tip's offset, the list of "
             "landmarks and its unit"
         )
     best = sorted((m for m in found if len(m.known) == most), key=lambda m: m.rms)

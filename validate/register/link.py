@@ -93,9 +93,9 @@ class _Front:
         if len(good) < _FEWEST:
             raise RegistrationError(
                 f"{len(good)} of {len(self.before)} particles have a partner on which their "
-                f"neighbours agree, {_FEWEST} are needed: a part of the body must move by less "
+                f"neighbours agree; {_FEWEST} are needed. Each part of the body must move by less "
                 f"than half the spacing of {1e6 * self.spacing:.3g} um; shift one of the clouds, "
-                "or take pictures in smaller steps"
+                f"or record images in smaller steps"
             )
         self.to[good] = there[good]
         return len(good)

@@ -196,7 +196,7 @@ class MarkerObservation:
             return None
         t = self.t[samples]
         probe = [selection.read(run.t, run.traces[f"{name}.{c}"].y, t) for c in axes]
-        words = "estimate less measured displacement of the marker, at the times it was seen"
+        words = "estimated minus measured displacement of the marker, at its visible samples"
         off = (np.stack(probe, axis=1) - moved[samples])[seen]
         # The tre is a length over three axes, the systematic part is per axis.
         tre, sd = float(self.tre[j] / np.sqrt(3)), self.along(range(len(axes)))
@@ -340,7 +340,7 @@ def _require_scale(x: Floats, rest: Floats) -> None:
     if not 0.5 < size / known < 2:
         raise RegistrationError(
             f"the markers spread over {1e3 * size:.4g} mm, their layout over {1e3 * known:.4g} mm: "
-            f"{size / known:.4g} times as much; wrong unit? positions are metres"
+            f"{size / known:.4g} times as much; check the unit, positions are in metres"
         )
 
 

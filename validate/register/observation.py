@@ -206,8 +206,8 @@ def nearest_samples(times: Floats, t: Floats, name: str) -> Ints:
     if off.max(initial=0.0) > WITHIN:
         i = int(off.argmax())
         raise ComparisonError(
-            f"{name} has no sample within {WITHIN:g} s of t = {t[i]:.3f} s (nearest {off[i]:.3f} s "
-            "off): 0 matched samples; check the clocks with `validate inspect`"
+            f"{name} has no sample within {WITHIN:g} s of t = {t[i]:.3f} s (nearest {off[i]:.3f} "
+            f"s away): 0 matched samples; check the clocks with `validate inspect`"
         )
     return np.asarray(index)
 

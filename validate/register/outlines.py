@@ -200,8 +200,8 @@ class OutlineObservation:
             Deviation(
                 "contour.material", moved[0] - moved[1], "m",
                 self.sd * float(np.sqrt((np.diag(along).mean() + across) / 2)), 0.0,
-                "displacement of the outline at equal polar angle about its own centroid, every "
-                "10 deg", freedom=_freedom(along), reference=moved[1],
+                "displacement of the outline at equal polar angle about its centroid, every 10 "
+                "deg", freedom=_freedom(along), reference=moved[1],
             ),
             *(self._corner(c, start, end) for c in self.corners),
             Deviation(

@@ -50,19 +50,19 @@ def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
     open, and where less than half of the poses belong to one point each.
     """
     if len(R) < _LEAST:
-        raise RegistrationError(f"{len(R)} poses, at least {_LEAST} are needed")
+        raise RegistrationError(f"{len(R)} poses; at least {_LEAST} are needed")
     used = _standing(R, T, point)
     if 2 * len(used) < len(R) or len(used) < _LEAST:
         raise RegistrationError(
-            f"the tip stands on a point in {len(used)} of {len(R)} poses, fewer than half: cut the "
-            "recording to the time in which it stands"
+            f"the tip stands on a point in {len(used)} of {len(R)} poses, fewer than half: "
+            f"shorten the recording to the time in which the tip stands still"
         )
     turns = _turns(R[used], point[used])
     if turns[0] < _TURNS:
         raise RegistrationError(
             f"turned by {np.degrees(turns[0]):.2g} degrees rms about the second axis, at least "
-            f"{np.degrees(_TURNS):.2g} are needed: the tip is open along one direction; tilt the "
-            "tool to all sides"
+            f"{np.degrees(_TURNS):.2g} are needed: the tip is not determined along one direction; "
+            f"tilt the tool to all sides"
         )
     tip = _solved(R[used], T[used], point[used])
     points, off = _off(R, T, point, used, tip)
@@ -71,7 +71,7 @@ def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
     if found.rms > _STILL * travel:
         raise RegistrationError(
             f"the tip wanders by {1e3 * found.rms:.3g} mm rms where the tool travels "
-            f"{1e3 * travel:.3g} mm: it does not stand on a point"
+            f"{1e3 * travel:.3g} mm: it does not stay on one point; hold it still and record again"
         )
     return found
 

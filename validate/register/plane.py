@@ -92,7 +92,9 @@ def require_rigid(pose: Floats, name: str) -> None:
     R = pose[:3, :3]
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > 1e-6 or np.linalg.det(R) < 0 or not np.allclose(pose[3], [0, 0, 0, 1]):
-        kind = "mirrors the image" if np.linalg.det(R) < 0 else f"is off orthogonal by {off:.1e}"
+        kind = (
+            "mirrors the image" if np.linalg.det(R) < 0 else f"is not orthogonal: error {off:.1e}"
+        )
         raise RegistrationError(f"pose '{name}' {kind}; give T_frame_from_image, right-handed")
 
 

@@ -188,8 +188,8 @@ def _used(
     missing = tuple(n for n, ok, want in zip(names, seen, wanted, strict=True) if want and not ok)
     if use.sum() < FEWEST:
         raise RegistrationError(
-            f"markers: {int(use.sum())} of {k} usable ({len(missing)} not seen, {len(exclude)} "
-            f"excluded), a registration with a residual needs {FEWEST}: add markers"
+            f"markers: {int(use.sum())} of {k} usable ({len(missing)} not visible, {len(exclude)} "
+            f"excluded); a registration with a residual needs {FEWEST}: add markers"
         )
     return x[use], y[use], tuple(n for n, ok in zip(names, use, strict=True) if ok), missing
 
@@ -263,7 +263,7 @@ def _across(d: int, up: Up | None) -> Floats:
 def _refuse_mirrored(found: Reflection, bound: float) -> None:
     if measures.looks_mirrored(found, bound):
         raise RegistrationError(
-            f"markers look mirrored: residual {1e3 * found.proper:.3g} mm by a rotation, "
+            f"markers seem mirrored: residual {1e3 * found.proper:.3g} mm by a rotation, "
             f"{1e3 * found.improper:.3g} mm by a reflection; check axis signs and handedness"
         )
 
@@ -275,7 +275,7 @@ def _refuse_relabelled(names: Sequence[str], x: Floats, y: Floats, fit: Fit, noi
 
 
 def _left_out(k: int, missing: tuple[str, ...], excluded: tuple[str, ...]) -> list[str]:
-    said = ((missing, "not seen (NaN), left out"), (excluded, "excluded on request"))
+    said = ((missing, "not visible (NaN), left out"), (excluded, "excluded on request"))
     return [f"{len(who)} of {k} markers {what}: {', '.join(who)}" for who, what in said if who]
 
 
@@ -296,7 +296,7 @@ def _refuse_moved(
         names = ",".join(o.name for o in outliers)
         far = ", ".join(f"{o.name} by {1e3 * o.residual:.3g} mm" for o in outliers)
         raise RegistrationError(
-            f"outliers among the markers ({far}) move the others by {1e3 * moved:.3g} mm, "
+            f"outliers among the markers ({far}) shift the others by {1e3 * moved:.3g} mm, "
             f"twice the registration's uncertainty is {2e3 * doubt:.3g} mm; leave them out of the "
             f"fit: set registration.exclude={names} or registration.robust=true"
         )
@@ -305,8 +305,8 @@ def _refuse_moved(
 def _outlying(outliers: Sequence[Outlier], robust: bool) -> list[str]:
     fate = "left out by the robust fit" if robust else "in the fit (exclude it to leave it out)"
     return [
-        f"marker {o.name} is an outlier: {1e3 * o.residual:.3g} mm from where the others put it; "
-        f"it is {fate}"
+        f"marker {o.name} is an outlier: {1e3 * o.residual:.3g} mm from the position predicted by "
+        f"the others; it is {fate}"
         for o in outliers
     ]
 

@@ -76,8 +76,9 @@ def label_fault(
     moved = _listed([names[i] for i in best.moved])
     if rivals:
         return (
-            f"markers {moved} look permuted ({change}), but {1 + len(rivals)} labellings fit "
-            f"equally well (up to {1e3 * rivals[-1].rms:.3g} mm): ambiguous; label by hand"
+            f"markers {moved} seem permuted ({change}), but {1 + len(rivals)} labellings fit "
+            f"equally well (up to {1e3 * rivals[-1].rms:.3g} mm): ambiguous; correct the labels "
+            f"manually"
         )
     verb = "swapped" if len(best.moved) == 2 else "permuted"
     return f"markers {moved} look {verb}: {change}; correct the names or exclude them"

@@ -87,7 +87,7 @@ class RoundOutlines:
         shown = self._lengths(run)[np.searchsorted(run.t, self.t[at])]
         seen = self.diameters[at]
         one = len(at) == 1
-        words = "diameter of the body less that of the circle through its outline, every image"
+        words = "diameter of the body minus that of the circle through its outline, every image"
         off = (shown - seen)[:, None]
         found = Deviation(
             self.name,

@@ -25,12 +25,12 @@ class Sensing:
     Raises `UsageError` for a gain that is not above 0.
     """
 
-    gain: float | None = quantity(1.0, "1", "reading over what is there")
-    delay: float | None = quantity(0.0, "s", "by which its clock is behind that of the drive")
+    gain: float | None = quantity(1.0, "1", "ratio of reading to true value")
+    delay: float | None = quantity(0.0, "s", "delay of its clock relative to the drive's clock")
 
     def __post_init__(self) -> None:
         if self.gain is not None and not self.gain > _LEAST:
-            raise UsageError(f"gain {self.gain:g} of a sensor: above 0; 1 reads what is there")
+            raise UsageError(f"gain {self.gain:g} of a sensor: expected above 0; 1 is exact")
 
     @property
     def offset(self) -> float:
@@ -50,7 +50,7 @@ class Sensing:
 
 @dataclass(frozen=True)
 class ForceSensing(Sensing):
-    bias: float | None = quantity(0.0, "N", "what it reads of nothing")
+    bias: float | None = quantity(0.0, "N", "reading at zero")
 
     @property
     def offset(self) -> float:
@@ -59,7 +59,7 @@ class ForceSensing(Sensing):
 
 @dataclass(frozen=True)
 class PressureSensing(Sensing):
-    bias: float | None = quantity(0.0, "Pa", "what it reads of nothing")
+    bias: float | None = quantity(0.0, "Pa", "reading at zero")
 
     @property
     def offset(self) -> float:
@@ -68,7 +68,7 @@ class PressureSensing(Sensing):
 
 @dataclass(frozen=True)
 class LengthSensing(Sensing):
-    bias: float | None = quantity(0.0, "m", "what it reads of nothing")
+    bias: float | None = quantity(0.0, "m", "reading at zero")
 
     @property
     def offset(self) -> float:
@@ -88,7 +88,7 @@ class PoseShift:
     turn_x: float | None = quantity(0.0, "rad", "turn about x")
     turn_y: float | None = quantity(0.0, "rad", "turn about y")
     turn_z: float | None = quantity(0.0, "rad", "turn about z")
-    delay: float | None = quantity(0.0, "s", "by which its clock is behind that of the drive")
+    delay: float | None = quantity(0.0, "s", "delay of its clock relative to the drive's clock")
 
     def of(self, seen: MarkerObservation) -> MarkerObservation:
         """The markers where they were, at the times of the samples; between samples linear, and a

@@ -132,7 +132,8 @@ def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:
     if change < -5 * seen.sd:
         raise RegistrationError(
             f"'{seen.quantity}' falls by {-change:.4g} {seen.unit} as '{drive.name}' closes by "
-            f"{1e3 * np.ptp(drive.y):.3g} mm; compression and pressure are positive: turn its sign"
+            f"{1e3 * np.ptp(drive.y):.3g} mm; compression and pressure are positive: reverse its "
+            f"sign"
         )
 
 
@@ -146,7 +147,7 @@ def holds_at(
     reached = [float(drive.y[nearest_sample(drive.t, ti, drive.name), 0]) for ti in t]
     if min(loads, default=1.0) <= 0 or len(set(loads)) != len(loads):
         shown = ", ".join(f"{1e3 * load:g}" for load in loads)
-        raise ComparisonError(f"loads {shown} mm: each must be above 0 (rest) and stand once")
+        raise ComparisonError(f"loads {shown} mm: each must be above 0 (rest) and occur once")
     holds = []
     for load in (0.0, *loads):
         off = np.abs(np.array(reached) - load)
@@ -154,10 +155,10 @@ def holds_at(
             seen = ", ".join(f"{1e3 * r:.2f}" for r in reached)
             raise ComparisonError(
                 f"no measurement at {1e3 * load:g} mm: 0 matched samples, '{drive.name}' was at "
-                f"{seen} mm; set the loads to those"
+                f"{seen} mm; set the loads to these values"
             )
         i = int(off.argmin())
-        holds.append(Selection(f"{1e3 * load:g}mm", t[i : i + 1], "one sample at the hold"))
+        holds.append(Selection(f"{1e3 * load:g}mm", t[i : i + 1], "one sample at the load step"))
     return tuple(holds)
 
 

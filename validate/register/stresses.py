@@ -73,7 +73,7 @@ class StressObservation:
         read = [selection.read(run.t, trace.y, self.t[at])[loaded] for trace in seen]
         at = at[loaded]
         off = (np.stack(read, axis=1) - self.y[at]) / self.scale[at][:, None]
-        words = "simulated less measured nominal stress over the larger measured one of its row"
+        words = "simulated minus measured nominal stress over the larger measured stress of its row"
         return (
             Deviation(
                 self.quantity, off.reshape(-1, 1), "1", self.sd, self.shared, words, scale=1.0,

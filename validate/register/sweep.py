@@ -77,7 +77,7 @@ def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
     ends = np.array([_end(at[:2][::-1], radii[:2][::-1], step), _end(at[-2:], radii[-2:], step)])
     if positions.min() >= at[0] or positions.max() <= at[-1]:
         raise RegistrationError(
-            "the inclusion reaches the first or last image of the sweep; its end is not seen"
+            "the inclusion reaches the first or last image of the sweep; its end is not visible"
         )
     stack = Stack(
         sweep.pose, at, centres, radii, outlines, ends, sweep.sd, float(step / np.sqrt(12))
@@ -91,13 +91,13 @@ def _placed(seen: Floats, t: Floats, positions: Floats) -> Floats:
     positions = checked(positions, "positions", (len(t),), error=RegistrationError)
     if len(seen) < _LEAST:
         raise RegistrationError(
-            f"{len(seen)} slices show the inclusion, {_LEAST} are needed; sweep in smaller steps "
+            f"{len(seen)} slices show the inclusion; {_LEAST} are needed: sweep in smaller steps "
             "or give its rough centre and radius"
         )
     if seen.min() < t[0] or seen.max() > t[-1]:
         raise RegistrationError(
             f"slices at {seen.min():.2f}..{seen.max():.2f} s, but the position of the plane is "
-            f"known at {t[0]:.2f}..{t[-1]:.2f} s only; record it over the whole sweep"
+            f"known at {t[0]:.2f}..{t[-1]:.2f} s; record it over the whole sweep"
         )
     return np.asarray(np.interp(seen, t, positions))
 
@@ -110,12 +110,12 @@ def _step(at: Floats) -> float:
     if gaps[near] <= 0.1 * step:
         raise RegistrationError(
             f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, the others "
-            f"{1e3 * step:.2f} mm apart; keep one of them"
+            f"{1e3 * step:.2f} mm steps; keep one of them"
         )
     if gaps[far] > _GAP * step:
         raise RegistrationError(
             f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, the others are "
-            f"{1e3 * step:.2f} mm apart: outline the missing image"
+            f"{1e3 * step:.2f} mm steps: outline the missing image"
         )
     return step
 
@@ -124,9 +124,9 @@ def _require_sections(stack: Stack) -> None:
     worst = int((stack.off_round / stack.radii).argmax())
     if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
         raise RegistrationError(
-            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is no section of an inclusion: "
+            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is not a section of an inclusion: "
             f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
-            f"{1e3 * stack.radii[worst]:.2f} mm; outline it anew"
+            f"{1e3 * stack.radii[worst]:.2f} mm; repeat its outline"
         )
     moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
     apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
@@ -134,8 +134,8 @@ def _require_sections(stack: Stack) -> None:
     if apart[i] > 0:
         raise RegistrationError(
             f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
-            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm apart, more than a radius; "
-            "outline them anew"
+            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm from each other, more than a "
+            f"radius; outline them again"
         )
 
 

@@ -123,8 +123,8 @@ def check_spread(points: Floats, name: str, weights: Floats | None = None) -> No
     shown = ", ".join(f"{1e3 * v:.3g}" for v in values)
     if values[0] <= COINCIDENT * np.abs(used).max():
         raise RegistrationError(
-            f"{name}: {k} coincident points (spread {shown} mm along principal axes): "
-            "place the markers apart"
+            f"{name}: {k} coincident points (spread {shown} mm along principal axes): move the "
+            f"markers to different places"
         )
     if d == 3 and values[1] < COLLINEAR * values[0]:
         raise RegistrationError(

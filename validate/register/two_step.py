@@ -53,7 +53,7 @@ def fit_plane(points: ArrayLike, name: str = "points", up: ArrayLike | None = No
     if len(values) == 3 and values[2] > PLANAR * values[1]:
         shown = ", ".join(f"{1e3 * v / np.sqrt(len(x)):.3g}" for v in values)
         raise RegistrationError(
-            f"{name}: no plane (spread {shown} mm along principal axes, third over second above "
+            f"{name}: not a plane (spread {shown} mm along principal axes, third over second above "
             f"{PLANAR:g}): use the rigid method, without `up`"
         )
     axes = Vt.T * np.array([1.0, 1.0, np.sign(np.linalg.det(Vt))])

@@ -35,7 +35,7 @@ def asked(
     named = [_parsed(experiment, parameters, text) for text in wanted]
     twice = [f.path for i, f in enumerate(named) if f.path in [g.path for g in named[:i]]]
     if twice:
-        raise UsageError(f"--parameters: {twice[0]} stands twice; name it once")
+        raise UsageError(f"--parameters: {twice[0]} is given twice; give it once")
     experiment = experiment if experiment.calibrations else _on_all(experiment, tuple(named))
     return experiment, _shared_out(experiment, parameters, named)
 
@@ -58,8 +58,8 @@ def _parsed(experiment: Experiment, parameters: Any, text: str) -> Free:
     path, sign, bounds = (part.strip() for part in text.partition("="))
     if path.startswith("methods."):
         raise UsageError(
-            f"--parameters {path}: a setting of a method, which has nothing to identify; give one "
-            f"of the experiment's own parameters, `validate list {experiment.name}` has them"
+            f"--parameters {path}: a setting of a method cannot be identified; give a parameter "
+            f"of the experiment, see `validate list {experiment.name}`"
         )
     declared = {f.path: f for c in experiment.calibrations for f in c.free}
     if not sign:
@@ -94,6 +94,8 @@ def _on_all(experiment: Experiment, free: tuple[Free, ...]) -> Experiment:
     )  # fmt: skip
     method = next(iter(experiment.accepted), next(iter(experiment.methods)))
     if not names:
-        raise UsageError(f"{experiment.name} accepts nothing: declare a calibration in its file")
-    every = Calibration(method, free, (Calibrates(names, name="all that is judged"),))
+        raise UsageError(
+            f"{experiment.name} has no accepted methods: declare a calibration in its file"
+        )
+    every = Calibration(method, free, (Calibrates(names, name="all checked quantities"),))
     return replace(experiment, calibrations=(every,))

@@ -70,7 +70,9 @@ def identify_body(
     if p.material.E is not None:
         return Identified(p, (), ())
     if p.material.coefficients != Coefficients():
-        raise UsageError("material.E is not set, beside coefficients of its law: give them all")
+        raise UsageError(
+            "material.E is not set, but other coefficients of its law are: give them all"
+        )
     if p.seen.force is None or drive_kind(recordings[0], p) != "moves":
         raise UsageError(
             "material.E is not set: an open modulus is identified on a force under a displacement "
@@ -94,7 +96,7 @@ def identify_body(
     )
     rest = (
         f"E = {f.scale:.5g} ± {2 * f.sd:.3g} Pa (two sd of the fit alone) was identified by "
-        f"{methods[n].label}; this method is not judged"
+        f"{methods[n].label}; this method is not checked"
         for n, f in fits.items() if n not in judged
     )  # fmt: skip
     notes = tuple(f"{line}." for line in (*map(sentence, values), *rest))

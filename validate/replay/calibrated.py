@@ -87,7 +87,8 @@ def problem_of(
     calibration = experiment.calibrations[number]
     if calibration.method not in methods:
         raise UsageError(
-            f"calibration by '{calibration.method}': no such method; {', '.join(methods)}"
+            f"calibration by '{calibration.method}': unknown method; expected one of "
+            f"{', '.join(methods)}"
         )
     own = {r.source.sha256 for r in shipped} - {""}
     parts = []
@@ -224,10 +225,10 @@ def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
         if not twice:
             continue
         mark = part.recordings[0].source.sha256[:8]
-        same = "" if part.on.judged else f", and what is judged is the same recording ({mark})"
+        same = "" if part.on.judged else f", and the checks use the same recording ({mark})"
         raise ComparisonError(
-            f"'{twice}' of {part.name} calibrates '{problem.calibration.method}'{same}: a figure "
-            "serves once; judge other loads, quantities or recordings, or set "
+            f"'{twice}' of {part.name} calibrates f'{problem.calibration.method}'{same}: each "
+            f"value can be used only once; check other loads, quantities or recordings, or set "
             f"{', '.join(problem.space.names)}"
         )
 
@@ -243,8 +244,8 @@ def require_identified(experiment: Experiment, one: Calibrated) -> None:
     for estimate, free in zip(one.found.estimates, one.problem.free, strict=True):
         if not estimate.identified:
             raise ComparisonError(
-                f"{not_identified(one, estimate, free)}; --anyway predicts with it all the "
-                f"same, `validate identify {experiment.name}` shows its profile"
+                f"{not_identified(one, estimate, free)}; --anyway predicts with it nevertheless; "
+                f"`validate identify {experiment.name}` shows its profile"
             )
 
 
@@ -303,7 +304,7 @@ def _input(one: Calibrated, name: str, step: Any, most: int) -> Input:
 
     e = one.found.estimates[most]
     value, sd = (with_unit(v, unit_of(one, e.name)) for v in (e.value, e.sd))
-    words = f"{e.name} within its covariance, {value} ± {sd} (one sd), and what goes with it"
+    words = f"{e.name} within its covariance, {value} ± {sd} (one sd), and correlated parameters"
     return Input(name, move, words, f"identified on {one.on}", identified=True)
 
 

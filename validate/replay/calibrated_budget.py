@@ -24,8 +24,8 @@ from validate.replay.fitted_moduli import on_meshes
 from validate.replay.problem import Calibrated, Problem, with_free
 
 _TWO_SIDED = float(norm.ppf(0.975))
-_ONLY_NOISE = "noise of these data alone: inputs and mesh are not in this interval"
-_APART = "inputs and mesh of the predictions are counted with this value kept"
+_ONLY_NOISE = "only the noise of these data: the interval does not include inputs and mesh"
+_APART = "inputs and mesh of the predictions are varied with this value fixed"
 
 
 def budgets(

@@ -53,7 +53,7 @@ def predicted(results: Sequence[MethodResult]) -> str:
         if c.count and (c.evidence or c.verdict == "undecided")
     ]  # fmt: skip
     if not found:
-        return f"predicted: nothing, for {_no_evidence(results)}"
+        return f"predicted: nothing, because {_no_evidence(results)}"
     each = (_within(*one) for one in found[:_SHOWN])
     more = f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else ""
     return f"predicted: {', '.join(each)}{more}"
@@ -62,29 +62,29 @@ def predicted(results: Sequence[MethodResult]) -> str:
 def _no_evidence(results: Sequence[MethodResult]) -> str:
     """Why none of the checks is evidence: what they are, most of them first."""
     kinds = Counter(c.verdict if c.count else "no match" for m in results for c in m.checks)
-    words = {"fitted": "served to fit", "same model": "only repeat the model itself"}
+    words = {"fitted": "were used for the fit", "same model": "only repeat the model"}
     each = (f"{n} of {kinds.total()} checks {words.get(kind, 'compared nothing')}"
             for kind, n in kinds.most_common())  # fmt: skip
-    return ", ".join(each) or "nothing is judged"
+    return ", ".join(each) or "nothing is checked"
 
 
 def _within(c: Check, by: str) -> str:
     off, doubt = with_unit(abs(c.value), c.unit), with_unit(2 * c.u_val, c.unit)
-    return f"{c.name}{by} off by {off} (2 u_val {doubt})"
+    return f"{c.name}{by} has an error of {off} (2 u_val {doubt})"
 
 
 def lines(one: Calibrated) -> tuple[str, ...]:
     """What is to be said of an identification: how sure it is, and what it is not."""
     found, p = one.found, len(one.found.space.ranges)
     misfit = (
-        f"; the model leaves {found.misfit:.3g} times the variance that noise explains, and all "
-        f"intervals are wider by a factor {found.misfit**0.5:.3g}"
+        f"; the model leaves {found.misfit:.3g} times the variance of the noise; all intervals "
+        f"are wider by a factor {found.misfit**0.5:.3g}"
         if found.misfit > 1
         else ""
     )
     how = (
         f"the residual is linear in it (checked at {found.best.evaluations} values), so the best "
-        "fit is known in closed form"
+        f"fit has a closed form"
         if found.linear
         else f"{found.found_again} of {len(found.fits)} starts ended at the best fit"
     )
@@ -110,7 +110,7 @@ def not_identified(one: Calibrated, e: Profiled, free: Free) -> str:
 
 def helping(free: Free) -> str:
     """The measurement that would help."""
-    return free.helps or "a measurement that moves with it and not with the others"
+    return free.helps or "a measurement that depends on it and not on the others"
 
 
 def scores(fitted: Iterable[Calibrated]) -> tuple[Score, ...]:

@@ -47,10 +47,10 @@ class TrackedTwin:
 
     seed: int = quantity(1, "1", "seed of the noise")
     noise: float = quantity(1e-9, "m2", "variance of the white noise per component (.001 mm2)")
-    stiffness: float = quantity(1.0, "1", "its modulus over that of the models")
+    stiffness: float = quantity(1.0, "1", "ratio of its modulus to that of the models")
     nu: float | None = quantity(None, "1", "its Poisson ratio; none: that of the models")
-    every: int = quantity(1, "1", "steps between two looks of the tracker")
-    missing: float = quantity(0.0, "1", "share of the looks at which a marker is not seen")
+    every: int = quantity(1, "1", "steps between two samples of the tracker")
+    missing: float = quantity(0.0, "1", "share of samples at which a marker is missing")
 
     def __post_init__(self) -> None:
         require_noise(self.noise)
@@ -147,6 +147,6 @@ def require_used(given: Coefficients, laws: set[LawName]) -> None:
         value = getattr(given, f.name)
         if value != f.default and all(getattr(given.known_to(w), f.name) != value for w in laws):
             raise UsageError(
-                f"material.{f.name} = {value}: no method has a law that knows it, only "
+                f"material.{f.name} = {value}: no method has a law with this parameter, only "
                 f"{', '.join(sorted(laws))}; set methods.NAME.law"
             )

@@ -107,7 +107,7 @@ def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]
 def _served(road: Road, mine: Followed, residual: Residual) -> str:
     """What the data of a residual served for, so that they are no evidence; else ""."""
     if residual.role == "calibrates" or {residual.name, residual.quantity} & set(road.calibrated):
-        return "these data served to identify"
+        return "these data were used for identification"
     given = road.settings[mine.method].markers
     if residual.quantity in given:
         return "this marker was given to the filter"
@@ -120,9 +120,9 @@ def _served(road: Road, mine: Followed, residual: Residual) -> str:
 def _classed(road: Road, check: Check) -> Check:
     """The check as what it is: no evidence where the recording is the model's own."""
     if road.remade:
-        return as_same_model(check, "the recording was made again from this run's own parameters")
+        return as_same_model(check, "the recording was simulated again with this run's parameters")
     if road.kind == "same model":
-        return as_same_model(check, "recording and judged model are the same model")
+        return as_same_model(check, "recording and checked model are the same model")
     return check
 
 
@@ -237,10 +237,10 @@ def _nothing(accept: Accept, mine: Followed, judged: Collection[str]) -> list[Ch
         dict.fromkeys(f"{r.outcome.state}: {r.outcome.why}" for r in mine.runs if not r.finished)
     )
     if accept.loads and there:
-        why = ends or f"no such load of {accept.quantity}; there are {', '.join(there)}"
+        why = ends or f"unknown load of {accept.quantity}; there are {', '.join(there)}"
         absent = [f"{accept.quantity}@{load}" for load in accept.loads if load not in there]
         return [_empty(accept, name, why, mine) for name in absent]
-    why = ends or "no such quantity in the recording"
+    why = ends or "the recording does not have this quantity"
     return [] if judged else [_empty(accept, accept.quantity, why, mine)]
 
 

@@ -80,7 +80,7 @@ def pressed(
     have fluid of constant volume in `specimen.fluid`. Raises `UsageError` for another with it."""
     linear = law == "linear"
     if fluid and not linear:
-        raise UsageError(f"method '{label}': fluid is for the linear law, not {law}")
+        raise UsageError(f"method '{label}': fluid needs the linear law, not {law}")
     slow = Tabulated(StaticNewton("none"))
     settings = ExactPressure() if fluid else NoFluid() if linear else slow
     return Method(label, settings, Pressed(plates, law, order))
@@ -178,8 +178,8 @@ def _pins(mesh: Mesh) -> tuple[Pin, ...]:
 def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -> Registered:
     if p.outline.topic is not None and not shown:
         raise UsageError(
-            "outline.topic: what makes outlines uncertain is chosen as the experiment is declared; "
-            "name them in its file, PressedOutline(topic=...)"
+            "outline.topic: the uncertain inputs of outlines are chosen in the experiment's file; "
+            "name the topic there, PressedOutline(topic=...)"
         )
     fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to), p.test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
@@ -192,8 +192,8 @@ def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:
             raise ComparisonError(
-                f"window '{window.label}': {len(window.t)} samples of {recording.name}, "
-                f"{MIN_SAMPLES} are needed to judge a prediction; widen fit_from, fit_to or limit"
+                f"window f'{window.label}': {len(window.t)} samples of {recording.name}; "
+                f"{MIN_SAMPLES} are needed to check a prediction: widen fit_from, fit_to or limit"
             )
     if p.outline.topic is None:
         return seen

@@ -69,7 +69,7 @@ class Gel:
     by_method: tuple[tuple[str, float, float], ...] = quantity(
         (), "1", "found by the run: of each model, its modulus Pa and where its load begins, m"
     )
-    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+    coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
 
 
 @dataclass(frozen=True)

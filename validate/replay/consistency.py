@@ -24,8 +24,8 @@ _HELD = 1e-12  # m: a component without error and without doubt is held, and no 
 # confident, whatever this is.
 _LEAST_SD = 1e-9
 _NEES = (
-    " and NEES at the nodes (error against the twin's truth over the filter's own standard "
-    "deviation)"
+    " and NEES at the nodes (error against the twin's truth over the filter's claimed "
+    "standard deviation)"
 )
 _CORRELATED = "NEES of one run is correlated in time, which widens its spread beyond the band."
 _HEADS = (
@@ -55,24 +55,24 @@ def consistency_exhibit(
     )
     white = NumberTable(
         "whiteness",
-        f"Whiteness of the innovations, Ljung-Box over {_LAGS} lags: a small p means that the "
-        "innovation has memory, so model or Q is wrong (white: p of 0.001 and more).",
+        f"Whiteness of the innovations, Ljung-Box over {_LAGS} lags: a small p means a correlated "
+        f"innovation, so model or Q is wrong (white: p of 0.001 and more).",
         ("filter", "component", "p / 1", "lag-1 correlation / 1", "samples", "white"),
         tuple(row for f in filters.values() for row in _white_rows(f)),
     )
     words = [
-        "NIS sees measured components only: a filter can look consistent while unmeasured nodes "
-        "are wrong, so read it beside the errors at the other nodes."
+        "NIS covers measured components only: a filter can seem consistent while unmeasured nodes "
+        "are wrong. Compare it with the errors at the other nodes."
     ]
     doubted = [f.label for f in filters.values() if not claims_hold(f)]
     if doubted:
         words.append(
-            "NIS outside its 95 % band, so the filter's own interval is not used in any verdict: "
+            "NIS outside its 95 % band, so no verdict uses the filter's claimed interval: "
             f"{'; '.join(doubted)}."
         )
     charts = tuple(_chart(f) for f in list(filters.values())[:4])
     return Exhibit(
-        "consistency", "Does the filter know its error?", tuple(words), (table, white), charts
+        "consistency", "Consistency of the filters", tuple(words), (table, white), charts
     )
 
 

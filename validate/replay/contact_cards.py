@@ -27,7 +27,7 @@ class Indenter:
         0.0, "m", "from the first instant to the first touch; below 0: it already presses"
     )
     friction: float = quantity(0.0, "1", "Coulomb's coefficient")
-    bonded: bool = quantity(False, "1", "whether what touches sticks while it is pressed")
+    bonded: bool = quantity(False, "1", "whether touching surfaces stick while pressed")
     reach: float = quantity(
         0.0, "m", "radius of contact at the largest load, for which a block's mesh is graded"
     )
@@ -40,8 +40,8 @@ class Indenter:
             )
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise UsageError(
-                f"indenter.friction = {self.friction:g}: 0 (frictionless), or a coefficient; what "
-                "sticks is indenter.bonded=true"
+                f"indenter.friction = {self.friction:g}: expected 0 (frictionless) or a "
+                f"coefficient; for sticking contact set indenter.bonded=true"
             )
         if len(self.tip) not in (0, 3) or not self.reach >= 0:
             raise UsageError(

@@ -26,15 +26,15 @@ def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | 
     table = NumberTable(
         "estimates",
         "Parameters at the end of the run with their 95 % intervals, as the filter claims them, "
-        "and the share of the sd at its start that is left (of a scale's logarithm).",
+        "and the remaining share of the initial sd (of a scale's logarithm).",
         ("case", "filter", "parameter", "value", "95 % from", "to", "sd left / 1", "says"),
         tuple(_row(f, name) for f in runs for name in parameters_of(f)),
-        "Intervals hold for a truth of the model's own kind: read NIS and its alarm beside them.",
+        "Intervals hold if the truth is of the model's kind: check NIS and its alarm, too.",
         below="says",
     )
     told = tuple(s for f in main.values() for s in sentences(f))
     charts = tuple(_chart(f, name) for f in main.values() for name in parameters_of(f))
-    title = "What filters found of stiffness, supports and loads"
+    title = "Stiffness, supports and loads estimated by filters"
     return Exhibit("estimates", title, told, (table,), charts)
 
 
@@ -58,7 +58,7 @@ def doubt(f: Followed, name: str) -> str:
     if nis and nis.mean > nis.band_999.high:
         return (
             f"the interval does not hold: NIS {nis.mean:.3g} per degree of freedom, at most "
-            f"{nis.band_999.high:.3g} by chance: the model is of another kind than the truth"
+            f"{nis.band_999.high:.3g} by chance: the model differs in kind from the truth"
         )
     left, (other, tie) = _last(f, f"{_OF}{name}.left"), _tied(f, name)
     if left <= LEFT:

@@ -72,8 +72,8 @@ def _executed(path: Path) -> ModuleType:
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise UsageError(
-            f"{path}{_place(error, path)}: {type(error).__name__}: {error}; "
-            f"mend the file (`python {quote(str(path))}` shows the whole way there)"
+            f"{path}{_place(error, path)}: {type(error).__name__}: {error}; correct the file "
+            f"(`python {quote(str(path))}` shows the full traceback)"
         ) from error
     return module
 

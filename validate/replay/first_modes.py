@@ -30,7 +30,9 @@ def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:
     are worth a look at its modes.
     """
     if scene.mesh.nodes.size > _MOST:
-        raise SceneError(f"{scene.mesh.nodes.size} unknowns, modes are taken of at most {_MOST}")
+        raise SceneError(
+            f"{scene.mesh.nodes.size} unknowns; modes are computed for at most {_MOST}"
+        )
     bare = replace(scene, cavities=(), material=replace(scene.material, stiffness_damping=0.0))
     system = build(with_law(bare, "linear"))
     try:

@@ -21,7 +21,7 @@ from validate.replay.experiment import Input, MeshLadder
 from validate.report.numbers import with_unit
 
 Entry = tuple[str, float, float]  # name of a model, modulus Pa, toe m
-COMMON = "each uncertain input is moved, the modulus identified again, and then predicted with"
+COMMON = "each uncertain input is varied, the modulus identified again and used for the prediction"
 _ROUNDING = 1e-9  # relative, of moduli on several meshes
 _SHOWN = 0.01  # of the combined uncertainty: smaller terms are named without a number
 _NOTHING = 1e-6  # relative effect on a prediction that is left out
@@ -154,8 +154,8 @@ def finding(law: str, pattern: Pattern | None, off: Misfit) -> str:
     times = f", {off.size / off.u:.2g} times its uncertainty" if off.u else ""
     return (
         f"the law '{law}' does not follow the force: the residual bends with the load, at the "
-        f"largest loads the measured force rises {way} than the law's; beyond the fit it is off by "
-        f"{with_unit(off.size, 'N')} rms{times} (by chance in "
+        f"largest loads the measured force rises {way} than the law's; beyond the fit its error "
+        f"is {with_unit(off.size, 'N')} rms{times} (by chance in "
         f"{max(100 * pattern.chance, 0.01):.2g} % of runs or fewer); try a law that stiffens "
         f"{'more' if pattern.stiffens else 'less'}, or a smaller strain limit"
     )

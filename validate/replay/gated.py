@@ -21,17 +21,17 @@ def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
         return None
     table = NumberTable(
         "gate",
-        "Looks of a marker whose components together lie further off than the filter's own claim "
-        "explains; they were treated as missing. Expected: of a filter whose claims hold. Far: by "
-        "how many standard deviations of its innovation the farthest one lay off.",
+        "Samples of a marker with an innovation beyond the gate of the filter; they were treated "
+        "as missing. Expected: number for a filter whose claimed errors hold. Far: largest "
+        "rejected innovation, in its standard deviations.",
         ("case", "filter", "marker", "looks", "rejected", "expected / 1", "first / s", "last / s",
          "far / 1"),
         tuple(_row(f, marker) for f in gated for marker in _markers(f)),
-        "NIS and whiteness above are of the looks that passed.",
+        "NIS and whiteness above use the accepted samples.",
     )  # fmt: skip
     words = gate_warnings(main)
     charts = tuple(_chart(f) for f in gated if _rejected(f) >= _DRAWN)
-    return Exhibit("gate", "Which measurements were rejected?", words, (table,), charts)
+    return Exhibit("gate", "Rejected measurements", words, (table,), charts)
 
 
 def gate_warnings(main: Mapping[str, Followed]) -> tuple[str, ...]:
@@ -42,9 +42,9 @@ def gate_warnings(main: Mapping[str, Followed]) -> tuple[str, ...]:
         rejected = _rejected(f)
         if tested and rejected > _MOST * tested:
             found.append(
-                f"{f.label}: its gate rejected {rejected} of {tested} looks, "
+                f"{f.label}: its gate rejected {rejected} of {tested} samples, "
                 f"{_sum(f, 'gate.expected'):.2g} expected: it follows its model, not the "
-                "recording; widen R or the process noise, or take the gate away"
+                f"recording; increase R or the process noise, or remove the gate"
             )
     return tuple(found)
 
@@ -88,6 +88,6 @@ def _chart(f: Followed) -> Chart:
             series.append(Series(marker, f.own_time[far > 0], far[far > 0], "points"))
     return Chart(
         "_".join(("gate", f.method, *filter(None, [f.case]))),
-        ", ".join((f"Rejected looks of {f.label}", *filter(None, [f.case]))), "recorded time / s",
+        ", ".join((f"Rejected samples of {f.label}", *filter(None, [f.case]))), "recorded time / s",
         "standard deviations off / 1", tuple(series), log="y", scale=1.0,
     )  # fmt: skip

@@ -19,10 +19,11 @@ _HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptan
 _OURS = "this one"
 _MB = 1e-6
 _WORDS = (
-    "Each is judged with the u_val of the accepted method: its measurement, its inputs and its "
-    "mesh's error. What a guest's own mesh is off by is a part of its E, and no rival sets the "
-    "exit code. A rate is that of one step (statics: one equilibrium) on one thread; memory is the "
-    "peak of the guest's largest process, of ours that of this whole workbench until then."
+    "All use the u_val of the accepted method: its measurement, inputs and mesh error. The "
+    "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
+    "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
+    "peak of the external simulator's largest process; for our methods it is the peak of the "
+    "whole workbench until then."
 )
 
 
@@ -35,11 +36,11 @@ def guest_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, .
     terms = {k: t for n in accepted for _, one in terms_of(road, main[n]) for k, t in one.items()}
     rows = [r for f in main.values() for r in _rows(f, road.methods[f.method].settings, terms)]
     said = [(main[n].label, line) for n in guests for line in _findings(main[n])]
-    tables = [NumberTable("guests", "Guests and our own methods", _HEAD, tuple(rows))]
+    tables = [NumberTable("guests", "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
-        head = ("guest", "what it did otherwise, or could not do")
+        head = ("guest", "deviations and failures")
         tables.append(NumberTable("guest_findings", "Findings", head, tuple(said)))
-    return (Exhibit("guests", "Simulators of others", (_WORDS,), tables=tuple(tables)),)
+    return (Exhibit("guests", "External simulators", (_WORDS,), tables=tuple(tables)),)
 
 
 def _findings(guest: Followed) -> list[str]:

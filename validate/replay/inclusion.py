@@ -95,7 +95,7 @@ class Streams:
     outline: str = quantity("outline", "1", "outlines of the inclusion")
     markers: str = quantity("markers", "1", "markers")
     signals: tuple[str, ...] = quantity((), "1", "force and pressure, where recorded")
-    tracker: str = quantity("pen", "1", "record that says which way is up for the markers")
+    tracker: str = quantity("pen", "1", "record with the upward direction of the markers")
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def placed(
         signals.append(validating(recording, topic, unit, quantity=measured, trace=trace))
         require_rising(stage, signals[-1])
     if not loads:
-        raise ComparisonError("no loads: nothing would be compared; set stage positions in m")
+        raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
     rest, *holds = holds_at(stage, contours.t, loads, within=_WITHIN)
     outline = observe_outlines(
         contours, wall, rest=instant(rest), corners=corners, name=streams.outline,

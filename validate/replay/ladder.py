@@ -80,7 +80,7 @@ class Trial:
         for dt in self.steps:
             ends = self.frames / dt
             if np.abs(ends - ends.round()).max() > 1e-6:
-                raise SceneError(f"steps of {dt:g} s do not land on the frames of the ladder")
+                raise SceneError(f"steps of {dt:g} s do not end on the frames of the ladder")
 
     def times(self, dt: float) -> Floats:
         """Ends (nt,) s of all steps of dt s."""
@@ -134,7 +134,7 @@ def turned(material: Material, mesh: int) -> Turned:
     """A material with density, on a mesh."""
     m = material
     if m.rho is None:
-        raise SceneError("nothing moves without a density; give the material rho kg/m3")
+        raise SceneError("a motion needs a density; set the material's rho, kg/m3")
     return Turned(m.E, m.nu, m.rho, m.mass_damping, m.stiffness_damping, mesh)
 
 

@@ -53,8 +53,8 @@ _FRAMES = 40
 _POINTS = 16
 _TOUCHED, _QUICK_TOUCHED = 7_000, 1_500  # of a touched reference, stepped in parts
 _DERIVED = (
-    "The experiment declares no ladder: this one is derived from its scene. A mesh's number is its "
-    "cells along an edge in percent of those of the experiment's own mesh."
+    "The experiment declares no ladder: this one is derived from its scene. A mesh's "
+    "number is its cells along an edge, in percent of the experiment's mesh."
 )
 _INSIDE = 1e-9  # of the body's size: a point within rounding of a face is on it
 
@@ -98,8 +98,8 @@ class _Loading:
 def _untaken(own: OwnBody) -> UsageError:
     """Of a scene that is touched by a probe, where nothing on the ladder takes it."""
     return UsageError(
-        f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which "
-        "no solver of a derived ladder takes; run the experiment, or declare its ladder"
+        f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which a "
+        f"derived ladder does not support; run the experiment, or declare its ladder"
     )
 
 
@@ -198,8 +198,8 @@ def _meshes(
     if others and (levels := own.levels(_LEVELS)[:2])[1:]:  # a mesh that cannot be coarsened
         return {others[0]: levels[:1]}, (others[0], levels[1])
     raise UsageError(
-        f"'{own.experiment.name}' can be meshed in one way only, so nothing is refined; give it "
-        "a number of cells as a parameter, or declare a ladder"
+        f"'{own.experiment.name}' has only one mesh, so it cannot be refined; give it a number of "
+        f"cells as a parameter, or declare a ladder"
     )
 
 
@@ -212,7 +212,7 @@ def _loading(own: OwnBody) -> _Loading:
     dt = float(np.median(steps)) if len(steps) else 1.0
     t, size = seen.t - seen.t[0] + dt, np.abs(seen.inputs).sum(axis=1)
     if not size.any():
-        raise UsageError(f"'{own.experiment.name}' drives nothing: all its inputs are zero")
+        raise UsageError(f"'{own.experiment.name}' has only zero inputs; nothing moves")
     reached = int(np.argmax(size >= 0.999 * size.max()))
     if dynamic:
         return _Loading(t, seen.inputs, 0.0 if reached == 0 else float(t[reached]), dynamic=True)
@@ -224,8 +224,8 @@ def _require_instants(own: OwnBody) -> None:
     """A step in time is the recording's: raises `UsageError` where it has none."""
     if len(own.seen.t) < 2:
         raise UsageError(
-            f"'{own.experiment.name}' is driven at {len(own.seen.t)} instant, which says no time "
-            "step to study; run the experiment, or declare its ladder"
+            f"'{own.experiment.name}' is driven at {len(own.seen.t)} instant, so there is no time "
+            f"step to study; run the experiment, or declare its ladder"
         )
 
 
@@ -311,7 +311,7 @@ def _body(own: OwnBody) -> StabilityBody:
     base = turned(own.scene.material, meshes[-1])
     return StabilityBody(
         f"{own.experiment.title} ({linear(own.scene.mesh).kind} cells; mesh: percent of the "
-        "experiment's own)",
+        f"experiment's mesh)",
         lambda level, material: _solid(own, level, material),
         base,
         meshes,

@@ -85,9 +85,9 @@ class TouchedLadder:
     def note(self) -> str:
         return (
             f"The probe's spring of {self.whole.spring:g} N/m is shared by the nodes within "
-            f"{1e3 * self.whole.pad:.3g} mm of the contact on every mesh: a point contact's answer "
-            "has no limit under refinement. Layers of a region are those of each mesh. The "
-            f"reference is the whole solve, every shortest step in {_PARTS} parts."
+            f"{1e3 * self.whole.pad:.3g} mm of the contact on every mesh: the solution of a point "
+            f"contact does not converge under refinement. Layers of a region are those of each "
+            f"mesh. The reference is the full solve, with each shortest step in {_PARTS} parts."
         )
 
 

@@ -118,7 +118,7 @@ def _inertia(found: Difference, shown: RecordedMotion | None) -> Cause | None:
         "inertia", share,
         f"the recorded motion is mostly at {shown.frequency:.3g} Hz, the body's first mode at "
         f"{found.first:.3g} Hz, and the method has no inertia",
-        "answer motion.how = dynamic in `validate new`; or record the same load more slowly",
+        "answer motion.how = dynamic in `validate new`, or record the same load more slowly",
     )  # fmt: skip
 
 
@@ -157,8 +157,8 @@ def _frequency(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     since = found.t[0] + ratio * (found.t - found.t[0])
     return Cause(
         "modulus or density", found.explained(_at(found, since)),
-        f"it rings at {rung[0].frequency:.4g} Hz, simulated at {rung[1].frequency:.4g} Hz: as if "
-        f"E / rho were {ratio**2:.3g} times the given one",
+        f"it rings at {rung[0].frequency:.4g} Hz, simulated at {rung[1].frequency:.4g} Hz: "
+        f"consistent with an E / rho of {ratio**2:.3g} times the given value",
         "weigh the body (rho); identify E on a static log; --set material.E=VALUE",
     )  # fmt: skip
 
@@ -185,8 +185,7 @@ def _law(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     return Cause(
         "law", found.explained(_fit((u, cube), y)) - found.explained(_fit((u,), y)),
         "the residual grows faster than the motion: another law at large strain",
-        'run a method of another law beside it: moving("large", "neo_hooke"), or '
-        'solid("...", "neo_hooke")',
+        'add a method with another law: moving("large", "neo_hooke"), or solid("...", "neo_hooke")',
     )  # fmt: skip
 
 
@@ -200,8 +199,8 @@ def _loop(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     return Cause(
         "contact or friction", found.explained(_fit((u, back), y)) - found.explained(_fit((u,), y)),
         "the residual depends on whether the load rises or falls",
-        "load and unload twice, at two speeds: friction does not care, relaxation does; watch the "
-        "support by a marker on it",
+        "load and unload twice, at two speeds: relaxation depends on the speed, friction does "
+        "not; put a marker on the support",
     )  # fmt: skip
 
 
@@ -218,7 +217,7 @@ def _clock(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     return Cause(
         "clock", shares[best],
         f"the recorded motion comes {1e3 * lag:+.3g} ms later than the simulated one",
-        "`validate align` the files, or set motion.start; tap the body once where both see it",
+        "`validate align` the files, or set motion.start; tap the body once so that both record it",
     )  # fmt: skip
 
 
@@ -241,10 +240,10 @@ def _marker(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     share = float(off[worst] / off.sum())
     return Cause(
         "wrong marker", share * (1 - rest / odd[worst]),
-        f"'{found.names[worst]}' is off by {100 * odd[worst]:.3g} % of its own motion, the others "
+        f"'{found.names[worst]}' is off by {100 * odd[worst]:.3g} % of its motion, the others "
         f"by {100 * rest:.3g} %",
-        f"look whether '{found.names[worst]}' is the marker that the layout calls so, and still "
-        "glued on",
+        f"check that '{found.names[worst]}' is the marker of that name in the layout, and still "
+        f"attached",
     )  # fmt: skip
 
 
@@ -261,7 +260,7 @@ def _swapped(found: Difference) -> Cause | None:
         return None
     return Cause(
         "wrong marker", share,
-        f"'{found.names[i]}' moves as '{found.names[j]}' should, and the other way round",
+        f"'{found.names[i]}' moves as '{found.names[j]}' should, and vice versa",
         "exchange the two names in the layout or the recording",
     )  # fmt: skip
 
@@ -275,7 +274,7 @@ def _zero(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     return Cause(
         "zero", found.explained(found.simulated + off),
         f"the residual has a mean of {with_unit(largest, found.history.unit)} at all times",
-        "look at the first samples, before the load: tare the sensor, or set seen.still",
+        "check the first samples, before the load: tare the sensor, or set seen.still",
     )  # fmt: skip
 
 
@@ -289,12 +288,12 @@ def _factor(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     if unit:
         return Cause(
             "wrong unit", share, f"measured is {factor:.4g} times simulated: near {unit:.4g}",
-            "compare one length of the body, and one load, with a ruler and a scale",
+            "measure one length of the body with a ruler, and one load with a scale",
         )  # fmt: skip
     of = "load over modulus" if found.history.unit == "m" else "the modulus"
     return Cause(
-        "load or modulus", share, f"measured is {factor:.3g} times simulated, everywhere and "
-        f"always: as if {of} were so many times the given one",
+        "load or modulus", share, f"measured is {factor:.3g} times simulated, at all places and "
+                                  f"times: consistent with {of} of that many times the given value",
         "identify E on a static log with a force; calibrate the force",
     )  # fmt: skip
 
@@ -352,10 +351,10 @@ def explained_by(
         return "", ()
     table = NumberTable(
         "likely_causes",
-        "What the residual looks like, and how much of its mean square would be gone. Shares "
-        "overlap; they rank causes and prove none.",
-        ("method", "of", "order", "cause", "share / %", "what is seen", "what would tell"),
-        tuple(rows), below="what would tell",
+        "Patterns of the residual, and the share of its mean square that each cause explains. "
+        "Shares overlap: they rank causes but do not prove one.",
+        ("method", "of", "order", "cause", "share / %", "observation", "next check"),
+        tuple(rows), below="next check",
     )  # fmt: skip
     return sentence, (Exhibit("likely-causes", "Likely causes of the difference", (),
                               tables=(table,)),)  # fmt: skip

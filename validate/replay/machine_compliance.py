@@ -48,7 +48,7 @@ def _measured(path: Path, displacement: str, force: str) -> tuple[float, float]:
         raise ComparisonError(
             f"machine.measured = {path.name}: {int(pressed.sum())} samples of '{displacement}' "
             f"beyond a tenth of the largest '{force}' ({load.max():.3g} N), {2 * _FEWEST} are "
-            "needed; press a rigid block, or give machine.compliance"
+            f"needed: press a rigid block, or give machine.compliance"
         )
     x, y = load[pressed], u.y[pressed, 0]
     middle = float(np.median(x))
@@ -96,8 +96,8 @@ def doubt(p: MeasuredBody, recording: Recording, limit: float | None) -> str:
     shown = " to ".join(f"{100 * s / top:.2g}" for s in shifts)
     against = f"; the limit is {limit:.3g} N" if limit else ""
     return (
-        f"machine.compliance is not stated. The specimen yields {1 / slope:.2g} m/N at "
-        f"{top:.3g} N; a machine of {USUAL[0]:g} to {USUAL[1]:g} m/N (assumed, usual) yields up to "
+        f"machine.compliance is not set. The specimen yields {1 / slope:.2g} m/N at "
+        f"{top:.3g} N; a machine of {USUAL[0]:g} to {USUAL[1]:g} m/N (assumed) yields up to "
         f"{1e3 * USUAL[1] * top:.2g} mm of {1e3 * float(np.ptp(way)):.3g} mm, which shifts the "
         f"force by {shown} % ({shifts[1]:.2g} N{against}). Press a rigid block and set "
         "machine.measured=FILE, or machine.compliance and machine.sd"

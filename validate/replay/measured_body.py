@@ -138,7 +138,7 @@ def _identified(
     why = doubt(p, recordings[0], min(limits, default=None))
     if not why:
         return found
-    headline = f"{found.headline}; largest doubt: " if found.headline else "largest doubt: "
+    headline = f"{found.headline}; largest warning: " if found.headline else "largest doubt: "
     return replace(
         found, doubts=(why, *found.doubts), headline=headline + "the machine's compliance"
     )
@@ -227,7 +227,7 @@ def _without_weight(
     if kind == "presses":
         return {"loads": (Pressure("load", where),)}
     if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:
-        raise SceneError(f"moved.along = {p.moved.along}: a place is moved along an axis, as -z")
+        raise SceneError(f"moved.along = {p.moved.along}: expected an axis, as -z")
     return {"drives": (Drive("moved", where, along),)}
 
 
@@ -241,7 +241,9 @@ def _mesh(p: MeasuredBody, body: Any) -> Mesh:
 def known_place(p: MeasuredBody) -> str:
     """Raises `UsageError` where the place that is moved is not said."""
     if not p.moved.place:
-        raise UsageError("moved.place is not set; say where the load acts: --set moved.place=zmax")
+        raise UsageError(
+            "moved.place is not set; name where the load acts, as --set moved.place=zmax"
+        )
     return p.moved.place
 
 
@@ -261,7 +263,7 @@ def body_of(card: Solid, *, folder: Path, places: tuple[str, ...] = ()) -> Mesh:
     """
     mesh = _meshed(card, folder, places)
     if mesh.dimension != 3:
-        raise SceneError(f"{card.file}: cells of {mesh.kind}; a body of 3-D cells is needed")
+        raise SceneError(f"{card.file}: cells of {mesh.kind}; expected 3-D cells")
     return replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
 
 
@@ -279,7 +281,7 @@ def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
         diameter, height = card.cylinder
         radial, axial = card.divisions or divided(_ideal(card))
         return whole_cylinder(diameter, height, radial, axial)
-    raise UsageError("body: none is given; set body.file, body.block or body.cylinder")
+    raise UsageError("no body is given; set body.file, body.block or body.cylinder")
 
 
 def gridded(p: MeasuredBody) -> MeasuredBody:

@@ -34,8 +34,8 @@ class Solid:
         given = [bool(self.file), bool(self.block), bool(self.cylinder)]
         if sum(given) > 1 or len(self.block) not in (0, 3) or len(self.cylinder) not in (0, 2):
             raise UsageError(
-                "body: one of file, block (three sizes) and cylinder (diameter, height); "
-                f"{sum(given)} are given, block {self.block}, cylinder {self.cylinder}"
+                f"body: expected one of file, block (three sizes) and cylinder (diameter, "
+                f"height); {sum(given)} are given: block {self.block}, cylinder {self.cylinder}"
             )
         axes = len(self.block) or len(self.cylinder)
         if self.divisions and (len(self.divisions) != axes or min(self.divisions) < 1):
@@ -53,7 +53,7 @@ class Tissue:
     by_method: tuple[tuple[str, float, float], ...] = quantity(
         (), "1", "found by the run: of each model, its modulus Pa; the last number is 0"
     )
-    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
+    coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,13 @@ class HeldAt:
     """Places by which displacements cannot happen there; several are joined by "+"."""
 
     all: str | None = quantity(None, "1", "held in every direction")
-    x: str | None = quantity(None, "1", "held along x alone")
-    y: str | None = quantity(None, "1", "held along y alone")
-    z: str | None = quantity(None, "1", "held along z alone")
+    x: str | None = quantity(None, "1", "held along x only")
+    y: str | None = quantity(None, "1", "held along y only")
+    z: str | None = quantity(None, "1", "held along z only")
     slides: str | None = quantity(
-        None, "1", "stands on a slippery plate: held across it; its middle stays and does not turn"
+        None,
+        "1",
+        "stands on a slippery plate: held normal to it; its middle stays and does not turn",
     )
 
 
@@ -85,7 +87,7 @@ class MovedBy:
         (), "m", "motion, evenly from the first instant to the last"
     )
     amount: float = quantity(9.80665, "m/s^2", "gravity")
-    scale: float = quantity(1.0, "1", "true load over the recorded one")
+    scale: float = quantity(1.0, "1", "ratio of true to recorded load")
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class SeenOf:
     force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
     markers: str | None = quantity(None, "1", "markers' topic")
     layout: str = quantity("as seen", "1", "markers' places: recorded, as seen, or a file")
-    stands: float = quantity(2e-3, "m", "how far off the body a marker may stand, as on a stalk")
+    stands: float = quantity(2e-3, "m", "largest distance of a marker from the body, as on a stalk")
     outline: str | None = quantity(None, "1", "outlines' topic")
     surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")
     pose: Pose = quantity("recorded", "1", "where the images lie: as recorded, declared or fitted")
@@ -139,12 +141,12 @@ class BodyMotion:
     fit_window: float | None = quantity(
         None, "s", "from the start, in which damping is identified; only later is evidence"
     )
-    gravity: str | None = quantity(None, "1", "direction of a weight that acts besides, as -z")
+    gravity: str | None = quantity(None, "1", "direction of gravity in addition, as -z")
     held_force: float | None = quantity(
-        None, "N", "that held the released place, along moved.along"
+        None, "N", "force that held the released place, along moved.along"
     )
     held_displacement: float | None = quantity(
-        None, "m", "at which the released place was held, along moved.along"
+        None, "m", "displacement at which the released place was held, along moved.along"
     )
 
     def __post_init__(self) -> None:
@@ -171,7 +173,7 @@ class BodyRanges(Ranges):
     damping: float = quantity(0.2, "1", "relative, of the damping; of a motion in time")
     size: float = quantity(0.005, "1", "relative, of each size of the body; of an identified E")
     contact: float = quantity(
-        0.0, "m", "of where the load begins: of an indenter's gap, of an identified E"
+        0.0, "m", "of the start of the load: of an indenter's gap, of an identified E"
     )
     friction: float = quantity(
         0.05, "1", "of an identified E: share of the way from sliding places to held ones"

@@ -44,8 +44,8 @@ def require_touching(p: MeasuredBody, unit: str) -> None:
     """Raises `UsageError` where an indenter is not moved by a displacement."""
     if unit != "m":
         raise UsageError(
-            f"indenter.shape = {p.indenter.shape}: an indenter is moved by a displacement; set "
-            f"moved.by to a signal in m ('{p.moved.by}' is none)"
+            f"indenter.shape = {p.indenter.shape}: an indenter needs a displacement; set moved.by "
+            f"to a signal in m ('{p.moved.by}' is not one)"
         )
 
 
@@ -88,8 +88,8 @@ def _axis(card: Indenter, along: Floats) -> Floats:
     axis = np.array(axis_of(card.axis))
     if abs(float(axis @ along)) > 1e-6:
         raise UsageError(
-            f"indenter.axis = {card.axis}: a cylinder lies across the direction that it is moved "
-            "along; set indenter.axis=+x or +y or +z"
+            f"indenter.axis = {card.axis}: a cylinder must lie across its direction of motion; "
+            f"set indenter.axis=+x or +y or +z"
         )
     return axis
 
@@ -180,9 +180,9 @@ def _cylinder(p: MeasuredBody) -> Mesh:
     radial, axial = p.body.divisions
     if not is_quarter(p):
         raise UsageError(
-            "an indenter on a cylinder is pressed along -z on zmax (or +z on zmin) in its middle, "
-            "held at zmin and zmax alone, and only its force is judged; for anything else give the "
-            "body as a mesh file"
+            "an indenter on a cylinder must press along -z on zmax (or +z on zmin) in its middle, "
+            "with the body held at zmin and zmax only and only its force compared; otherwise give "
+            "the body as a mesh file"
         )
     R = diameter / 2
     share = _shares(p, (R, height), (radial, axial))

@@ -44,8 +44,8 @@ def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
     if unit not in _KINDS:
         known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in _KINDS]
         raise UsageError(
-            f"moved.by = {p.moved.by}: {'in ' + unit if unit else 'no signal of that name'}; one "
-            f"of {', '.join([*known, 'markers', 'gravity', NOTED, RELEASE])}"
+            f"moved.by = {p.moved.by}: {'in f' + unit if unit else 'no signal of that name'}; "
+            f"expected one of {', '.join([*known, 'markers', 'gravity', NOTED, RELEASE])}"
         )
     return _KINDS[unit]
 
@@ -83,8 +83,8 @@ def _noted(p: MeasuredBody, t: Floats) -> SignalObservation:
     says `ranges.load`."""
     if len(p.moved.noted) < 2 or not np.any(np.diff(p.moved.noted)):
         raise UsageError(
-            f"moved.noted = {p.moved.noted or 'none'}: two amounts or more that "
-            "differ, from the first instant to the last, as 0,2mm,5mm"
+            f"moved.noted = {p.moved.noted or 'none'}: expected at least two different "
+            f"displacements, from the first to the last instant, as 0,2mm,5mm"
         )
     at = np.linspace(t[0], t[-1], len(p.moved.noted))
     y = p.moved.scale * (np.interp(t, at, p.moved.noted) - p.moved.noted[0])
@@ -105,7 +105,7 @@ def zeroed_force(recording: Recording, p: MeasuredBody, kind: Kind, until: float
     displacement moves a place."""
     if kind != "moves":
         raise ComparisonError(
-            f"seen.force = {p.seen.force}: a force is predicted where a displacement moves a "
+            f"seen.force = {p.seen.force}: a force is predicted only if a displacement moves a "
             f"place; here the body {kind}. Set seen.force=none"
         )
     return zeroed(recording, str(p.seen.force), "N", until)
@@ -137,7 +137,7 @@ def prescribed(recording: Recording, p: MeasuredBody, where: Place, at: BodyAt) 
     places = dict(zip(observed.names, observed.x[0], strict=True))
     unseen = [n for n in p.moved.markers if n not in places]
     if unseen:
-        raise RegistrationError(f"markers {unseen} on the moved place are not seen at rest")
+        raise RegistrationError(f"markers {unseen} on the moved place are not visible at rest")
     points = tuple((n, tuple(places[n].tolist())) for n in p.moved.markers)
     return Prescribed("moved", where, points)
 
@@ -151,7 +151,8 @@ def _followed(recording: Recording, p: MeasuredBody, t: Floats, at: BodyAt) -> S
     if not np.isfinite(y).all():
         first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
         raise RegistrationError(
-            f"the markers on the moved place are not all seen at t = {first:.3f} s: fill the gap, "
+            f"the markers on the moved place are not all visible at t = {first:.3f} s: fill the "
+            f"gap, "
             "or leave one out of moved.markers"
         )
     y[0] = 0.0
@@ -166,7 +167,7 @@ def released_force(p: MeasuredBody, scene: Scene) -> float:
     if (force is None) == (displacement is None):
         raise UsageError(
             "moved.by = release: set motion.held_force (as 0.2N) or motion.held_displacement (as "
-            "5mm), one of them"
+            "5mm), not both"
         )
     if force is not None:
         return force

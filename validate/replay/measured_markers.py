@@ -35,12 +35,12 @@ def registered(recording: Recording, p: MeasuredBody, at: BodyAt) -> MarkerObser
     if not kept:
         raise RegistrationError(
             f"seen.layout = {p.seen.layout} has {listed_names(layout)}; the recording has "
-            f"{listed_names(markers.names)}: no marker's name is in both; spell them as recorded"
+            f"{listed_names(markers.names)}: no name occurs in both; spell them as recorded"
         )
     if len(kept) < FEWEST:
         raise RegistrationError(
-            f"seen.layout = {p.seen.layout}: {len(kept)} of its markers are seen at rest, a "
-            f"registration with a residual needs {FEWEST}; fewer will do where they were recorded "
+            f"seen.layout = {p.seen.layout}: {len(kept)} of its markers are visible at rest; a "
+            f"registration with a residual needs {FEWEST}. Fewer are enough if they were recorded "
             f"in the body's frame: seen.layout = '{AS_SEEN}'"
         )
     markers = replace(
@@ -60,8 +60,8 @@ def _declared(
     enough, as nothing is fitted. Raises `UsageError` for settings of a fit."""
     if p.seen.registration != MarkerFit():
         raise UsageError(
-            f"seen.registration is of a fit, and seen.layout = '{AS_SEEN}' fits nothing; name a "
-            "layout, or leave it out"
+            f"seen.registration needs a fit, but seen.layout = '{AS_SEEN}' fits nothing; name a "
+            f"layout, or leave seen.registration out"
         )
     topic, rest = markers_topic(recording, p), markers.x[0]
     return observe_markers(
@@ -79,7 +79,7 @@ def compared_markers(recording: Recording, p: MeasuredBody, at: BodyAt) -> Marke
     driving = p.moved.markers if p.moved.by == "markers" else ()
     kept = [i for i, name in enumerate(whole.names) if name not in driving]
     if not kept:
-        raise ComparisonError("every marker moves the body: none is left to be compared")
+        raise ComparisonError("every marker moves the body: no marker is left to compare")
     return replace(
         whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
         rest=whole.rest[kept], tre=whole.tre[kept],
@@ -109,10 +109,10 @@ def _points_in(path: Path) -> Mapping[str, Markers]:
     try:
         return recognised(path).read(path, {}).markers
     except UsageError as error:
-        why = str(error).split("; say it")[0]
+        why = str(error).split("; give it")[0]
         raise UsageError(
-            f"seen.layout: {why}; a layout says all itself: as a table its columns are name, "
-            "x (mm), y (mm), z (mm)"
+            f"seen.layout: {why}; a layout must be complete: the columns of a table are name, x "
+            f"(mm), y (mm), z (mm)"
         ) from None
 
 
@@ -121,5 +121,5 @@ def markers_topic(recording: Recording, p: MeasuredBody) -> str:
     if p.seen.markers:
         return p.seen.markers
     if len(recording.markers) != 1:
-        raise UsageError(f"seen.markers is not set; one of {sorted(recording.markers)}")
+        raise UsageError(f"seen.markers is not set; expected one of {sorted(recording.markers)}")
     return next(iter(recording.markers))

@@ -27,7 +27,8 @@ def observed_outline(
     contours = recording.contour(topic)
     if mesh.bricks:
         raise RegistrationError(
-            f"outlines need triangular facets, the body has {mesh.kind}: give a body of tetrahedra"
+            f"outlines need triangular facets, but the body has {mesh.kind}: give a body of "
+            f"tetrahedra"
         )
     mesh.facet_nodes(p.seen.surface)
     wall = cavity_sampler(mesh, p.seen.surface, None, _PARTS)
@@ -38,8 +39,8 @@ def observed_outline(
         contours = replace(contours, pose=_fitted(p, contours, wall, rest))
         at = ", ".join(f"{1e3 * x:.2f}" for x in contours.pose[:3, 3])
         said = (
-            f"Images of '{topic}': their origin at ({at}) mm was fitted, so that the outline at "
-            "rest has the centroid of the body's section; where it lies at rest is no evidence.",
+            f"Images of '{topic}': their origin at ({at}) mm was fitted: the outline at rest has "
+            f"the centroid of the body's section. Its position at rest is not evidence.",
         )
     sd_t = clock_sd(recording, topic)
     return observe_outlines(contours, wall, rest, name=topic, sd_t=sd_t), said

@@ -57,7 +57,7 @@ def place(recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path) 
         findings = (*findings, *said)
     if not compared:
         raise ComparisonError(
-            "nothing of the recording is compared: set one of seen.force, seen.markers and "
+            "no stream of the recording is compared: set one of seen.force, seen.markers and "
             f"seen.outline to a topic of {sorted(recording.streams)}"
         )
     still = [o.name for o in compared if not isinstance(o, SignalObservation)]
@@ -79,7 +79,7 @@ def _instants(recording: Recording, p: MeasuredBody) -> tuple[Floats, float]:
         raise UsageError(f"no stream {missing} in {recording.name}; it has {sorted(streams)}")
     times = [streams[str(topic)].t for topic in used]
     if not times:
-        raise ComparisonError("nothing of the recording is used: set seen.* or moved.by")
+        raise ComparisonError("no stream of the recording is used: set seen.* or moved.by")
     start, end = max(t[0] for t in times), min(t[-1] for t in times)
     if not end > start:
         raise ComparisonError(
@@ -110,8 +110,8 @@ def _force(
     if y[far] * drive.y[far, 0] < 0 and abs(y[far]) > 5 * force.sd:
         raise RegistrationError(
             f"'{topic}' is {y[far]:.4g} N where '{p.moved.by}' is {1e3 * drive.y[far, 0]:.3g} mm: "
-            "force and motion must have one sign; turn one as it is imported, with "
-            "--map force=COLUMN:UNIT:-"
+            f"force and motion must have the same sign; reverse one at import, with --map "
+            f"force=COLUMN:UNIT:-"
         )
     return observed_force(recording, p, force, t, y[:, None])
 
@@ -124,7 +124,7 @@ def _markers(
     source, unseen, samples = rested(recording.marker(markers_topic(recording, p)), p.seen.still)
     found = since_rest(part, at[0], noise(source), samples, p.seen.stands)
     bare = [n for n in source.names if n not in (*part.names, *p.moved.markers)]
-    left = (("not seen at rest", unseen), ("not in the layout", bare))
+    left = (("not visible at rest", unseen), ("not in the layout", bare))
     said = tuple(
         f"markers {why} are left out: {listed_names(names)}" for why, names in left if names
     )
@@ -145,8 +145,8 @@ def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amou
     if along < -_AGAINST * most and -along > 5 * markers.sd / np.sqrt(len(seen)):
         raise RegistrationError(
             f"the markers went {-1e3 * along:.3g} mm against {p.moved.along}, along which "
-            f"'{p.moved.by}' moves the body (the farthest by {1e3 * most:.3g} mm): another axis is "
-            "up in their frame, or the sign is the other one; set moved.along, or seen.layout"
+            f"'{p.moved.by}' moves the body (the farthest by {1e3 * most:.3g} mm): another axis "
+            f"is up in their frame, or the sign is reversed; set moved.along, or seen.layout"
         )
 
 
@@ -177,7 +177,7 @@ def _selections(
 def _window(label: str, t: Floats, words: str) -> Selection:
     if len(t) < _FEWEST:
         raise ComparisonError(
-            f"window '{label}': {len(t)} {words}, {_FEWEST} are needed; set seen.fit_to or "
+            f"window '{label}': {len(t)} {words}; {_FEWEST} are needed: set seen.fit_to or "
             "seen.states"
         )
     return Selection(label, t, words)

@@ -12,7 +12,7 @@ from validate.register.registered import Registered
 from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.
-WALK_UNRECORDED = "not recorded whether the load's walk was chosen on this twin"
+WALK_UNRECORDED = "the run does not record whether the load's walk was chosen on this twin"
 
 
 @runtime_checkable
@@ -35,14 +35,14 @@ class Method:
     with that beside.
     """
 
-    label: str = quantity("", "1", "what reports call it")
+    label: str = quantity("", "1", "name in reports")
     settings: Any = part(None, "of the scheme or filter")
-    scene: Any = part(None, "what the scene is built with")
+    scene: Any = part(None, "settings of the scene")
     markers: tuple[str, ...] = quantity((), "1", "markers and outlines that a filter is given")
     steps: int | None = quantity(None, "1", "steps to run; none: all")
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
-    chosen: str = quantity("", "1", "what was chosen on the twin that judges it; empty: nothing")
-    split: int = quantity(1, "1", "steps of this method in one of those, inputs interpolated")
+    chosen: str = quantity("", "1", "settings chosen on the twin that checks it; empty: none")
+    split: int = quantity(1, "1", "steps of this method in one of these, inputs interpolated")
 
     def prepare(
         self,
@@ -82,7 +82,7 @@ class Method:
             known = (defaults[name], value, getattr(declared.settings, name, value))
             if own not in known and defaults[name] is not MISSING:
                 raise UsageError(
-                    f"{name} = {own} of '{self.label}': the experiment sets {value}; "
-                    "change its own parameter"
+                    f"{name} = {own} of '{self.label}': the experiment sets {value}; change the "
+                    f"experiment's parameter"
                 )
         return mine

@@ -44,7 +44,7 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> Num
     rings, size, unit = shown.ringing, scale(shown.unit), shown_unit(shown.unit)
     rows: list[tuple[Entry, ...]] = [
         ("largest motion, peak to peak", size * shown.size, unit, f"'{shown.marker}'{way}"),
-        ("from first to last sample", size * shown.drift, unit, "drift, or another rest"),
+        ("from first to last sample", size * shown.drift, unit, "drift, or a different rest"),
         ("samples a second", shown.rate, "Hz", ""),
         ("gaps", shown.gaps, "1", f"longest interval {shown.gap:.4g} s, "
                                   f"{100 * shown.missing:.2g} % of the samples missing"),
@@ -53,7 +53,7 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> Num
          f"resolved to {shown.resolution:.2g} Hz"),
         ("ring-down, frequency", rings.frequency if rings else None, "Hz",
          f"damping {rings.damping:.3g} (sd {rings.damping_sd:.1g})" if rings else "none seen"),
-        *((f"natural frequency {i}", f, "Hz", "of the body as it is held, undamped"
+        *((f"natural frequency {i}", f, "Hz", "of the body with its supports, undamped"
            + (assumed and f", {assumed}")) for i, f in enumerate(modes, 1)),
     ]  # fmt: skip
     if modes:
@@ -61,7 +61,7 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> Num
         word = "matters" if shown.inertia_matters(modes[0]) else "is small"
         rows.append(("motion above a third of the first", 100 * share, "%",
                      f"rms, of peak to peak: inertia {word}"))  # fmt: skip
-    return NumberTable("recorded_motion", "What was recorded, and the body's first modes.",
+    return NumberTable("recorded_motion", "The recorded motion, and the body's first modes.",
                        ("what", "value", "unit", "note"), tuple(rows))  # fmt: skip
 
 

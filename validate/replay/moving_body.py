@@ -194,8 +194,8 @@ def _identify(
     """
     if p.material.E is None:
         raise UsageError(
-            "material.E is not set: of a motion in time the modulus must be known; set it, or "
-            "identify it on a static log"
+            "material.E is not set: a motion in time needs a known modulus; set it, or identify "
+            "it on a static log"
         )
     shown = motion_of(recordings[0], judged(p))
     first = _first_of(recordings[0], p, methods, build)
@@ -239,8 +239,8 @@ def _ring_down(
     found = motion_of(begun.recording, judged(p)).ringing
     if found is None or found.damping <= 0:
         raise ComparisonError(
-            f"motion.fit_window = {window:g} s: no ring-down is found in it (three periods or more "
-            "that fade are needed); give motion.stiffness_damping or motion.damping_ratio"
+            f"motion.fit_window = {window:g} s: it contains no ring-down (three or more decaying "
+            f"periods are needed); give motion.stiffness_damping or motion.damping_ratio"
         )
     w = 2 * np.pi * found.frequency
     beta, share = 2 * found.damping / w, found.damping_sd / found.damping
@@ -253,7 +253,7 @@ def _ring_down(
     note = (
         f"Damping was identified, not predicted: ratio {found.damping:.4f} (sd "
         f"{found.damping_sd:.2g}) at {found.frequency:.4g} Hz, of the ring-down in the first "
-        f"{window:g} s; only what comes later is evidence."
+        f"{window:g} s; only later samples are evidence."
     )
     score = Score(
         "damping.ratio", found.damping, "1", 1, "identified",

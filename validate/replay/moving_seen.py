@@ -204,7 +204,7 @@ def place_moving(
         film = (Selection(FILM, taken, "every outline after the start", of=(outline.name,)),)
     if not compared:
         raise ComparisonError(
-            "nothing of the motion is compared: set seen.markers, seen.force or seen.outline"
+            "no stream of the motion is compared: set seen.markers, seen.force or seen.outline"
         )
     return Registered(
         (*drives, *compared), (*_windows(p, t, compared[0], others), *film), findings=said,
@@ -253,7 +253,7 @@ def _windows(
     if early.sum() < _FEWEST or (~early).sum() < _FEWEST:
         raise ComparisonError(
             f"motion.fit_window = {p.motion.fit_window:g} s: {int(early.sum())} samples in it and "
-            f"{int((~early).sum())} after it, {_FEWEST} of each are needed"
+            f"{int((~early).sum())} after it; {_FEWEST} of each are needed"
         )
     end = f"{p.motion.fit_window:g} s after the start"
     return (

@@ -65,7 +65,9 @@ def _asked(experiment: Experiment, missing: Sequence[Parameter]) -> str:
         for p in missing
     )
     sets = " ".join(f"--set {p.path}=VALUE" for p in missing)
-    return f"{named}. The recording does not say it: measure it and write it there, or pass {sets}"
+    return (
+        f"{named}. The recording does not contain it: measure it and write it there, or pass {sets}"
+    )
 
 
 def _line(tree: ast.AST, parameter: str) -> int:

@@ -118,11 +118,11 @@ def meshed(scene: AnyScene) -> Scene:
     """The scene; raises `SceneError` for one without a mesh, where nothing can be refined, and for
     rigid bodies that touch, which the schemes of a derived ladder do not know."""
     if isinstance(scene, Meshless):
-        raise SceneError("the scene has no mesh and no steps: it enters no study")
+        raise SceneError("the scene has no mesh and no steps; a study needs both")
     if scene.contacts:
         raise SceneError(
-            f"the scene touches {len(scene.contacts)} rigid bodies, which the ladder that a study "
-            "derives does not know; run the experiment, or declare its ladder"
+            f"the scene touches {len(scene.contacts)} rigid bodies, which a derived ladder does "
+            f"not support; run the experiment, or declare its ladder"
         )
     return scene
 

@@ -43,13 +43,13 @@ def _of_value(p: Parameter, stated: Mapping[str, float]) -> Iterator[str]:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
     if p.unit == "m" and p.origin != "default" and abs(value) >= LENGTH:
-        yield f"{p.path} = {value:g} m is 1000 times {value:g} mm: were millimetres meant?"
+        yield f"{p.path} = {value:g} m is 1000 times {value:g} mm: check its unit"
     if p.unit == "Pa" and p.path.split(".")[-1].startswith("E"):
         yield from _outside(f"{p.path} ({p.origin})", value, MODULUS, "modulus")
     said = stated.get(p.path)
     if said and value and not 1 / (1 + ENTERED) < value / said < 1 + ENTERED:
         yield (
-            f"{p.path} = {value:g} {p.unit} was {p.origin}; the recording says {said:g} {p.unit}, "
+            f"{p.path} = {value:g} {p.unit} was {p.origin}; the recording has {said:g} {p.unit}, "
             f"{_factor(value, said)}"
         )
 
@@ -70,7 +70,7 @@ def _of_compression(
         )
     compared = float(np.ptp(followed.seen.inputs[:, 0])) / along
     if scene.material.law == "linear" and compared > LINEAR:
-        yield f"strain of {compared:.3g} by a linear law, which is good to about 0.1"
+        yield f"strain of {compared:.3g} by a linear law, which is valid to about 0.1"
     area = float(np.abs(cell_volumes(scene.mesh)).sum()) * scene.copies / along
     for force in followed.seen.of(SignalObservation):
         if force.unit == "N":

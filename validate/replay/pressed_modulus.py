@@ -101,8 +101,8 @@ def identify_pressed(
         return Identified(p, (), ())
     if p.specimen.fluid is not None:
         raise UsageError(
-            "material.E is not set, and a body with fluid inside is not pressed uniformly: its "
-            "modulus is not the log's slope; give it with --set material.E=VALUE"
+            "material.E is not set: a body with fluid inside does not deform uniformly, and the "
+            "log's slope is not its modulus; give it with --set material.E=VALUE"
         )
     recording = recordings[0]
     log = _log(recording, p)
@@ -362,7 +362,7 @@ def _inputs(budgets: Mapping[str, _Budget], declared: Sequence[Input]) -> tuple[
     )
     found = [
         with_move("identified modulus", "E within the noise of its fit", by, noise),
-        with_move("contact point", "where the load begins, and E fitted with it", by, toe),
+        with_move("contact point", "start of the load, and E fitted with it", by, toe),
     ]
     names = dict.fromkeys(n for b in budgets.values() for n in b.moved)
     kept = [i for i in declared if i.name != "modulus"]
@@ -397,7 +397,7 @@ def _of_rival(name: str, f: _Fitting) -> str:
     ends = _ENDS[f.p.test][scene.plates]
     return (
         f"E = {f.E:.5g} ± {half:.3g} Pa (two sd of the fit alone) was identified by {name} for "
-        f"{ends}, law '{scene.law}'; this method is not judged"
+        f"{ends}, law '{scene.law}'; this method is not checked"
     )
 
 

@@ -36,13 +36,13 @@ class PressedOutline:
     """Outlines of the recording, and which surface of the body they are of."""
 
     topic: str | None = quantity(None, "1", "outlines' topic; none: not compared")
-    surface: str = quantity(WHOLE, "1", "facet set that they show; surface: the body's own edge")
+    surface: str = quantity(WHOLE, "1", "facet set that they show; surface: the body's edge")
     origin: tuple[float, ...] = quantity((), "m", "the images' first pixel; none: recorded pose")
     image_x: str = quantity("+x", "1", "direction of the images' x (columns)")
     image_y: str = quantity("-z", "1", "direction of the images' y (rows)")
-    shift: tuple[float, float] = quantity((0.0, 0.0), "m", "along the images' x and y, added to it")
+    shift: tuple[float, float] = quantity((0.0, 0.0), "m", "shift along the images' x and y")
     sd: float | None = quantity(None, "m", "standard uncertainty of that place, along x and y each")
-    holds: int = quantity(4, "1", "images compared beside the first, evenly over the displacement")
+    holds: int = quantity(4, "1", "further images compared, evenly spaced in displacement")
 
     def __post_init__(self) -> None:
         if not 1 <= self.holds <= 50 or (self.sd is not None and not 0 <= self.sd < np.inf):
@@ -88,17 +88,17 @@ def with_outline(
 def _posed(contours: Contours, card: PressedOutline) -> Contours:
     if card.sd is None:
         raise UsageError(
-            "outline.sd is not set: how well the place of the images on the body is known (one "
-            "standard uncertainty, as 0.3mm); give it with --set outline.sd=VALUE"
+            "outline.sd (standard uncertainty of the images' position on the body, as 0.3mm) is "
+            "not set; give it with --set outline.sd=VALUE"
         )
     pose = contours.pose
     if card.origin:
         pose = pose_of(card.origin, card.image_x, card.image_y)
     elif np.array_equal(pose, np.eye(4)):
         raise UsageError(
-            f"where the images of '{card.topic}' lie on the body is not recorded: "
-            "outline.origin (their first pixel), image_x and image_y say it in the body's frame, "
-            "whose z is the axis from the resting plate: --set outline.origin=-12mm,0mm,30mm"
+            f"the position of the images '{card.topic}' is not recorded: give outline.origin "
+            f"(first pixel), image_x and image_y in the body's frame (z: axis from the resting "
+            f"plate), as --set outline.origin=-12mm,0mm,30mm"
         )
     moved_by = np.eye(4)
     moved_by[:2, 3] = card.shift
@@ -113,8 +113,8 @@ def _instants(
     if len(own) < 2:
         raise ComparisonError(
             f"'{card.topic}': {len(own)} of {len(contours.t)} outlines lie within the "
-            f"{stage.t[0]:.3f}..{stage.t[-1]:.3f} s of the log up to its limit, 2 are needed; "
-            "`validate align` their clocks"
+            f"{stage.t[0]:.3f}..{stage.t[-1]:.3f} s of the log up to its limit; 2 are needed: "
+            f"`validate align` their clocks"
         )
     d = np.interp(own, stage.t, stage.y[:, 0])
     first = int(np.abs(d).argmin())
@@ -132,9 +132,9 @@ def _require_alike(found: OutlineObservation, mesh: Mesh, card: PressedOutline) 
     if not area / _LIKE < seen < _LIKE * area:
         raise RegistrationError(
             f"the outlines '{card.topic}' enclose {1e4 * seen:.3g} cm2, the section of the body's "
-            f"'{card.surface}' with the images {1e4 * area:.3g} cm2: they show something else, "
-            "which this model may not have. outline.surface names a facet set of a mesh file (an "
-            "inclusion's wall); --set outline.topic=none leaves them out"
+            f"'{card.surface}' with the images {1e4 * area:.3g} cm2: they show something else. "
+            f"Set outline.surface to a facet set of a mesh file (an inclusion's wall); --set "
+            f"outline.topic=none leaves them out"
         )
 
 

@@ -98,8 +98,8 @@ def _named(part: Part, found: Sequence[Residual]) -> list[Residual]:
         if not any(wanted in (r.quantity, r.name) for r in found):
             there = ", ".join(dict.fromkeys(r.name for r in found)) or "none"
             raise ComparisonError(
-                f"{part.name}: no residual '{wanted}' to calibrate on, 0 matched samples; there "
-                f"are {', '.join(there.split(', ')[:_SHOWN])}"
+                f"{part.name}: no residual '{wanted}' for the calibration, 0 matched samples; "
+                f"there are {', '.join(there.split(', ')[:_SHOWN])}"
             )
     return [r for r in found if {r.quantity, r.name} & set(part.on.quantities)]
 

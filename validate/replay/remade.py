@@ -80,7 +80,9 @@ def made_by(
         return recording, true, ()
     true = with_values(true, changed)
     said = ", ".join(f"{path} = {text}" for path, text in changed.items())
-    note = f"The twin was recorded anew in memory with {said}; the shipped recording was not used."
+    note = (
+        f"The twin was simulated again in memory with {said}; the shipped recording was not used."
+    )
     return record(true), true, (note,)
 
 
@@ -97,8 +99,9 @@ def require_known(
     lost = [p for p in mine if p.startswith(remake) and p not in known and mine[p] != own.get(p)]
     if lost:
         raise UsageError(
-            f"{recording.name}: --set {lost[0]}={mine[lost[0]]} would be ignored: the recording "
-            "does not say how it was made; leave it out, or make one with `validate record`"
+            f"{recording.name}: --set {lost[0]}={mine[lost[0]]} would have no effect: the "
+            f"recording does not contain its parameters; leave it out, or make one with `validate "
+            f"record`"
         )
 
 

@@ -99,7 +99,7 @@ def set_out(
     *,
     since: float = 0.0,
 ) -> SetOut:
-    """Loads, asks for memory and identifies. Raises children of `ValidateError` for bad input."""
+    """Loads, requests memory and identifies. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     cases = chosen_cases(experiment, options)
     found = opened(experiment, parameters)
@@ -108,7 +108,7 @@ def set_out(
     experiment = _following(experiment, found, differing)
     shipped, parameters = found.recordings, found.parameters
     if report:
-        report(0, 1, "asks for memory")
+        report(0, 1, "requests memory")
     asked = middle(experiment, parameters)
     require_room(experiment, methods, asked, shipped[0], quick=options.quick)
     if report and (experiment.identify or experiment.calibrations):
@@ -229,7 +229,7 @@ def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, 
     own = [f"{c.path} = {c.value}" for c in differing if c.path not in experiment.locates]
     if not own:
         return followed
-    other = f"printed for this experiment's own settings; not compared with {', '.join(own)}"
+    other = f"printed for this experiment's default settings; not compared with {', '.join(own)}"
     return replace(
         followed, published=tuple(replace(f, other=f.other or other) for f in followed.published)
     )
@@ -309,7 +309,7 @@ def _published(
 
 
 def _doubtful(warnings: tuple[str, ...]) -> str:
-    return "Doubtful input, see the warnings; " if warnings else ""
+    return "With warnings on the input; " if warnings else ""
 
 
 def _opening(identified: Identified | None) -> str:

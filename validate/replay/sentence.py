@@ -10,11 +10,11 @@ from validate.compare.verdict import Check
 from validate.report.numbers import with_unit
 
 _AGAINST: dict[Kind, str] = {
-    "measured": "what was measured",
+    "measured": "the measurement",
     "twin": "a twin, a recording of another model",
     "same law, finer mesh": "the same law on a finer mesh",
-    "same model": "a recording of its own model",
-    "reference": "what third-party code computed",
+    "same model": "a recording of the same model",
+    "reference": "the result of third-party code",
 }
 Answer = Callable[[Check], str]
 # How each answer is counted, and whether its checks are named.
@@ -51,7 +51,7 @@ def figures_sentence(published: tuple[Published, ...]) -> str:
     """Which printed figures do not stand, and that those of other data are not compared."""
     fallen = [p for p in published if p.fault]
     foreign = sum(bool(p.other) for p in published)
-    told = [f" {len(fallen)} of {len(published)} printed figures do not stand ({_named(fallen)})."]
+    told = [f" {len(fallen)} of {len(published)} printed figures do not hold ({_named(fallen)})."]
     told += [f" {foreign} of {len(published)} printed figures belong to other data: not compared."]
     return "".join(t for t, there in zip(told, (fallen, foreign), strict=True) if there)
 
@@ -104,8 +104,8 @@ def _corrected(found: Overall) -> str:
         )
     if found.alone:
         return (
-            f" Corrected for {found.total} checks (Holm) none differs: by chance alone a perfect "
-            "model shows as much."
+            f" Corrected for {found.total} checks (Holm) none differs: a perfect model shows "
+            f"as much by chance."
         )
     return ""
 

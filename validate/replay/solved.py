@@ -187,4 +187,4 @@ def _label(method: Method, scene: AnyScene) -> str:
     order = getattr(method.scene, "order", own)
     label = method.label if order == own else f"{method.label} [order {own}]"
     smooth = getattr(method.settings, "smooth", False)
-    return f"{label} [smoothed: sees the future]" if smooth else label
+    return f"{label} [smoothed: uses future samples]" if smooth else label

@@ -52,11 +52,9 @@ def _displacements(experiment: Experiment, shown: Mapping[str, Followed]) -> Exh
     charts = [_track_chart(shown, probe, axis) for probe in probes]
     scored = {n: f for n, f in shown.items() if f.scored}
     charts += [_error_chart(scored, probe, axis) for probe in probes if scored]
-    words = (
-        "Points are what was measured there; only the markers named in a method are given to it."
-    )
+    words = "Points are measurements; a method uses only the markers in its name."
     if scored:
-        words = f"The reference is the twin's own displacement, which no method sees. {words}"
+        words = f"The reference is the twin's true displacement, which no method uses. {words}"
     return Exhibit(
         "displacements",
         "Displacements over time",
@@ -111,7 +109,7 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     return Chart(
         f"error_{probe}", f"Error at {probe}", "recorded time / s",
         f"|u_{axis} − reference| / mm", series, log="y",
-        caption="Dips toward zero, where an error changes its sign, are cut.", scale=_MM * moved,
+        caption="Dips toward zero, at a change of sign, are truncated.", scale=_MM * moved,
     )  # fmt: skip
 
 
@@ -124,7 +122,7 @@ def _error_table(scored: Mapping[str, Followed], axis: str) -> NumberTable:
     return NumberTable(
         "errors",
         f"Errors of u_{axis} against the twin's truth. SD: sample standard deviation (ddof 1) of "
-        "the absolute error. NRMSE: RMSE over the range (largest less smallest) of the reference.",
+        "the absolute error. NRMSE: RMSE over the range (largest minus smallest) of the reference.",
         ("method", "node", "MAE / mm", "RMSE / mm", "SD / mm", "max / mm", "NRMSE / 1", "times"),
         tuple(rows),
     )
@@ -152,8 +150,8 @@ def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: C
     errors = "RMSE over the range of the reference, per node, and " if probes else ""
     table = NumberTable(
         "cases",
-        f"Every other case: {errors}NIS per degree of freedom (1: consistent; far above: the model "
-        "class is wrong).",
+        f"Every other case: {errors}NIS per degree of freedom (1: consistent; far above 1: the "
+        f"model class is wrong).",
         (kind, "method", *(f"{p} NRMSE / %" for p in probes), "NIS per dof / 1", "ended"),
         tuple(rows),
     )
@@ -169,7 +167,8 @@ def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:
     cost = f"; cost is computing time per recorded time over that of '{base.label}'" if base else ""
     table = NumberTable(
         "speeds",
-        "Time per step, every method in this run on this machine, one thread. The real-time factor "
+        "Time per step of every method in this run, on this machine, one thread. The real-time "
+        "factor "
         f"is recorded over computing time{cost}. dt is that of a step of the integration.",
         ("method", "set-up / s", "step p50 / ms", "p99 / ms", "rate / Hz", "dt / ms",
          "dt over critical / 1", "real-time factor / 1", "cost / 1", "steps", "ended"),
@@ -183,7 +182,7 @@ def _endings(main: Mapping[str, Followed]) -> Exhibit:
     rows = tuple((f.label, f.run.setup_s, f.run.outcome.state, f.run.outcome.why)
                  for f in main.values())  # fmt: skip
     table = NumberTable(
-        "speeds", "No step is timed: every method solves its scene at once, or is smoothed.",
+        "speeds", "No step times: every method solves its scene at once, or is smoothed.",
         ("method", "time / s", "ended", "why"), rows, below="why",
     )  # fmt: skip
     return Exhibit("speeds", "How every method ended", tables=(table,))
@@ -234,4 +233,4 @@ def _maps(shown: Mapping[str, Followed]) -> Exhibit | None:
             maps.append(NodeMap(f"error_{f.method}", title, mesh, _MM * error, "mm", "error"))
     if not maps:
         return None
-    return Exhibit("error-maps", "Where the errors are", maps=tuple(maps[:_MAPS]))
+    return Exhibit("error-maps", "Errors by node", maps=tuple(maps[:_MAPS]))

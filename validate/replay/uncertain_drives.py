@@ -61,7 +61,7 @@ def drive_inputs(scene: AnyScene, seen: Registered) -> tuple[Input, ...]:
             off = np.zeros(count)
             off[first : first + wide] = row
             which = f", {k} of {len(rows)}" if len(rows) > 1 else ""
-            words = f"{drive.name} off by its standard deviation of {drive.sd:.3g} {drive.unit}"
+            words = f"{drive.name} shifted by its standard deviation of {drive.sd:.3g} {drive.unit}"
             name = f"sd of {drive.name}{which}"
             found.append(Input(name, _as_it_is, words, "recorded", off=tuple(off.tolist())))
         first += wide

@@ -71,7 +71,7 @@ def against(name: str, caption: str, panels: Sequence[Against]) -> Picture:
 
     points = sum(len(panel.measured) for panel in panels)
     return Picture(
-        name, caption, f"{points} predictions against what was measured, and their bands.",
+        name, caption, f"{points} predictions against measurements, with their bands.",
         draw(paint, width, (_PANEL + _TITLE) * rows + legend_height(labels, width)),
     )  # fmt: skip
 

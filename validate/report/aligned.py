@@ -23,11 +23,11 @@ def aligned(one: Signal, other: Signal, names: tuple[str, str], seconds: float) 
         ):
             ax.plot(signal.t + late, _even(signal.y[:, 0]), color=colour, ls=dash, lw=1.2,
                     label=name)  # fmt: skip
-        ax.set(xlabel="time / s", ylabel="less its mean, over its sd / 1")
+        ax.set(xlabel="time / s", ylabel="minus its mean, over its sd / 1")
         labels = ax.get_legend_handles_labels()[1]
         figure.legend(loc="outside lower center", ncols=legend_columns(labels))
 
-    words = f"'{names[1]}' moved by {seconds:+.6g} s over '{names[0]}', each less its mean."
+    words = f"'{names[1]}' moved by {seconds:+.6g} s over '{names[0]}', each minus its mean."
     return Picture("aligned", words, words, draw(paint, WIDTH, _HEIGHT))
 
 

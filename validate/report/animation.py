@@ -51,12 +51,12 @@ def _film(shots: list[_Shot], label: str, driven: str) -> Animation:
     times = [_STILL, *(_HELD if shot.held else _MOVING for shot in shots[1:])]
     return Animation(
         "outline",
-        "The outline through the load, again and again, image coordinates in mm. "
-        "Points: measured at the load in the title (black) or at the load before (grey). "
+        "The outline during loading, repeated; image coordinates in mm. "
+        "Points: measured at the load in the title (black) or at the previous load (grey). "
         f"Line: section of {label}, computed at the loads, {HOW}. Thin line: measured at rest. "
-        f"The still picture shows {shots[0].title}.",
+        f"The still image shows {shots[0].title}.",
         f"Animation: the measured outline points over the simulated outline of {label} from rest "
-        f"to {shots[0].title}; the still picture shows the last load.",
+        f"to {shots[0].title}; the still image shows the last load.",
         film(lambda figure: _paint(figure, shots, label, driven), len(shots), _SIDE, _SIDE),
         tuple(times),
     )

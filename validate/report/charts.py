@@ -60,7 +60,7 @@ def _sentence(words: str) -> str:
 def _undrawn(chart: Chart) -> str:
     """What lies below the floor, in words."""
     lost, floor = beneath(chart), _floor(chart)
-    words = f"Not drawn, below {floor}, a billionth of the scale: {'; '.join(lost)}"
+    words = f"Not drawn, as below {floor}, a billionth of the scale: {'; '.join(lost)}"
     return words if lost else ""
 
 

@@ -83,10 +83,10 @@ def _signal(result: Result, quantity: str) -> tuple[Chart, ...]:
     ends = np.array([f(q) for f in (np.min, np.max) for q in [np.hstack(longest.q)]])
     band = Series("± 2 sd of one sample", ends, 0 * ends - noise, "band", 0 * ends + noise)
     off = Chart(
-        f"curve_{name}_error", f"{quantity}, model less measurement", q,
+        f"curve_{name}_error", f"{quantity}, model minus measurement", q,
         f"simulated − measured / {unit}",
         (band, *(s for line in lines for s in _off(result, line, factor))), linear=noise,
-        caption="Outside of the grey band the axis is logarithmic.",
+        caption="Outside the grey band the axis is logarithmic.",
     )  # fmt: skip
     return level, off
 
@@ -163,7 +163,7 @@ def _band_words(lines: list[_Line]) -> str:
 
 
 def _left_out(hidden: list[str]) -> str:
-    return f" Not drawn, lying on another line: {'; '.join(hidden)}." if hidden else ""
+    return f" Not drawn, as they coincide with another line: {'; '.join(hidden)}." if hidden else ""
 
 
 # --- volume --------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What this recording can tell apart: errors against noise, effects against sensors, sentences."""
+"""Which effects a recording can distinguish: errors against noise, effects against sensors."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ def discrimination(result: Result) -> Exhibit:
     effects = _recorded(result)
     return Exhibit(
         "discrimination",
-        "What this recording can tell apart",
+        "Which effects this recording can distinguish",
         tuple(map(_sentence, effects)),
         (_matrix(effects), _budget(effects)) if effects else (),
         pictures=over_noise(result),
@@ -67,8 +67,8 @@ def _matrix(effects: tuple[Effect, ...]) -> NumberTable:
     return NumberTable(
         "",
         "Separation of each effect in each recorded quantity at the load where it is largest: the "
-        "rms change over the uncertainty that averaging leaves (no unit). Above 2 (coloured, with "
-        "a tick) the recording sees the effect.",
+        "rms change over the uncertainty of the mean (no unit). Above 2 (coloured, with a tick) "
+        "the recording shows the effect.",
         ("effect", *sensors),
         rows,
     )
@@ -103,8 +103,8 @@ def _budget(effects: tuple[Effect, ...]) -> NumberTable:
     return NumberTable(
         "",
         f"Error budget: what each effect moves {at_load(load)}; rms and, in brackets, largest "
-        "change of what has more than one value.",
-        ("effect", *heads, "seen by (any load)", "a sensor that would see it"),
+        f"change of quantities with several values.",
+        ("effect", *heads, "measured by (any load)", "a sensor that would measure it"),
         rows,
     )
 
@@ -143,17 +143,19 @@ def _rounded(value: float, unit: str) -> str:
 def _sentence(effect: Effect) -> str:
     opening, seen = f"{effect.name.capitalize()} ({effect.doc})", _seen(effect)
     if seen:
-        return f"{opening}: this recording can tell it apart, by {_listed(seen)}."
+        return f"{opening}: this recording can distinguish it, by {_listed(seen)}."
     best = max(effect.changes, key=lambda c: c.separation, default=None)
     size = ""
     if best is not None and best.separation > 0:
         size = (
             f" (best: {best.name}, {with_unit(best.rms, best.unit, 2)}, separation "
-            f"{best.separation:.1f} of the {TELLS_APART:g} needed)"
+            f"{best.separation:.1f} of {TELLS_APART:g} needed)"
         )
     if effect.would_see:
-        return f"{opening}: cannot be told apart{size}; would decide: {_listed(effect.would_see)}."
-    return f"{opening}: cannot be told apart{size}, nor would any sensor listed decide."
+        return (
+            f"{opening}: cannot be distinguished{size}; would decide: {_listed(effect.would_see)}."
+        )
+    return f"{opening}: cannot be distinguished{size}; no listed sensor would decide."
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -65,7 +65,7 @@ def _map(shown: NodeMap, span: Range) -> Picture:
 
 def _require_distinct(found: tuple[Exhibit, ...]) -> None:
     kinds = {
-        "exhibits with the anchor": [e.anchor for e in found],
+        "report items with the anchor": [e.anchor for e in found],
         "tables": [t.name for e in found for t in (*e.tables, *e.data) if t.name],
         "charts": [c.name for e in found for c in e.charts],
         "heats": [h.name for e in found for h in e.heats],
@@ -75,7 +75,7 @@ def _require_distinct(found: tuple[Exhibit, ...]) -> None:
     for kind, names in kinds.items():
         name, count = next(iter(Counter(names).most_common(1)), ("", 0))
         if count > 1:
-            raise ComparisonError(f"{count} {kind} '{name}'; give each its own name")
+            raise ComparisonError(f"{count} {kind} '{name}'; give each a different name")
 
 
 def write_files(shown: DrawnExhibit, folder: Path) -> None:

@@ -74,7 +74,7 @@ def replace_folder(folder: Path, fill: Callable[[Path], None], keep: tuple[str, 
             shutil.rmtree(fresh, ignore_errors=True)
             if not isinstance(error, OSError) or not of_the_place(error):
                 raise
-            stays = "what was there stays" if folder.exists() else "nothing is left there"
+            stays = "its old content is kept" if folder.exists() else "nothing was kept there"
             raise UsageError(
                 f"cannot write {folder}: {why_not(error, folder, needed)}; {stays}; make room or "
                 "choose another folder with --out"
@@ -90,8 +90,8 @@ def _require_replaceable(folder: Path, keep: tuple[str, ...]) -> None:
     count = len(_own(folder, keep))
     if count and not (folder / MARK).is_file():
         raise UsageError(
-            f"{folder} holds {count} entries and no {MARK}, so it is not a report to be replaced; "
-            "choose another folder with --out"
+            f"{folder} holds {count} entries but no {MARK}, so it is not a report and is not "
+            f"replaced; choose another folder with --out"
         )
 
 

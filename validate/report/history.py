@@ -74,7 +74,7 @@ def lines_of(folder: Path) -> list[Json]:
         try:
             found.append(unsealed(json_value(text)))
         except ValueError as error:
-            LOG.warning(f"{folder.name}/{LINES}, line {number}: not believed ({error})")
+            LOG.warning(f"{folder.name}/{LINES}, line {number}: ignored ({error})")
     now = current(folder)
     return [*found, *([] if now is None else [now])]
 

@@ -42,7 +42,7 @@ def _top(shown: NodeMap) -> float:
 
 def _own(shown: NodeMap) -> NodeMap:
     title = shown.title.removesuffix(".")
-    words = f"{title} (colours of its own, far below the largest of {shown.scale})"
+    words = f"{title} (separate colour scale, far below the largest of {shown.scale})"
     return replace(shown, title=words, scale="")
 
 

@@ -103,8 +103,8 @@ def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
         "Left: displacement from "
         f"rest, measured (thin, black) and {judged.label} (wide, blue), to scale. Right: measured "
         f"positions as circles of the declared noise ({with_unit(seen.markers.sd, 'm')} per axis), "
-        "the simulated ones as dots. About four dots in ten fall inside their circle when the "
-        "model is right.",
+        "the simulated ones as dots. If the model is right, about four dots in ten lie in their "
+        "circle.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
         draw(lambda f: _panels(f, seen, judged), WIDTH, _row_height(seen) * count + _ROOM),
     )

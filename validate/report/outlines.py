@@ -118,8 +118,8 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
     return Picture(
         "outlines",
         f"Outlines in image coordinates (mm) at {loads}. Points: measured outline; line: section "
-        f"of {label} with the image plane; grey line: measured rest outline; in the last "
-        f"panel also the other models, but for those whose line would lie on another's.{ringed}",
+        f"of {label} with the image plane; grey line: measured rest outline; in the last panel "
+        f"also the other models, except those whose line coincides with another.{ringed}",
         f"Measured outline points and the simulated section of {label}, one panel per load "
         f"({loads}).",
         draw(lambda figure: _panels(figure, measured, judged, drawn), WIDTH, height),
@@ -203,7 +203,7 @@ def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Chart:
         "simulated − measured / mm",
         (band, *(Series(d.method.label, angle[order], _MM * _off(d, measured)[order])
                  for d in drawn)),
-        caption="Outward positive. Models whose line would lie on another's are left out.",
+        caption="Outward positive. Models whose line coincides with another are left out.",
     )  # fmt: skip
 
 

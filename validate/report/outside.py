@@ -86,7 +86,7 @@ def _check(content: Json, method: Json, check: Json) -> ElementTree.Element:
     case = _case(content, method, check["name"])
     verdict, overall = check["verdict"], content["overall"]
     alone = verdict == "differs" and check["name"] not in overall["differs"]
-    words = "differs by itself, not after Holm's correction" if alone else verdict
+    words = "differs alone, but not after Holm's correction" if alone else verdict
     said = _clean(f"{words} ({check['validation']}): E {_value(check, 'value')}, u_val "
                   f"{_value(check, 'u_val')}, limit {_value(check, 'limit')}, margin "
                   f"{_value(check, 'margin')}, {check['count']} values; {check['why']}; limit: "

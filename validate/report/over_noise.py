@@ -48,10 +48,11 @@ def over_noise(result: Result) -> tuple[Picture, ...]:
     shown = Picture(
         "errors_over_noise",
         f"Rms error of every model {where} over the rms that measurement noise alone gives "
-        "(no unit, logarithmic; the noise stands in the title). Filled: the judged models; hollow: "
-        "the others. Grey: where noise alone puts 95 % of repetitions (chi-square with the number "
-        "of values); right of it the recording sees the model's error. Where all models lie on "
-        f"grey, that quantity cannot choose between them. Ratios below {_LOWEST:g} are arrows.",
+        f"(no unit, logarithmic; the title gives the noise). Filled: checked models; hollow: the "
+        f"others. Grey: 95 % of repetitions with noise alone (chi-square with the number of "
+        f"values). To the right of it, the recording shows the model's error. Where all models "
+        f"lie on grey, that quantity cannot choose between them. Ratios below {_LOWEST:g} are "
+        f"arrows.",
         "Dot chart: rms error over measurement noise for each quantity and model.",
         pixels,
     )

@@ -52,7 +52,13 @@ def _fill(
         ax.plot(*part.T, ".", color=PALETTE[4], markersize=2.5, label=label)
     ax.plot(*at.T, "o", color=ACCEPTED, markersize=5, label="landmark, touched")
     error = longer * np.array([p.error for p in places])
-    ax.quiver(*at.T, *error.T, color=PALETTE[1], linewidth=1.5, label="to where the others put it")
+    ax.quiver(
+        *at.T,
+        *error.T,
+        color=PALETTE[1],
+        linewidth=1.5,
+        label="to the position predicted by the others",
+    )
     for p in places:
         ax.text(*p.at, f"  {p.label}", fontsize=9)
     ax.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")

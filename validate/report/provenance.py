@@ -98,8 +98,8 @@ def _metadata(record: Recording) -> NumberTable:
 def _assumed(record: Recording) -> NumberTable:
     """What stands between the file as written and the recording; never folded."""
     rows = tuple(record.metadata[ASSUMED].items())
-    title = f"Assumed in reading {record.name}, and what decided."
-    return NumberTable("", title, ("", "what, and why"), rows)
+    title = f"Assumptions in reading {record.name}, with reasons."
+    return NumberTable("", title, ("", "assumption and reason"), rows)
 
 
 def parameters(result: Result) -> Exhibit:
@@ -109,8 +109,8 @@ def parameters(result: Result) -> Exhibit:
         for p in result.parameters
     )
     used = NumberTable(
-        "", "Parameters as used, SI. Change one with --set path=value. Origin: recorded (the "
-        "recording says it), entered (the experiment's file or --set), default (the library's), "
+        "", "Parameters as used, SI. Change one with --set path=value. Origin: recorded (in the "
+            "recording), entered (the experiment's file or --set), default (the library's), "
         "identified.",
         ("path", "value", "unit", "origin", "meaning"), rows, folded=True,
     )  # fmt: skip
@@ -128,7 +128,7 @@ def how(result: Result, made: Made) -> Exhibit:
     )
     none = "" if rows else "None differs."
     differing = NumberTable(
-        "", "Parameters that differ from what the experiment declares, SI.",
+        "", "Parameters that differ from the experiment's declared values, SI.",
         ("path", "declared", "here", "unit"), rows, none,
     )  # fmt: skip
     said = [("command", made.command or "none: made from Python")]
@@ -138,12 +138,12 @@ def how(result: Result, made: Made) -> Exhibit:
     if made.files:
         files = tuple((f.role, f.path, f.bytes, f.sha256) for f in made.files)
         head = ("what", "file", "bytes", "SHA-256")
-        tables.append(NumberTable("", "Files read beside the recordings.", head, files))
+        tables.append(NumberTable("", "Files read in addition to the recordings.", head, files))
     return Exhibit("made", "How this was made", (), tuple(tables))
 
 
 def _commit(commit: Commit | None) -> str:
-    return str(commit) if commit else "unknown: the code lies in no clone, or git does not say"
+    return str(commit) if commit else "unknown: the code is not in a clone, or git does not answer"
 
 
 def _plain(value: object) -> str:

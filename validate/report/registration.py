@@ -48,13 +48,14 @@ def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
         return NumberTable("", "Markers as recorded.", ("", "value", "meaning"), (markers_, noise))
     rows = (
         ("method", found.method, "fitted once, on the rest state, then frozen"),
-        ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not seen, "
+        ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not visible, "
          f"{len(found.excluded)} excluded, {len(found.outliers)} outliers ("
-         f"{len(found.rejected)} left out by a robust fit); all that were seen are compared"),
+         f"{len(found.rejected)} left out by a robust fit); all visible markers are compared"),
         ("fitted scale", f"{found.scale.value:.5f} ± {found.scale.half:.2g}",
          f"markers over layout, 99.9 %; {'not ' * (found.transform.s == 1)}used"),
         noise,
-        ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; no measure of accuracy"),
+        ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; not a measure of "
+                                           "accuracy"),
         ("FLE", with_unit(found.fle, "m"), "rms localisation error of one marker, from the FRE"),
         ("TRE at the markers", with_unit(float(rms(seen.tre[:, None])), "m"), "predicted, rms"),
         *_target(result, found),
@@ -74,8 +75,8 @@ def _target(result: Result, found: Registration) -> Iterator[tuple[str, str, str
 def _rest(rest: tuple[Residual, ...]) -> NumberTable:
     return NumberTable(
         "",
-        "What registration and geometry leave at rest, before any load; noise: the rms that a "
-        "perfect model would show.",
+        "Errors of registration and geometry at rest, before any load; noise: the rms of a "
+        "perfect model.",
         ("residual", "unit", "rms", "max", "noise", "values"),
         tuple(
             (r.name, shown_unit(r.unit), *(TableCell(v, r.unit) for v in _statistics(r)), r.count)

@@ -53,7 +53,7 @@ def renders(body: ShownBody) -> tuple[Picture, ...]:
     )  # fmt: skip
     whole = body.normal is None
     plates = "; plates grey" if body.plates else ""
-    plates += "; the rigid indenter in see-through grey" if body.indenters else ""
+    plates += "; the rigid indenter in transparent grey" if body.indenters else ""
     opened = "whole" if whole else f"cut open through {body.cut}"
     cut = "" if whole else " at and behind the cut"
     flat = "from the side" if whole else "against the cut"
@@ -147,7 +147,9 @@ def drawn_indenter(part: ShownIndenter) -> Any:
     elif isinstance(shape, RigidPlane):
         at, radius, thick = shape.point, long / 2, 0.05 * long
     else:
-        raise TypeError(f"no drawing of a {type(shape).__name__}; expected a rigid shape of scenes")
+        raise TypeError(
+            f"a {type(shape).__name__} cannot be drawn; expected a rigid shape of scenes"
+        )
     normal = np.array(shape.normal) / np.linalg.norm(shape.normal)
     return pv.Cylinder(center=1e3 * np.array(at) - 0.5 * thick * normal, direction=normal,
                        radius=radius, height=thick)  # fmt: skip

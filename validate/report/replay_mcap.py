@@ -145,7 +145,7 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
 
 def _interpolated(result: Result) -> str:
     if any(over_time(view) for view in views(result)):
-        return "nothing: output frames at their own times"
+        return "nothing: output frames keep their times"
     return f".../simulated/scene and points: {HOW}"
 
 

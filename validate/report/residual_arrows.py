@@ -27,7 +27,7 @@ def residual_arrows(found: Registration) -> Picture:
     how = f"arrows magnified {by:g} times" if by else "none beyond rounding"
     return Picture(
         "registration",
-        "Registration residuals of the markers at rest, mapped less target, in mm, seen along "
+        "Registration residuals of the markers at rest, mapped minus target, in mm, seen along "
         f"{along}; {how}. Largest: {with_unit(_longest(found), 'm')}. A pattern "
         "(all outward, all turned) would mean a wrong scale or rotation; noise has none. Markers "
         "that lie behind one another share a name.",

@@ -40,8 +40,8 @@ def methods(result: Result) -> Exhibit:
     """How each method ended, what it cost and its errors, at the last load or over time."""
     cost = NumberTable(
         "",
-        "How each method ended and what it cost. Rate: 1 over the median time of one step; set-up: "
-        "what is done once (mesh, assembly, factorisation). Times are of this machine.",
+        "How each method ended, and its cost. Rate: 1 over the median time of one step; set-up: "
+        "done once (mesh, assembly, factorisation). Times hold for this machine.",
         ("method", "name", "ended", "rate", "p99 of a step", "updates", "set-up"),
         tuple(_cost_row(m) for m in result.methods),
     )
@@ -98,7 +98,7 @@ def _errors(result: Result, found: dict[str, str], where: str) -> tuple[NumberTa
         return ()
     shown = list(found)[:_COLUMNS]
     left = len(found) - _COLUMNS
-    more = f" {left} more stand under All scores." if left > 0 else ""
+    more = f" All scores lists {left} more." if left > 0 else ""
     heads = (f"{n.partition('@')[0]} / {shown_unit(found[n])}".removesuffix(" / ") for n in shown)
     rows = tuple(_error_row(m, shown) for m in result.methods)
     return (NumberTable("", f"Errors {where}.{more}", ("method", *heads), rows),)
@@ -217,7 +217,7 @@ def _budget(values: tuple[IdentifiedValue, ...]) -> NumberTable:
         parts = tuple(TableCell(v.parts[n], v.unit) if n in v.parts else None for n in terms)
         cells = (TableCell(x, v.unit, with_unit(x, v.unit, 4)) for x in numbers)
         rows.append((v.name, v.by, *cells, *parts, v.count))
-    words = "Identified values and their uncertainty budgets: standard uncertainties, one a term."
+    words = "Identified values and their uncertainty budgets: standard uncertainties, one per term."
     return NumberTable("identified_values", words, head, tuple(rows))
 
 
@@ -227,10 +227,11 @@ def published(result: Result) -> Exhibit | None:
     if not result.published:
         return None
     groups = [
-        (NumberTable("published", f"Results printed in {result.source}, beside ours.", _PUBLISHED,
+        (NumberTable("published", f"Results printed in {result.source}, and ours.", _PUBLISHED,
                      tuple(_printed(p) for p in result.published if p.result))),
-        (NumberTable("published_settings", "Settings, sketches and citations of the source: no "
-                     "results, and not counted as figures.", _PUBLISHED,
+        (NumberTable("published_settings", "Settings, sketches and citations of the source. They "
+                                           "are not results and are not counted as "
+                                           "figures.", _PUBLISHED,
                      tuple(_printed(p) for p in result.published if not p.result), folded=True)),
     ]  # fmt: skip
     tables = tuple(table for table in groups if table.rows)

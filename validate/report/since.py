@@ -103,8 +103,8 @@ def _runs(folder: Path) -> Iterator[PastRun]:
             yield _past(folder.name, line)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(
-            f"{folder / LINES} holds a line that is none of ours ({error!r:.60}); "
-            "mend or remove the file"
+            f"{folder / LINES} has a line that `validate` did not write ({error!r:.60}); "
+            "correct or remove the file"
         ) from error
 
 

@@ -32,7 +32,11 @@ _BANDS = {
 def band(result: Result) -> tuple[str, str]:
     """The colour class of the sentence and the word that says the same."""
     colour, word = _BANDS[result.overall.word]
-    return ("open", f"{word}, in doubt") if result.warnings and colour == "good" else (colour, word)
+    return (
+        ("open", f"{word}, with warnings")
+        if result.warnings and colour == "good"
+        else (colour, word)
+    )
 
 
 def checks(result: Result) -> Exhibit | None:
@@ -41,13 +45,13 @@ def checks(result: Result) -> Exhibit | None:
         return None
     table = NumberTable(
         "checks",
-        "E = simulation less measurement. max: of many points the one with the largest |E| + "
-        "2 u_val; rms: the rms of the error itself, noise removed. u_val² = u_D² (measurement) + "
-        "u_num² (mesh, step) + u_input² (declared ranges, and what a filter claims of its own "
-        "error), standard uncertainties. Acceptance: E ± 2 u_val against the limit; good enough "
+        "E = simulation minus measurement. max: the point with the largest |E| + 2 u_val; rms: "
+        "the rms error, noise removed. u_val² = u_D² (measurement) + "
+        "u_num² (mesh, step) + u_input² (declared ranges, and a filter's claimed error), standard "
+        "uncertainties. Acceptance: E ± 2 u_val against the limit; good enough "
         "inside, not good enough outside, undecided where it straddles. Validation: differs where "
-        "E ± 2 u_val excludes zero. Margin: limit less |E| + 2 u_val. Fitted (the data served to "
-        "identify) and same model (the recording is the model's own) are no evidence.",
+        "E ± 2 u_val excludes zero. Margin: limit minus (|E| + 2 u_val). Fitted (data used for "
+        "identification) and same model (recording made by the model) are not evidence.",
         _HEADINGS,
         tuple(
             (m.name, *_row(c), f"{m.why(c)}. Limit: {c.requirement}.")
@@ -57,7 +61,7 @@ def checks(result: Result) -> Exhibit | None:
         below="why",
     )
     checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)
-    words = f"Checked: {checked}. Other methods are rivals, shown for discrimination."
+    words = f"Checked: {checked}. The other methods are candidates, listed for comparison."
     found = result.overall
     corrected = (
         f"The recording is: {KINDS[result.kind]}. Verdict over all: {found.word}, "
@@ -72,7 +76,7 @@ def checks(result: Result) -> Exhibit | None:
 def _as_declared(result: Result) -> Iterator[str]:
     """What the experiment declares of its verdicts, and which moved."""
     for e in result.expected:
-        yield f"Expected: {e.check} of {e.method} is {e.verdict}, for {e.why}."
+        yield f"Expected: {e.check} of {e.method} is {e.verdict}, because of {e.why}."
     yield from (f"Moved: {m.words}." for m in result.moved if result.expected)
 
 
@@ -80,14 +84,14 @@ def _inputs(result: Result) -> Iterator[NumberTable]:
     """Where the ranges behind u_input come from, and what first order leaves out of it."""
     if result.inputs:
         rows = tuple((i.name, i.range, i.source) for i in result.inputs)
-        title = "Uncertain inputs behind u_input; a range that nobody measured says so."
+        title = "Uncertain inputs of u_input; a range that was not measured is marked."
         yield NumberTable("inputs", title, ("input", "range", "source"), rows)
     if result.joint:
         yield NumberTable(
             "joint_inputs",
-            "u_input by first order, one input at a time, beside draws of all inputs at once "
-            "(Latin hypercube of uniform ranges; rms distance from what was simulated). Checks use "
-            "first order.",
+            "u_input to first order, one input at a time, and by draws of all inputs together "
+            "(Latin hypercube of uniform ranges; rms distance from the simulated value). Checks "
+            "use first order.",
             ("quantity", "unit", "first order", "sampled", "difference / %", "draws"),
             tuple(_joint(j) for j in result.joint),
         )
@@ -109,7 +113,7 @@ def _joint(found: Joint) -> tuple[TableCell | int, ...]:
 def _row(check: Check) -> tuple[TableCell | int | str, ...]:
     E = _figures(check, check.value)
     if check.count and check.value == 0 < check.raw:
-        E = (TableCell(0.0, check.unit, text="within noise"),)
+        E = (TableCell(0.0, check.unit, text="below noise"),)
     limit = TableCell(check.limit, check.unit, text="" if check.limit else "none")
     return (
         TableCell(check.name, emphasis="strong"),

@@ -29,7 +29,10 @@ def alone(
     """
     roles = [role for role in _UNITS if mapping.get(role) != NONE]
     if not roles:
-        raise UsageError("--map force=none --map displacement=none: nothing is left to be read")
+        raise UsageError(
+            "--map force=none --map displacement=none: no column is left to read; leave one of "
+            "them out"
+        )
     role = roles[0]
     said = parse_mapping({k: v for k, v in mapping.items() if v != NONE}, table)
     table = without_repeats(table, said.get("time"), mapping.get("repeated"))
@@ -57,6 +60,10 @@ def alone(
 
 
 def _taken(role: str, time: Pick, pick: Pick, sign: int) -> dict[str, str]:
-    how = "turned, as said" if sign < 0 else "as written: nothing tells what is positive"
+    how = (
+        "reversed, as given by --map"
+        if sign < 0
+        else "as written: the positive direction is not known"
+    )
     units = (f"'{p.column.label}' in {p.unit} x {p.factor:.6g}" for p in (time, pick))
-    return {"test": f"{role} alone, as said", "signs": how, "units": ", ".join(units)}
+    return {"test": f"only {role}, as given by --map", "signs": how, "units": ", ".join(units)}

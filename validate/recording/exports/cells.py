@@ -48,7 +48,7 @@ def split_lines(raw: Sequence[str]) -> Split:
     if best.score < _FEW:
         raise RecordingError(
             f"no table of numbers in {len(raw)} lines of text "
-            f"(looked for columns separated by comma, semicolon, tab, | or spaces)"
+            f"(columns separated by comma, semicolon, tab, | or spaces were searched)"
         )
     return best
 
@@ -63,7 +63,7 @@ def _cells(line: str, separator: str) -> list[str]:
     try:
         split = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
     except csv.Error as error:
-        raise RecordingError(f"no CSV text: a line of {len(line)} characters: {error}") from error
+        raise RecordingError(f"not CSV text: a line of {len(line)} characters: {error}") from error
     return [cell.strip() for cell in split]
 
 

@@ -184,7 +184,7 @@ def unnamed_column(role: str, table: Table) -> str:
     found = [c for c in table.columns if not role_of(c) and _measures(c, QUANTITY[role])]
     if not found:
         return ""
-    return f" (if '{found[0].label}' is the {role}, say --map '{role}={found[0].label}' alone)"
+    return f" (if '{found[0].label}' is the {role}, give --map '{role}={found[0].label}' alone)"
 
 
 def said_pick(role: str, table: Table, said: Said) -> Pick:
@@ -192,7 +192,7 @@ def said_pick(role: str, table: Table, said: Said) -> Pick:
     named = _named(said.column, table)
     if len(named) != 1:
         raise UsageError(
-            f"--map {role}: {len(named)} columns are called '{said.column}'; give the column's "
+            f"--map {role}: {len(named)} columns have the name '{said.column}'; give the column's "
             "number instead, as #3"
         )
     return picked(role, named[0], table, said)
@@ -225,7 +225,7 @@ def _unusable(role: str, column: Column) -> str:
         return column.problem or _without_numbers(column)
     if not column.unit:
         return f"no unit for {role}"
-    return "" if _measures(column, QUANTITY[role]) else f"'{column.unit}' is no unit of {role}"
+    return "" if _measures(column, QUANTITY[role]) else f"'{column.unit}' is not a unit of {role}"
 
 
 def _uncompared(role: str, column: Column, table: Table) -> str:
@@ -278,8 +278,8 @@ def _refuse_derived(role: str, column: Column) -> None:
     for derived in DERIVED:
         if called == derived or (called != role and _measures(column, QUANTITY[derived])):
             raise UsageError(
-                f"--map {role}={column.label}: it is a {derived}, which no unit makes a {role}; "
-                f"say --map '{derived}={column.label}' and the specimen's size, as --map "
+                f"--map {role}={column.label}: this column is a {derived}, not a {role}; give "
+                f"--map '{derived}={column.label}' and the specimen's size, as --map "
                 f"{_SIZE_OF['force' if derived == 'stress' else 'displacement']}"
             )
 
@@ -287,9 +287,9 @@ def _refuse_derived(role: str, column: Column) -> None:
 def _way_out(role: str, column: Column) -> str:
     weight = (column.unit or "").lower()
     if role == "force" and weight in ("g", "kg"):
-        return f"say --map 'force={column.label}:{weight}f'"
+        return f"give --map 'force={column.label}:{weight}f'"
     return (
-        "if columns are swapped or the unit is wrong say so with --map "
+        "if columns are swapped or the unit is wrong, give --map "
         f"'{role}={column.label}:UNIT' or another COLUMN"
     )
 

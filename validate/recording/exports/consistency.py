@@ -29,9 +29,8 @@ def check_time(pick: Pick, lines: Sequence[int]) -> None:
             at = int(np.argmax(bad)) + 1
             raise RecordingError(
                 f"line {lines[at]}: time {what}, {t[at - 1]:.6g} -> {t[at]:.6g} {pick.unit} "
-                f"({int(bad.sum())} such rows); mend the rows, say --map "
-                "repeated=last (or first) for rows of one time or, at a constant rate, "
-                "--map time=every:0.1s"
+                f"({int(bad.sum())} such rows); correct the rows; for rows of equal time give "
+                f"--map repeated=last (or first); at a constant rate give --map time=every:0.1s"
             )
 
 
@@ -48,7 +47,7 @@ def check_derived(base: Pick, derived: Pick, divisor: float, lines: Sequence[int
     slope, start = np.polyfit(expected, derived.values, 1)
     what = f"'{derived.column.label}' is {abs(slope):.4g} x '{base.column.label}' / {divisor:.6g}"
     if base.unit_is_said:
-        return f"{what} (unit given by the user, not checked)"
+        return f"{what} (unit given by --map, not checked)"
     if abs(abs(slope) - 1) > SCALE:
         raise RecordingError(
             f"{what} m{'2' if base.role == 'force' else ''}: {_cause(slope, base)}"
@@ -60,8 +59,8 @@ def check_derived(base: Pick, derived: Pick, divisor: float, lines: Sequence[int
         raise RecordingError(
             f"line {lines[at]}: '{derived.column.label}' {derived.values[at]:.6g} (SI) and "
             f"'{base.column.label}' {base.values[at]:.6g} (SI) contradict each other by "
-            f"{rest[at]:.3g}, {int((rest > limit).sum())} such rows; mend these rows or confirm "
-            f"with --map '{base.role}={base.column.label}:{base.unit}'"
+            f"{rest[at]:.3g}, {int((rest > limit).sum())} such rows; correct these rows or "
+            f"confirm with --map '{base.role}={base.column.label}:{base.unit}'"
         )
     return what
 
@@ -99,9 +98,9 @@ def check_swapped(
     backward = _backward(d) > 0.01 and _backward(f) == 0
     if (crossed and all(crossed)) or (ramp < 1e-4 and (other > 100 * ramp + 1e-3 or backward)):
         raise RecordingError(
-            f"'{force.column.label}' moves as a crosshead does and '{displacement.column.label}' "
-            f"as a load (1 - r^2 over time {ramp:.1e} and {other:.1e}): swapped columns or a "
-            f"load-controlled test; say which with --map 'force={force.column.label}', or "
+            f"'{force.column.label}' moves like a crosshead and '{displacement.column.label}' "
+            f"like a load (1 - r^2 over time {ramp:.1e} and {other:.1e}): swapped columns or a "
+            f"load-controlled test; choose with --map 'force={force.column.label}', or "
             f"--map 'force={displacement.column.label}:UNIT' and "
             f"--map 'displacement={force.column.label}:UNIT'"
         )
@@ -123,7 +122,7 @@ def _cause(slope: float, base: Pick) -> str:
     power = _power_of_ten(abs(slope))
     if power:
         return f"contradictory units (a factor of 1e{power:+d}); {fix}, or the true size"
-    return f"expected 1: sizes and columns contradict each other; mend one or {fix}"
+    return f"expected 1: sizes and columns contradict each other; correct one or {fix}"
 
 
 def _power_of_ten(ratio: float) -> int:

@@ -37,7 +37,8 @@ class FieldColumns:
         columns = ", ".join((*self.places, *self.displacements, *self.strains))
         return (
             f"{held} of {columns}: a field of displacements or strains at one instant, not the "
-            "motion of one point; export chosen points over time, a row an instant, as time (s), "
+            "motion of one point; export chosen points over time, one row per instant, as time "
+            "(s), "
             "p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
         )
 

@@ -51,12 +51,12 @@ def decode(data: bytes, said: str | None = None) -> Text:
     """
     if len(data) > MAX_BYTES:
         raise RecordingError(f"{len(data)} bytes, the limit for text tables is {MAX_BYTES}")
-    encoding, why = (_named(said), "given by the user") if said else _chosen(data)
+    encoding, why = (_named(said), "given by --map") if said else _chosen(data)
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
         raise RecordingError(
-            f"no text file: byte {error.start} of {len(data)} is not {encoding}; "
+            f"not a text file: byte {error.start} of {len(data)} is not {encoding}; "
             "export the test as CSV text, or name its encoding with --map encoding=cp1250"
         ) from error
     odd = re.search(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f\ufffe\uffff]", text)
@@ -79,7 +79,7 @@ def _named(said: str) -> str:
         return codecs.lookup(said).name
     except LookupError:
         raise UsageError(
-            f"--map encoding={said}: no such encoding; known are utf-8, utf-16, "
+            f"--map encoding={said}: unknown encoding; expected utf-8, utf-16, "
             f"{', '.join(CANDIDATES)}"
         ) from None
 
@@ -106,7 +106,7 @@ def _old(data: bytes) -> tuple[str, str]:
     lines = b"\n".join(line for line in re.split(rb"[\r\n]+", data) if not line.isascii())
     found = [r for r in (_reading(lines, name) for name in CANDIDATES) if r is not None]
     if not found:
-        return CANDIDATES[0], "no candidate fits"
+        return CANDIDATES[0], "no known encoding fits"
     best = max(found, key=lambda r: (r.hits, -r.odd))  # the first of equals
     if best.words:
         return best.encoding, f"by its words {', '.join(best.words[:4])}"

@@ -104,6 +104,7 @@ def _number(key: str, text: str, decimal: str) -> float:
         value = number(text, other)
     if value is None:
         raise RecordingError(
-            f"header: '{key}' is '{text}', no plain number; write it without thousands separators"
+            f"header: '{key}' is '{text}', not a plain number; write it without thousands "
+            f"separators"
         )
     return value

@@ -117,7 +117,7 @@ def recording_of(
     table = without_repeats(table, said.get("time"), mapping.get("repeated"))
     if len(table.lines) < MIN_SAMPLES:
         raise RecordingError(
-            f"{len(table.lines)} samples, at least {MIN_SAMPLES} are needed; export the whole test"
+            f"{len(table.lines)} samples; at least {MIN_SAMPLES} are needed; export the whole test"
         )
     specimen = specimen_of(table.header, table.decimal)
     kind = kind_of_test(mapping.get("test"), table.header, _labels(table))
@@ -187,8 +187,8 @@ def _require_apart(displacement: Pick, force: Pick, table: Table) -> None:
     other = "displacement" if force.said else "force"
     left = [c.label for c in table.columns if role_of(c) == kept and c is not force.column]
     raise UsageError(
-        f"column '{force.column.label}' would be displacement and force at once; say which is the "
-        f"other, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
+        f"column f'{force.column.label}' would be both displacement and force; name the other "
+        f"column, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
     )
 
 
@@ -200,7 +200,7 @@ def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
     what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
     asks = dict.fromkeys(ask for e in missing for ask in e.asks)
     if missing and not kind:
-        asks[f"{ASK.removeprefix('say ')}, where neither strain nor stretch says it"] = None
+        asks[f"{ASK.removeprefix('say ')}, as neither strain nor stretch shows it"] = None
     return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
 
 
@@ -292,7 +292,7 @@ def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
     """Kind of test, signs and unit factors, each with what decided."""
     kind = f"{flips.kind.name}: {flips.kind.why}" if flips.kind else "not stated"
     units = [
-        f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (said)' if p.unit_is_said else ''}"
+        f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (given)' if p.unit_is_said else ''}"
         for p in picks.values()
     ]
     return {
@@ -306,7 +306,9 @@ def _stop(header: Mapping[str, str]) -> Record:
     """Words that tell that the run was ended early; how far it got is in the rows."""
     told = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
     said = next((text for text in told if tells_a_stop(text)), None)
-    return {"run": f"aborted: the file says '{said[:60]}'; taken as far as it goes"} if said else {}
+    return (
+        {"run": f"aborted: the file says '{said[:60]}'; rows up to there are read"} if said else {}
+    )
 
 
 def _is_text(path: Path) -> bool:
@@ -321,5 +323,5 @@ INSTRON = Reader(
     "a testing machine's export, text",
     _is_text,
     read_instron,
-    "text that no other format claims",
+    "it is text of no other known format",
 )

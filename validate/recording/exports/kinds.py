@@ -16,7 +16,7 @@ from validate.recording.exports.vocabulary import (
 
 KindName = Literal["compression", "tension"]
 KINDS: dict[str, KindName] = {"compression": "compression", "tension": "tension"}
-ASK = "say --map test=compression or --map test=tension"
+ASK = "give --map test=compression or --map test=tension"
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ def kind_of_test(said: str | None, header: Mapping[str, str], labels: Iterable[s
     """
     if said is not None:
         if said not in KINDS:
-            raise UsageError(f"--map test={said}: a test is one of tension, compression")
-        return Kind(KINDS[said], "said by the user", said=True)
+            raise UsageError(f"--map test={said}: expected tension or compression")
+        return Kind(KINDS[said], "given by --map", said=True)
     lines = [
         value if key.startswith("line ") else f"{key}: {value}"
         for key, value in header.items()

@@ -47,7 +47,7 @@ def decimal_sign(cells: Iterable[tuple[int, str]]) -> str:
     if "." in shown and "," in shown:
         (a, dot), (b, comma) = shown["."], shown[","]
         raise RecordingError(
-            f"two decimal signs: '{dot}' in line {a}, '{comma}' in line {b}; export with one"
+            f"two decimal signs: '{dot}' in line {a}, '{comma}' in line {b}; export it with one"
         )
     decimal = "," if "," in shown else "."
     doubtful = shown.get("?." if decimal == "," else "?,")

@@ -25,7 +25,7 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
     while size := _repeated(rows[start:]):
         start += size
     if start:
-        note = f"{start} first rows, from line {table.lines[0]} on, are written twice: used once"
+        note = f"{start} first rows, from line {table.lines[0]} on, occur twice: they are read once"
         table, times = table.take(range(start, len(rows)), note), times[start:]
     return table if keep is None else _one_per_time(table, times, keep)
 
@@ -49,5 +49,7 @@ def _one_per_time(table: Table, times: Sequence[float | None], keep: str) -> Tab
         kept = [i for i in range(count) if i == 0 or times[i] != times[i - 1]]
     else:
         kept = [i for i in range(count) if i == count - 1 or times[i] != times[i + 1]]
-    note = f"{count - len(kept)} rows left out: the {keep} row of each time is used, as said"
+    note = (
+        f"{count - len(kept)} rows left out: the {keep} row of each time is read, as given by --map"
+    )
     return table.take(kept, note)

@@ -31,8 +31,8 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     rows, footer = _rows(lines, count)
     if not rows:
         raise RecordingError(
-            f"line {names[0]} names {count} columns, and no row of samples is below it; export the "
-            "samples too"
+            f"line {names[0]} names {count} columns, but no row of samples follows; export the "
+            f"samples too"
         )
     notes = []
     beside = _beside(rows, count)
@@ -72,8 +72,8 @@ def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
 def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
     """Raises `RecordingError` for words that stand amid samples."""
     raise RecordingError(
-        f"line {line}: text '{' '.join(words).strip()[:60]}' amid the rows; "
-        "export one test per file and mend this line"
+        f"line {line}: text '{' '.join(words).strip()[:60]}' between the rows; export one test "
+        f"per file and correct this line"
     )
 
 
@@ -99,8 +99,8 @@ def refuse_emptied(emptied: Sequence[int], rows: Sequence[Line]) -> None:
     amid = [line for line in emptied if rows[0][0] < line < rows[-1][0]]
     if amid:
         raise RecordingError(
-            f"line {amid[0]}: a row with all cells empty amid the rows ({len(amid)} such rows); "
-            "mend or remove it"
+            f"line {amid[0]}: an empty row between the rows ({len(amid)} such rows); fill or "
+            f"remove it"
         )
 
 
@@ -109,6 +109,6 @@ def refuse_cut(rows: Sequence[Line]) -> None:
     ends = [decimals(next((c for c in row[::-1] if c), "")) for _, row in rows]
     if len(ends) > 2 and ends[-1] < min(ends[:-1]) == max(ends[:-1]):
         raise RecordingError(
-            f"line {rows[-1][0]}: the file is cut, its last number '{rows[-1][1][-1]}' has "
+            f"line {rows[-1][0]}: the file is truncated: its last number '{rows[-1][1][-1]}' has "
             f"{ends[-1]} digits after the sign, all others {ends[0]}; remove the row or copy again"
         )

@@ -41,7 +41,7 @@ def signs(
     kind = kind or _by_strain(d, f, strain, stress)
     if kind is None:
         raise UsageError(
-            f"nothing says whether this test presses or pulls: '{displacement.column.label}' goes "
+            f"the file does not tell compression from tension: '{displacement.column.label}' goes "
             f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}{_of_neither(displacement, force)}"
         )
     if kind.name == "tension" and not kind.said and d + f < 0 and d * f >= 0:
@@ -58,8 +58,8 @@ def _of_neither(displacement: Pick, force: Pick) -> str:
     text = f"{displacement.column.label} {force.column.label}"
     if not _NEITHER.search(text):
         return ""
-    return ("; a bent or an indented body is neither: say compression where the tool moves into it "
-            "and, in validate new, experiment = body")  # fmt: skip
+    return ("; a bent or an indented body is neither: give compression if the tool moves into it "
+            "and answer experiment = body in `validate new`")  # fmt: skip
 
 
 def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None) -> Signs:
@@ -69,9 +69,11 @@ def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None)
     flip_f = said_f or _matching(f, d * flip_d)
     given = _NAMES.get(flip_d * d or flip_f * f)
     if kind and kind.said and given and given != kind.name:
-        raise UsageError(f"--map test={kind.name}: the signs given beside it make it {given}")
-    shown = Kind(given, "the sign given by the user makes it so") if given else kind
-    return Signs(flip_d, flip_f, "sign given by the user", shown)
+        raise UsageError(
+            f"--map test={kind.name}: the signs of the other --map options mean {given}"
+        )
+    shown = Kind(given, "follows from the sign given by --map") if given else kind
+    return Signs(flip_d, flip_f, "sign given by --map", shown)
 
 
 def _reason(d: int, f: int, kind: Kind) -> str:

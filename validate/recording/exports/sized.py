@@ -37,7 +37,7 @@ from validate.units import si_factor, split
 
 MEASURES = ("engineering", "true")
 _FROM = {"displacement": ("strain", "stretch"), "force": ("stress",)}
-_LENGTH = "the length that strain is measured on, as --map length=20mm"
+_LENGTH = "the gauge length of the strain, as --map length=20mm"
 _AREA = "the specimen's loaded area, as --map area=314mm2"
 _LONGEST = 20.0  # no rubber is stretched so far: per cent that are called numbers
 
@@ -77,7 +77,7 @@ def sizes_of(mapping: Mapping[str, str], specimen: Mapping[str, float], kind: Ki
         "length": specimen.get("height_m") if pressed else None,
     }
     found = {k: said.get(k, told[k]) for k in told}
-    words = {k: "said" if k in said else "of the header" for k in told}
+    words = {k: "said" if k in said else "from the header" for k in told}
     return Sizes(found["area"], found["length"], measure, words)
 
 
@@ -156,14 +156,16 @@ def require_left(sized: Sized, closing: Floats, length: float) -> None:
         label = sized.pick.column.label
         raise RecordingError(
             f"'{label}' presses the specimen by {100 * most:.4g} % of its length; if it is in per "
-            f"cent say --map 'strain={label}:%', if it is a true strain --map measure=true"
+            f"cent, give --map 'strain={label}:%', if it is a true strain --map measure=true"
         )
 
 
 def _source(role: str, table: Table, said: Mapping[str, Said]) -> Pick:
     if role in said:
         if said[role].sign is not None:
-            raise UsageError(f"--map {role}: no sign; say --map test=compression or test=tension")
+            raise UsageError(
+                f"--map {role}: no sign is allowed; give --map test=compression or test=tension"
+            )
         return said_pick(role, table, said[role])
     found = _candidates(role, table)
     engineering = [c for c in found if holds(c.name, ENGINEERING)]
@@ -171,7 +173,7 @@ def _source(role: str, table: Table, said: Mapping[str, Said]) -> Pick:
     if len(found) != 1:
         labels = ", ".join(repr(c.label) for c in found) or "none"
         raise MissingColumnError(
-            f"{len(found)} columns may be {role}: {labels}; --map {role}=COLUMN"
+            f"{len(found)} columns may be {role}: {labels}; choose with --map {role}=COLUMN"
         )
     column = found[0]
     if role == "stretch" and not column.unit:
@@ -198,9 +200,10 @@ def _measure(pick: Pick, sizes: Sizes) -> tuple[str, list[str]]:
     by_name = "true" if holds(name, TRUE) else "engineering" if holds(name, ENGINEERING) else None
     if by_name and sizes.measure not in (None, by_name):
         raise UsageError(
-            f"--map measure={sizes.measure}: '{pick.column.label}' says {by_name} itself; leave it"
+            f"--map measure={sizes.measure}: '{pick.column.label}' names {by_name} itself; leave "
+            f"the option out"
         )
-    ask = "whether stress and strain are those of the undeformed body, as --map measure=engineering"
+    ask = "whether stress and strain refer to the undeformed body, as --map measure=engineering"
     found = by_name or sizes.measure
     return found or "", [] if found else [f"{ask}, or measure=true"]
 
@@ -210,7 +213,7 @@ def _stretch(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | 
     if not ({"strain", "stretch"} & set(said) or _strained(table)):
         moved = needed_pick("displacement", table, said.get("displacement"))
         if sizes.length is None:
-            raise MissingColumnError("true stress, and the area that is left", (_LENGTH,))
+            raise MissingColumnError("true stress and the current area", (_LENGTH,))
         return 1 + _signed((moved.values - moved.values[0]) / sizes.length, kind, moved)
     source = _elongation(table, said)
     shown = _shown_by_stretch(source) if source.role == "stretch" else None
@@ -230,7 +233,7 @@ def _relative(source: Pick, measure: str, kind: Kind | None) -> Floats:
             raise RecordingError(
                 f"'{source.column.label}' from {source.values.min():.4g} to "
                 f"{source.values.max():.4g}: a stretch is 1 at rest and above 0; if it is a "
-                f"strain say --map 'strain={source.column.label}:%' (or :1)"
+                f"strain, give --map 'strain={source.column.label}:%' (or :1)"
             )
         return source.values - 1
     if measure == "true":
@@ -243,8 +246,8 @@ def _signed(x: Floats, kind: Kind | None, source: Pick) -> Floats:
     way = excursion(x)
     if kind is None and way >= 0:
         raise MissingColumnError(
-            f"'{source.column.label}' does not say whether the specimen is pressed or pulled, "
-            "which a true measure needs"
+            f"'{source.column.label}' does not show whether the specimen is pressed or pulled; a "
+            f"true measure needs it"
         )
     longer = kind is not None and kind.name == "tension"
     return x * (way or 1) if longer else -x * (way or 1)
@@ -264,8 +267,8 @@ def _shown_by_stretch(source: Pick) -> Kind | None:
 def _refuse_other(kind: Kind | None, shown: Kind | None, source: Pick) -> None:
     if kind and shown and kind.name != shown.name:
         raise RecordingError(
-            f"a {kind.name} test ({kind.why}), but {shown.why}; say --map test={shown.name}, or "
-            f"if it is no stretch --map 'strain={source.column.label}:%' (or :1)"
+            f"a {kind.name} test ({kind.why}), but {shown.why}; give --map test={shown.name}, or "
+            f"if it is not a stretch, --map 'strain={source.column.label}:%' (or :1)"
         )
 
 

@@ -52,7 +52,7 @@ def chosen(found: Mapping[str, Table], said: str | None) -> tuple[str, Table]:
     by_number = dict(zip(map(str, range(1, len(found) + 1)), found, strict=True))
     label = said if said in found else by_number.get(said)
     if label is None:
-        raise UsageError(f"--map specimen={said}: no such specimen; {_listed(found)}")
+        raise UsageError(f"--map specimen={said}: unknown specimen; {_listed(found)}")
     return label, found[label]
 
 

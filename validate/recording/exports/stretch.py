@@ -39,7 +39,7 @@ def read_stretch_stress(path: Path, unit: str | None = None) -> Recording:
     try:
         tables = parse_tables(data)
         if len(tables) != 1:
-            raise RecordingError(f"{len(tables)} tables; one curve a file")
+            raise RecordingError(f"{len(tables)} tables; export one curve per file")
         curve, said = _curve(tables[0], unit)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
@@ -80,7 +80,7 @@ def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
     stress = np.stack([table.numbers(c) for c in stresses], axis=1) * si_factor(said, "stress")
     stretch = np.stack([table.numbers(c) for c in stretches], axis=1)
     _require_sense(stretch, stress, table.lines)
-    return Curve(stretch, stress), said if unit else f"{said}, of the header"
+    return Curve(stretch, stress), said if unit else f"{said}, from the header"
 
 
 def _named(table: Table, word: str) -> list[Column]:

@@ -79,7 +79,8 @@ class Table:
         if bad:
             raise RecordingError(
                 f"line {self.lines[bad[0]]}, column '{column.label}': '{column.cells[bad[0]]}' is "
-                f"not a number ({len(bad)} such cells of {len(values)}); mend or remove these rows"
+                f"not a number ({len(bad)} such cells of {len(values)}); correct or remove these "
+                f"rows"
             )
         return checked(np.array(values, dtype=float), column.label, (None,), error=RecordingError)
 

@@ -117,7 +117,7 @@ def _tests(sheets: list[_Sheet], said: str | None) -> list[_Sheet]:
     if said is not None:
         named = [s for s in sheets if s.name == said]
         if not named:
-            raise UsageError(f"--map sheet={said}: no such sheet; the workbook has {names}")
+            raise UsageError(f"--map sheet={said}: unknown sheet; the workbook has {names}")
         if not named[0].tables:
             raise RecordingError(f"sheet '{said}': {named[0].why}")
         return named
@@ -175,7 +175,7 @@ XLSX = Reader(
     "a testing machine's export, workbook",
     _is_workbook,
     read_xlsx,
-    "it is an archive that holds a workbook",
+    "it is an archive with a workbook",
 )
 
 SHEETS = Reader(
@@ -183,5 +183,5 @@ SHEETS = Reader(
     "a testing machine's export, workbook of old Excel (.xls) or OpenDocument (.ods)",
     _is_other_workbook,
     read_sheets,
-    "it is a container or archive that holds a workbook",
+    "it is a container or archive with a workbook",
 )

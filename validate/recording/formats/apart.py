@@ -63,7 +63,8 @@ def decoded(
         if done.returncode or not out.is_file():
             how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
             raise RecordingError(
-                f"{path.name}: its reader ended with {how}: damaged, or not what its name says"
+                f"{path.name}: its reader ended with {how}: the file is damaged, or not of the "
+                f"type that its name claims"
             )
         with np.load(out, allow_pickle=False) as found:
             return {name.removeprefix(_OURS): found[name] for name in found.files}
@@ -81,7 +82,7 @@ def _allowed(path: Path, least: int) -> float:
 
 def _late(seconds: float, path: Path) -> str:
     size = _bytes(path)
-    return f"its reader took over {seconds:.0f} s for {size} bytes and was ended; damaged?"
+    return f"its reader was stopped after {seconds:.0f} s for {size} bytes; the file may be damaged"
 
 
 def _ended(
@@ -125,7 +126,9 @@ def _decode(decoder: str, path: Path, out: Path, limits: str, given: str) -> int
         print(f"the library '{missing.name}' that reads this format is not installed")
         return _MISSING
     except MemoryError:
-        print(f"its reader wants more than {limit / 2**20:.0f} MB: damaged, or too large")
+        print(
+            f"its reader needs more than {limit / 2**20:.0f} MB: the file is damaged or too large"
+        )
         return _SAID
     except ValidateError as error:
         print(error)

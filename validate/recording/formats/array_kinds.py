@@ -76,5 +76,5 @@ def _volume(path: str, found: Arrays) -> str:
     three = [n for n, a in found.items() if a.size == 3 and _SPACING.fullmatch(_leaf(n))]
     if not three and not _VOLUME.fullmatch(_leaf(path)):
         return ""
-    by = f"{three[0]} has three numbers" if three else "it is called so"
+    by = f"{three[0]} has three numbers" if three else "its name says so"
     return f"a volume ({by}), not images over time; images are read as uint8 (h, w, nt)"

@@ -45,10 +45,10 @@ def read_c3d(path: Path, options: Options) -> Recording:
     found = decoded("c3d_arrays", path)
     rate = float(found["rates"][0])
     if not (np.isfinite(rate) and rate > 0):
-        raise RecordingError(f"{path.name}: {rate:g} frames a second stated; expected above 0")
+        raise RecordingError(f"{path.name}: {rate:g} frames per second declared; expected above 0")
     streams, told, never = _streams(path, found, rate, options)
     if not streams:
-        raise RecordingError(f"{path.name}: neither points that were seen nor channels: {never}")
+        raise RecordingError(f"{path.name}: neither visible points nor channels: {never}")
     source = source_of(path, "C3D keeps no checksum: integrity not provable")
     return recorded(path.stem, source, streams, told, never)
 
@@ -85,20 +85,22 @@ def _require_whole(path: Path) -> None:
     if not path.is_file():
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
     if len(first) < BLOCK or first[1] != _KEY:
-        raise RecordingError(f"{path.name}: no C3D file, or one cut in its first {BLOCK} bytes")
+        raise RecordingError(
+            f"{path.name}: not a C3D file, or truncated in its first {BLOCK} bytes"
+        )
     lies = layout(path, first)
     size = path.stat().st_size
     if lies.start < 2 or size < lies.needs:
         raise RecordingError(
-            f"{path.name}: {size} bytes, its header tells of {lies.frames} frames of "
-            f"{lies.points} points and {lies.analog} analog numbers: {lies.needs} bytes; cut or "
-            "damaged"
+            f"{path.name}: {size} bytes, but its header declares {lies.frames} frames of "
+            f"{lies.points} points and {lies.analog} analog numbers: {lies.needs} bytes; "
+            f"truncated or damaged"
         )
     _require_parameters(path, head(path, lies.at(0)), BLOCK * max(first[0] - 1, 1))
 
 
 def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
-    """No parameter tells of more values than the file has bytes left: ezc3d takes memory for them
+    """No parameter declares more values than the file has bytes left: ezc3d takes memory for them
     before it reads, for seconds."""
     size = path.stat().st_size
     for group, name, at in records(raw, begin):
@@ -107,7 +109,7 @@ def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
         if told > size - at:
             word = name.decode("ascii", "replace")
             raise RecordingError(
-                f"{path.name}: its parameter {word!r} tells of {told:.3g} values, {size - at} "
+                f"{path.name}: its parameter {word!r} declares {told:.3g} values, but {size - at} "
                 "bytes are left: damaged"
             )
 
@@ -121,7 +123,8 @@ def _trial(found: Held) -> Record:
     }
     if left > BLOCK:
         told[LEFT_OUT] = (
-            f"{left} bytes after frame {MOST}: its header counts no further, no parameter does"
+            f"{left} bytes after frame {MOST}: its header cannot count further, and no parameter "
+            f"does"
         )
     return told
 
@@ -131,7 +134,11 @@ def _events(found: Held) -> dict[str, str]:
     times = 60 * found["event_times"][0] + found["event_times"][1]
     names = distinct(found["events"].tolist(), len(times))
     told = "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True))
-    return {"events": f"{told} (of the trial; told, no stream)"} if told else {}
+    return (
+        {"events": f"{told} (events of the trial, listed but not stored as a stream)"}
+        if told
+        else {}
+    )
 
 
 def _recognises(path: Path) -> bool:
@@ -146,5 +153,5 @@ C3D = Reader(
     "motion capture (C3D)",
     _recognises,
     read_c3d,
-    "its second byte is 80 and its first block is no text",
+    "its second byte is 80 and its first block is not text",
 )

@@ -40,7 +40,7 @@ def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
     frames = _count(parameters) if lies.frames == MOST else 0
     size = path.stat().st_size
     if size < lies.at(frames):
-        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: cut")
+        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
     rest = parts_beyond(path, frames, part)
     held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
     header = found["header"]

@@ -76,7 +76,9 @@ def analog_of(found: Held, rate: float, frame: str) -> Found:
     for i, name in enumerate(distinct(found["channels"].tolist(), values.shape[1])):
         odd = int((~np.isfinite(values[:, i])).sum())
         if not len(t) or odd:
-            never[f"analog/{name}"] = f"{odd} numbers are none" if odd else "no rate is stated"
+            never[f"analog/{name}"] = (
+                f"{odd} values are not numbers" if odd else "no rate is stated"
+            )
         else:
             unit = units[i] or NOT_STATED
             streams[f"analog/{name}"] = Signal(t, values[:, [i]], unit, 0.0, frame)

@@ -48,13 +48,13 @@ def read_device_set(path: Path) -> DeviceSet:
     text = head(path, _BYTES + 1)
     if not text or len(text) > _BYTES or b"<!" in text.replace(b"<!--", b""):
         raise RecordingError(
-            f"{path}: {len(text)} bytes; a configuration of PLUS is XML of 1 to {_BYTES} bytes "
-            "without declarations of its own"
+            f"{path}: {len(text)} bytes; expected a PLUS configuration: XML of 1 to {_BYTES} "
+            f"bytes without DTD declarations"
         )
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise RecordingError(f"{path.name}: no XML, or damaged ({error})") from None
+        raise RecordingError(f"{path.name}: not XML, or damaged ({error})") from None
     transforms = {
         (node.get("From", ""), node.get("To", "")): _declared(path, node)
         for node in root.iter("Transform")

@@ -36,7 +36,7 @@ def read_dicom(path: Path, options: Options) -> Recording:
     """
     require_known(options, _OPTIONS)
     if not (path.is_dir() or is_dicom(path)):
-        raise RecordingError(f"{path.name}: no DICOM file, or one cut in its first 132 bytes")
+        raise RecordingError(f"{path.name}: not a DICOM file, or truncated in its first 132 bytes")
     found = decoded("dicom_arrays", path, None, _SECONDS, "dicom")
     images, levels = shallow(list(found["images"]), options)
     height, width = images[0].shape
@@ -65,7 +65,7 @@ def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
         return np.arange(count) / above_zero(options, "rate")
     if len(found["t"]) != count:
         raise UsageError(
-            f"{path.name}: {count} images without times; say --map rate=HZ (a volume is not read)"
+            f"{path.name}: {count} images without times; give --map rate=HZ (a volume is not read)"
         )
     return np.asarray(np.rint(1e9 * found["t"]) / 1e9)
 
@@ -82,25 +82,25 @@ def _regions(
     whole = (0, 0, width, height)
     if "m_per_px" in options:
         side = length(options, "m_per_px", "0.1mm")
-        return [(whole, (side, side))], f"{options['m_per_px']} a pixel (entered)"
+        return [(whole, (side, side))], f"{options['m_per_px']} per pixel (entered)"
     planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
               and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
     if not planes:
         x, y = _spacing(path, found["spacing"])
-        return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm a pixel (PixelSpacing)"
+        return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm per pixel (PixelSpacing)"
     boxes = [
         (_box(path, r, width, height), (float(r[4]), float(r[5])))
         for r in sorted(planes, key=lambda r: (float(r[0]), float(r[1])))
     ]
     sides = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in boxes)
-    return boxes, f"{sides} mm a pixel (SequenceOfUltrasoundRegions)"
+    return boxes, f"{sides} mm per pixel (SequenceOfUltrasoundRegions)"
 
 
 def _spacing(path: Path, spacing: Floats) -> tuple[float, float]:
     if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
         raise UsageError(
-            f"{path.name}: states no scale, neither regions in cm nor a spacing; say "
-            "--map m_per_px=0.1mm"
+            f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
+            f"m_per_px=0.1mm"
         )
     return 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
 
@@ -110,7 +110,7 @@ def _box(path: Path, region: Floats, width: int, height: int) -> _Box:
     if right > width or bottom > height:
         raise UsageError(
             f"{path.name}: its region ends at pixel {right}, {bottom} of an image of {width} x "
-            f"{height}: it was resized after its scale was written; say --map m_per_px=0.1mm"
+            f"{height}: it was resized after its scale was written; give --map m_per_px=0.1mm"
         )
     if left < 0 or top < 0 or right <= left or bottom <= top:
         raise RecordingError(
@@ -124,5 +124,5 @@ DICOM = Reader(
     "ultrasound and other images (DICOM)",
     begins_as_dicom,
     read_dicom,
-    "DICM stands at byte 128, in a folder of its first file",
+    "byte 128 of the file, or of a folder's first file, begins DICM",
 )

@@ -80,7 +80,8 @@ def _series(folder: Path) -> list[pydicom.Dataset]:
     series = Counter(str(ds.get("SeriesInstanceUID")) for ds in sets)
     if len(series) > 1:
         raise RecordingError(
-            f"{len(series)} series in one folder, of {sorted(series.values())} files; a folder each"
+            f"{len(series)} series in one folder, of {sorted(series.values())} files; put each "
+            f"into a separate folder"
         )
     many = sum(int(ds.get("NumberOfFrames") or 1) > 1 for ds in sets)
     if many and len(sets) > 1:
@@ -105,10 +106,11 @@ def _require_no_volume(ds: pydicom.Dataset) -> None:
               for p in f.get("PlanePositionSequence", ())}  # fmt: skip
     distance = float(ds.get("SpacingBetweenSlices") or 0)
     why = {
-        "counted by their distance": ds.get("FrameIncrementPointer") in _BY_PLACE,
+        "spaced by distance": ds.get("FrameIncrementPointer") in _BY_PLACE,
         "organised in 3D": ds.get("DimensionOrganizationType") == "3D",
         f"of {len(places)} places": len(places) > 1,
-        f"{distance:g} mm apart, without times": distance > 0 and not len(_times(ds, count)[0]),
+        f"{distance:g} mm between slices, without times": distance > 0
+        and not len(_times(ds, count)[0]),
     }
     found = next((text for text, holds in why.items() if holds), "")
     if count > 1 and found:
@@ -174,12 +176,12 @@ def _images(sets: list[pydicom.Dataset]) -> NDArray[Any]:
     made = 0
     for made, image in enumerate((_grey(ds, i) for ds in sets for i in _frames(ds)), start=1):
         if made > count:
-            raise RecordingError(f"more images than the {count} that its header tells of; damaged")
+            raise RecordingError(f"more images than the {count} that its header declares; damaged")
         if made == 1:
             out = out.astype(image.dtype)
         out[made - 1] = image
     if made != count:
-        raise RecordingError(f"{made} of {count} images can be read: cut or damaged")
+        raise RecordingError(f"{made} of {count} images can be read: truncated or damaged")
     return out
 
 
@@ -196,7 +198,7 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
             raise UsageError(
-                f"its pixels are in '{name}', which no permissively licensed library here decodes; "
+                f"its pixels are in '{name}', which no permissively licensed library decodes; "
                 f"{_unpacked_by(name)}"
             ) from None
         raise
@@ -214,8 +216,8 @@ def _codec(ds: pydicom.Dataset) -> str:
 def _unpacked_by(name: str) -> str:
     """What a user can do about pixels in a transfer syntax of that name."""
     if "MPEG" in name or "HEVC" in name:
-        return "they are a video: take it out, as by `gdcmraw -i x.dcm -o x.mp4`, and import that"
-    return "make it uncompressed first, as by `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
+        return "they are a video: extract it, as with `gdcmraw -i x.dcm -o x.mp4`, and import that"
+    return "decompress it first, as with `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
 
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:

@@ -32,7 +32,7 @@ def files_of(folder: Path) -> list[Path]:
     files = [member(f) for f in members(folder) if _may_be(f)]
     others = [f.name for f in files if not is_dicom(f)]
     if others:
-        said = f"{len(others)} of {len(files)} files are no DICOM ({', '.join(others[:3])})"
+        said = f"{len(others)} of {len(files)} files are not DICOM ({', '.join(others[:3])})"
         raise RecordingError(f"{said}; take them out")
     if len(files) > _MOST:
         raise RecordingError(f"{len(files)} files, the limit is {_MOST}; split the folder")

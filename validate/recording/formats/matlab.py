@@ -71,7 +71,9 @@ def _named(
 ) -> tuple[dict[str, Stream], set[str], dict[str, str]]:
     """The streams that the user names, the paths of their arrays, and what is to be told."""
     if "unit" in options:
-        raise UsageError("--map unit=...: each named array says its own, as --map tip=x.tip:mm")
+        raise UsageError(
+            "--map unit=...: give the unit with each named array, as --map tip=x.tip:mm"
+        )
     streams: dict[str, Stream] = {}
     notes: dict[str, str] = {}
     said = {key: named_array(key, text, found) for key, text in asked.items()}
@@ -114,7 +116,7 @@ def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Str
             f"numbers; it holds {listing(found) or 'nothing'}"
         )
     raise UsageError(
-        f"{path.name}: no array shows what it is; name what is meant, as --map force=PATH:N "
+        f"{path.name}: no array's role is clear; name the arrays, as --map force=PATH:N "
         f"--map rate=100 or --map time=PATH:s; it holds {listing(found)}"
     )
 
@@ -185,8 +187,8 @@ def _frames(what: str, values: Variable, options: Options) -> Frames:
     images = tuple(np.moveaxis(np.atleast_3d(values), -1, 0))
     if len(images) > 1 and "rate" not in options:
         raise UsageError(
-            f"{what} states no times; if the last of its axes is time (a volume is not read), say "
-            "--map rate=10"
+            f"{what} has no times; if its last axis is time (a volume is not read), give --map "
+            f"rate=10"
         )
     t = np.arange(len(images)) / (above_zero(options, "rate") if len(images) > 1 else 1.0)
     return Frames(t, images, (side, side), np.eye(4), options.get("frame", "matlab"))
@@ -194,7 +196,7 @@ def _frames(what: str, values: Variable, options: Options) -> Frames:
 
 def _said(what: str, key: str, example: str, options: Options, lacks: str) -> None:
     if key not in options:
-        raise UsageError(f"{what} states no {lacks}; say it: --map {key}={example}")
+        raise UsageError(f"{what} has no {lacks}; give it, as --map {key}={example}")
 
 
 MATLAB = Reader(

@@ -32,14 +32,14 @@ def elements(path: Path) -> list[tuple[int, int, int]]:
         first = file.read(HEADER)
         order = _ORDERS.get(first[-2:])
         if len(first) < HEADER or not first.startswith(MAGIC) or order is None:
-            raise RecordingError(f"no MATLAB 5 file, or one cut in its first {HEADER} bytes")
+            raise RecordingError(f"not a MATLAB 5 file, or truncated in its first {HEADER} bytes")
         while at < size:
             file.seek(at)
             tag = file.read(8)
             kind, count = struct.unpack(f"{order}II", tag) if len(tag) == 8 else (MATRIX, 0)
             at += 8 + count
             if at > size or len(tag) < 8:
-                raise RecordingError(f"{size} bytes, its variables need {at} and more; cut")
+                raise RecordingError(f"{size} bytes, its variables need {at} and more; truncated")
             if kind not in (MATRIX, COMPRESSED):
                 raise RecordingError(f"no variable {8 + count} bytes before byte {at}; damaged")
             found.append((kind, at - count, count))

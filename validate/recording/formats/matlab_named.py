@@ -63,7 +63,7 @@ def named_array(key: str, text: str, found: Arrays) -> NamedArray:
     unit = more[0] if more else ""
     if not unit:
         example = "s" if key == "time" else "N"
-        raise UsageError(f"{path} states no unit; say it: --map {key}={path}:{example}")
+        raise UsageError(f"{path} has no unit; give it, as --map {key}={path}:{example}")
     if len(more) > 2 or more[1:] not in ([], ["-"]):
         raise UsageError(f"--map {key}={text}: expected PATH:UNIT or PATH:UNIT:-")
     if key == "time" and more[1:]:
@@ -151,9 +151,9 @@ def _fits(order: str, shape: tuple[int, ...], nt: int | None) -> bool:
 
 
 def _misfit(key: str, shape: tuple[int, ...], nt: int | None) -> str:
-    times = "no times are named" if nt is None else f"{nt} times"
+    times = "no times are given" if nt is None else f"{nt} times"
     return (
-        f"an array of {shape} and {times} leave open which axis is which; say --map time=PATH:s, "
+        f"an array of {shape} and {times} do not show which axis is which; give --map time=PATH:s, "
         f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, r those and a residual, "
         "c channels; one letter an axis)"
     )
@@ -179,5 +179,5 @@ def _times(key: str, count: int, t: Floats | None, options: Options) -> Floats:
             raise UsageError(f"{key}: {count} samples, the time of --map time= has {len(t)}")
         return t
     if "rate" not in options:
-        raise UsageError(f"{key} states no times; say them: --map time=PATH:s or --map rate=100")
+        raise UsageError(f"{key} has no times; give --map time=PATH:s or --map rate=100")
     return np.arange(count) / above_zero(options, "rate")

@@ -61,8 +61,8 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
     last = re.search(rf"\n{_LAST}[ \t]*=[^\n]*\n".encode(), text)
     if last is None:
         raise RecordingError(
-            f"{path.name}: no MetaImage, or its header does not end with '{_LAST} = ...' within "
-            f"{min(len(text), _HEADER)} bytes: cut or damaged"
+            f"{path.name}: not a MetaImage, or its header does not end with '{_LAST} = ...' within "
+            f"{min(len(text), _HEADER)} bytes: truncated or damaged"
         )
     lines = text[: last.end()].decode("utf-8", "replace").splitlines()
     pairs = (line.partition("=") for line in lines)
@@ -114,7 +114,8 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
     local = name.upper() == "LOCAL"
     if not local and (name.upper().startswith("LIST") or "%" in name):
         raise RecordingError(
-            f"{path.name}: its pixels lie in '{name[:60]}'; one file beside it is read"
+            f"{path.name}: its pixels lie in '{name[:60]}'; only one file in the same folder is "
+            f"read"
         )
     try:
         with open_file(path if local else inside(path.parent, name), ANY_SIZE) as stream:
@@ -137,7 +138,8 @@ def _unpacked(path: Path, fields: dict[str, str], packed: bytes, size: int) -> b
         whole = len(data) == size and unpacker.eof
     if not whole:
         raise RecordingError(
-            f"{path.name}: {len(data)} bytes of pixels, its header needs {size}: cut or damaged"
+            f"{path.name}: {len(data)} bytes of pixels, its header needs {size}: truncated or "
+            f"damaged"
         )
     return data
 
@@ -150,7 +152,7 @@ def _spacing(path: Path, fields: dict[str, str]) -> tuple[float, float]:
     except (ValueError, IndexError):
         x = y = 0.0
     if not (0 < x < np.inf and 0 < y < np.inf):
-        raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(text)[:60]}' is no size")
+        raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(text)[:60]}' is not a size")
     return x, y
 
 
@@ -158,7 +160,7 @@ def _whole(path: Path, fields: dict[str, str], key: str) -> list[int]:
     try:
         return [int(word) for word in fields.get(key, "").split()]
     except ValueError:
-        raise RecordingError(f"{path.name}: {key} '{fields[key][:60]}': no numbers") from None
+        raise RecordingError(f"{path.name}: {key} '{fields[key][:60]}': not numbers") from None
 
 
 def _recognises(path: Path) -> bool:

@@ -69,8 +69,8 @@ def read_ndi(path: Path, options: Options) -> Recording:
     t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
     stated = tools[0].unit or above.get("units", "")
     if not stated and "unit" not in options and header.cell(0).startswith("#"):
-        raise UsageError(f"{path.name}: states no unit of length; say it: --map unit=m, as "
-                         "trajectories of TUM have it, or unit=mm")  # fmt: skip
+        raise UsageError(f"{path.name}: has no unit of length; give --map unit=m (as in TUM "
+                         f"trajectories) or unit=mm")  # fmt: skip
     factor = length({"unit": stated or "mm", **options}, "unit", "mm")
     frame = options.get("frame", "tracker")
     streams: dict[str, Stream] = {}
@@ -86,10 +86,16 @@ def read_ndi(path: Path, options: Options) -> Recording:
             streams |= pose_signals(name, t[own][seen], R, factor * pose[seen, :3], frame)
     if not streams:
         states = sorted({row.cell(t.state) for row in rows for t in tools if t.state is not None})
-        which = f"; of the states {states[:6]} say which is seen: --map ok=..." if states else ""
-        raise RecordingError(f"{path.name}: no tool was seen: {told}{which}")
+        which = (
+            f"; name the state that means visible, of {states[:6]}: --map ok=..." if states else ""
+        )
+        raise RecordingError(f"{path.name}: no tool is visible: {told}{which}")
     said = options.get("unit", stated)
-    unit = {"unit": said} if said else {ASSUMED: "lengths in mm, as NDI writes; else --map unit=m"}
+    unit = (
+        {"unit": said}
+        if said
+        else {ASSUMED: "lengths in mm, as NDI writes; if not, give --map unit=m"}
+    )
     return _recording(path, streams, told, {**unit, **told_left(left)})
 
 
@@ -182,15 +188,15 @@ def _times(
     if "rate" in options:
         count = Counter(whose)
         if len(set(count.values())) > 1:
-            raise RecordingError(f"{held.name}: tools of {dict(count)} lines: no rate tells their "
-                                 "times; export a column of time")  # fmt: skip
+            raise RecordingError(f"{held.name}: tools of {dict(count)} lines: their times are not "
+                                 f"known; export a column of time")  # fmt: skip
         names = np.array(whose)
         nth = np.empty(len(values))
         for name in count:
             nth[names == name] = np.arange(count[name])
         return nth / above_zero(options, "rate")
     if not factors:
-        raise UsageError(f"{held.name}: no column is a time; say --map rate=HZ")
+        raise UsageError(f"{held.name}: no column is a time; give --map rate=HZ")
     t = values @ np.array(factors)
     if np.isnan(t).any():
         raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; damaged")

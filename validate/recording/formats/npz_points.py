@@ -55,7 +55,9 @@ def read_points(path: Path, unit: str | None = None) -> Recording:
         source_of(path, "verified (CRC-32)"),
         0,
         markers={"points": markers},
-        metadata={"provenance": {"file": path.name, "unit": unit or f"{_said(path)}, of the name"}},
+        metadata={
+            "provenance": {"file": path.name, "unit": unit or f"{_said(path)}, from the file name"}
+        },
         unread={k: f"{a.shape} {a.dtype}" for k, a in arrays.items() if k != "points"},
     )
 
@@ -89,5 +91,5 @@ def _array(
 def _said(path: Path) -> str:
     found = _UNIT.fullmatch(path.stem)
     if not found or found[1] == "px":
-        raise UsageError(f"{path.name} does not say its unit; give it with --set unit=mm")
+        raise UsageError(f"{path.name} has no unit; give it with --set unit=mm")
     return found[1]

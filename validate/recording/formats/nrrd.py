@@ -24,7 +24,7 @@ def read_nrrd(path: Path, options: Options) -> Recording:
     if not path.is_file():
         raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
     if not _recognises(path):
-        raise RecordingError(f"{path.name}: no NRRD file, or one cut in its first bytes")
+        raise RecordingError(f"{path.name}: not an NRRD file, or truncated in its first bytes")
     found = decoded("nrrd_arrays", path)
     keys, texts = found["keys"].tolist(), found["texts"].tolist()
     x, y = found["spacing"].tolist()

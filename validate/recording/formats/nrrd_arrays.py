@@ -117,4 +117,4 @@ def _require_end(path: Path, most: int) -> None:
             raise RecordingError(f"over {most} bytes unpacked, more than its sizes hold")
         packed = unpacker.unconsumed_tail
     if not unpacker.eof:
-        raise RecordingError("cut: its pixels do not end with their checksum")
+        raise RecordingError("truncated: its pixels do not end with their checksum")

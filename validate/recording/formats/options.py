@@ -44,6 +44,6 @@ def metres(options: Options, stated: str, what: str) -> tuple[float, str]:
     text = options.get("unit", stated)
     factor = in_si(1.0, text, "m") if text else None
     if factor is None:
-        states = f"states the unit '{stated}'" if stated else "states no unit"
-        raise UsageError(f"{what}: {states} of length; say it: --map unit=mm")
+        states = f"has the unit '{stated}'" if stated else "has no unit"
+        raise UsageError(f"{what}: {states} of length; give --map unit=mm")
     return factor, f"{text} ({'entered' if 'unit' in options else 'stated'})"

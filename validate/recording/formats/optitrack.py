@@ -101,7 +101,9 @@ def read_optitrack(path: Path, options: Options) -> Recording:
 
 def _header(held: TextRows) -> dict[str, str]:
     if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
-        raise RecordingError(f"{held.name}: no Motive CSV: its first cell is not 'Format Version'")
+        raise RecordingError(
+            f"{held.name}: not a Motive CSV file: its first cell is not 'Format Version'"
+        )
     first = held.rows[0].cells
     return dict(zip(first[::2], first[1::2], strict=False))
 
@@ -154,7 +156,7 @@ def _poses(
         pose = table.values[:, [*at, *q]]
         seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
         if not q:
-            unread[name] = "its rotation is no quaternion; export it as Rotation Type Quaternion"
+            unread[name] = "its rotation is not a quaternion; export it as Rotation Type Quaternion"
         elif not seen.any():
             unread[name] = "never seen"
         else:

@@ -55,8 +55,8 @@ def read_point_table(path: Path, options: Options) -> Recording:
     layout = layout_of(held)
     if layout is None:
         raise RecordingError(
-            f"{held.name}: no line names points: columns such as time (s), tip_x (mm), tip_y (mm), "
-            "tip_z (mm), or name, x, y, z, are expected"
+            f"{held.name}: no line names points; expected columns such as time (s), tip_x (mm), "
+            f"tip_y (mm), tip_z (mm), or name, x, y, z"
         )
     instant = [] if layout.instant is None else [layout.instant]
     columns = [*layout.columns, *layout.sure, *instant]
@@ -125,8 +125,10 @@ def _without_unsure(
     least = above_zero({"likelihood": str(_UNSURE), **options}, "likelihood")
     count = len(layout.columns)
     low = values[:, count : count + len(layout.sure)] < least
-    told = f"likelihood below {least:g} as not seen ({int(low.sum())} of {low.size})"
-    entry = {} if "likelihood" in options else {ASSUMED: f"{told}; else --map likelihood=0.9"}
+    told = f"likelihood below {least:g} is taken as missing ({int(low.sum())} of {low.size})"
+    entry = (
+        {} if "likelihood" in options else {ASSUMED: f"{told}; change it with --map likelihood=0.9"}
+    )
     return np.where(low[..., None], np.nan, x), entry or {"likelihood": told}
 
 
@@ -138,14 +140,14 @@ def _scale(held: TextRows, layout: PointLayout, options: Options) -> tuple[float
     unit = "" if "unit" in options else _one_unit(held, layout) or layout.above.get("units", "")
     if "m_per_px" in options and (not unit or unit in PIXELS):
         if "unit" in options:
-            raise UsageError(f"{held.name}: --map unit and m_per_px; say one of them")
+            raise UsageError(f"{held.name}: --map unit and m_per_px exclude each other; give one")
         size = length(options, "m_per_px", "0.1mm")
         return size, f"px of {size:g} m (entered)"
     if "m_per_px" in options:
         raise UsageError(f"{held.name}: --map m_per_px: coordinates are in {unit}")
     if unit in PIXELS:
-        raise UsageError(f"{held.name}: coordinates in pixels; say the size of one: "
-                         "--map m_per_px=0.1mm")  # fmt: skip
+        raise UsageError(f"{held.name}: coordinates in pixels; give the pixel size, as --map "
+                         f"m_per_px=0.1mm")  # fmt: skip
     return metres(options, unit, held.name)
 
 
@@ -162,7 +164,7 @@ def _by_instants(
     instants, at = np.unique(t, return_inverse=True)
     if len(instants) * len(own) > _SPARSE * len(rows) + 1000:
         raise RecordingError(f"{held.name}: {len(own)} labels at {len(instants)} instants in only "
-                             f"{len(rows)} rows; keep the tracks that are long")  # fmt: skip
+                             f"{len(rows)} rows; keep only long tracks")  # fmt: skip
     places = list(zip(at.tolist(), (own[label] for label in labels), strict=True))
     twice = next((p for p, count in Counter(places).items() if count > 1), None)
     if twice is not None:
@@ -180,11 +182,11 @@ def _with_third(held: TextRows, x: Floats, options: Options) -> Floats:
     """Points with the z that the user says, where they have none: in m, as the factor knows."""
     if x.shape[2] == len(AXES):
         if "z" in options:
-            raise UsageError(f"{held.name}: --map z: the points have a z of their own")
+            raise UsageError(f"{held.name}: --map z: the points already have a z; leave it out")
         return x
     if "z" not in options:
-        raise UsageError(f"{held.name}: points of x and y alone; say where their plane lies: "
-                         "--map z=0mm")  # fmt: skip
+        raise UsageError(f"{held.name}: points have x and y only; give the position of their "
+                         f"plane, as --map z=0mm")  # fmt: skip
     z = length(options, "z", "0mm", zero=True) + 0 * x[..., :1]  # NaN where it was not seen
     return np.concatenate([x, z], axis=2)
 
@@ -194,7 +196,7 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
     instants = values[:, -1] if layout.instant is not None else np.arange(float(len(values)))
     if np.isnan(instants).any():
         line = layout.rows[int(np.argmax(np.isnan(instants)))].line
-        raise RecordingError(f"{held.name}: line {line}: it has no time; mend it")
+        raise RecordingError(f"{held.name}: line {line}: it has no time; correct it")
     if layout.whose is None:
         _require_one_row_each(held, layout, instants)
     elif layout.time is not None and "rate" in options:
@@ -207,8 +209,8 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
     t = _seconds_of(held, layout, options) * instants
     if layout.whose is None and (np.diff(t) <= 0).any():
         at = 1 + int(np.argmax(np.diff(t) <= 0))
-        raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is "
-                             "not after the one before; mend it, or say --map rate=HZ")  # fmt: skip
+        raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is not after "
+                             f"the one before; correct it, or give --map rate=HZ")  # fmt: skip
     return np.asarray(t - t.min())
 
 
@@ -223,8 +225,9 @@ def _require_one_row_each(held: TextRows, layout: PointLayout, instants: Floats)
         )
     if layout.time is None and (np.diff(instants) <= 0).any():
         line = layout.rows[1 + int(np.argmax(np.diff(instants) <= 0))].line
-        raise RecordingError(f"{held.name}: line {line}: its '{layout.names[column]}' is not after "
-                             "the one before; mend it, or remove that column")  # fmt: skip
+        raise RecordingError(f"{held.name}: line {line}: its '{layout.names[column]}' is not "
+                             f"after the one before; correct it, or remove that "
+                             f"column")  # fmt: skip
 
 
 def _seconds_of(held: TextRows, layout: PointLayout, options: Options) -> float:
@@ -232,8 +235,8 @@ def _seconds_of(held: TextRows, layout: PointLayout, options: Options) -> float:
     name = layout.names[layout.time or 0]
     unit = options.get("time", layout.units[layout.time or 0])
     if not unit:
-        raise UsageError(f"{held.name}: '{name}' has no unit; say it: --map time=s, or "
-                         "--map rate=HZ")  # fmt: skip
+        raise UsageError(f"{held.name}: '{name}' has no unit; give --map time=s, or --map "
+                         f"rate=HZ")  # fmt: skip
     return si_factor(unit, "time")
 
 
@@ -244,7 +247,8 @@ def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:
     stated = as_number(layout.above.get("frequency", "")) or 0.0
     if not 0 < stated < np.inf:
         raise UsageError(
-            f"{held.name}: no column of time; if its rows are instants, say --map rate=HZ; if they "
+            f"{held.name}: no column of time; if its rows are instants, give --map rate=HZ; if "
+            f"they "
             "are points at one instant, name each in a column called name"
         )
     return stated
@@ -266,7 +270,7 @@ def _one_unit(held: TextRows, layout: PointLayout) -> str:
     units = {layout.units[i] for i in layout.columns}
     if len(units) > 1:
         shown = ", ".join(repr(u) for u in sorted(units))
-        raise UsageError(f"{held.name}: coordinates in {shown}; say one: --map unit=mm")
+        raise UsageError(f"{held.name}: coordinates in {shown}; give one, as --map unit=mm")
     return units.pop()
 
 

@@ -76,13 +76,19 @@ def read_qualisys(path: Path, options: Options) -> Recording:
 def _events(held: TextRows) -> dict[str, str]:
     """Lines of a name, a frame and a time, in the time of the measurement."""
     told = [f"{r.cell(1)} {r.cell(3)} s" for r in held.rows if r.cell(0) == _EVENT]
-    return {"events": f"{'; '.join(told)} (of the trial; told, no stream)"} if told else {}
+    return (
+        {"events": f"{'; '.join(told)} (events of the trial, listed but not stored as a stream)"}
+        if told
+        else {}
+    )
 
 
 def _parts(held: TextRows) -> tuple[dict[str, str], tuple[str, ...], list[TextRow]]:
     """Header, names of the points, and the rows of numbers."""
     if not held.rows or held.rows[0].cell(0).encode() not in _MAGIC:
-        raise RecordingError(f"{held.name}: no Qualisys text: its first cell is not NO_OF_FRAMES")
+        raise RecordingError(
+            f"{held.name}: not a Qualisys text file: its first cell is not NO_OF_FRAMES"
+        )
     keys = [r for r in held.rows if r.cell(0).isupper() and r.cell(0) not in ABSENT]
     header = {r.cell(0): r.cell(1) for r in keys if r.cell(0) not in (*_NAMES, _EVENT)}
     if header.get("DATA_INCLUDED", "3D") not in ("3D", _SIX):
@@ -135,7 +141,7 @@ def _bodies(
             R = _turned(f"{path.name}: {name}", one[seen, _TURN:])
             streams |= pose_signals(name, t[seen], R, factor * one[seen, :3], frame)
     if not streams:
-        raise RecordingError(f"{path.name}: no body was seen: {told}")
+        raise RecordingError(f"{path.name}: no body is visible: {told}")
     unread = {n: "never seen" for n in names if f"{n}/rotation" not in streams}
     record = {
         "kind": "motion capture (Qualisys TSV, 6D)",
@@ -155,8 +161,8 @@ def _turned(what: str, columns: Floats) -> Floats:
     bad = (off > _ROUND) | (np.linalg.det(R) < 0)
     if bad.any():
         raise RecordingError(
-            f"{what}: sample {int(bad.argmax()) + 1} is no rotation (off by "
-            f"{off[bad.argmax()]:.3g}); other columns than Qualisys' 6D has, or damaged"
+            f"{what}: sample {int(bad.argmax()) + 1} is not a rotation (error "
+            f"{off[bad.argmax()]:.3g}); expected the columns of Qualisys 6D, or the file is damaged"
         )
     return np.asarray(R)
 
@@ -165,7 +171,7 @@ def _rate(held: TextRows, header: dict[str, str]) -> float:
     rate = as_number(header.get("FREQUENCY", "")) or 0.0
     if not 0 < rate < np.inf:
         raise RecordingError(
-            f"{held.name}: FREQUENCY '{header.get('FREQUENCY', '')}' is no number of Hz above 0"
+            f"{held.name}: FREQUENCY '{header.get('FREQUENCY', '')}' is not a rate above 0 Hz"
         )
     return rate
 

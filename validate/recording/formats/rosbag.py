@@ -32,7 +32,7 @@ def read_bag(path: Path, options: Options) -> Recording:
     if not path.exists():
         raise RecordingError(f"{path}: no such file or folder")
     if not _recognises(path):
-        raise RecordingError(f"{path.name}: no bag of ROS")
+        raise RecordingError(f"{path.name}: not a ROS bag")
     if path.is_dir() and (one := _only_mcap(path)):
         return read_all(one, options)
     _require_all(path)
@@ -71,13 +71,12 @@ def _require_all(path: Path) -> None:
     if path.is_dir():
         if missing := [name for name in names if not (path / name).is_file()]:
             raise RecordingError(
-                f"{path.name}: its {_YAML} names {len(names)} files, of which {missing[0]} is not "
-                "there; copy it too, or import the others one by one"
+                f"{path.name}: its {_YAML} names {len(names)} files, but {missing[0]} is missing; "
+                f"copy it too, or import the others one by one"
             )
     elif packed and path.name in names:
         raise RecordingError(
-            f"{path.name}: each message is compressed, as {_YAML} beside it tells; import its "
-            "folder"
+            f"{path.name}: each message is compressed, see {_YAML}; import the folder"
         )
 
 
@@ -87,14 +86,16 @@ def _require_whole(path: Path) -> None:
     log = path.with_name(f"{path.name}-wal")
     if log.is_file() and log.stat().st_size:
         raise RecordingError(
-            f"{path.name}: {log.stat().st_size} bytes of it are still in {log.name}; put them in: "
+            f"{path.name}: {log.stat().st_size} bytes are still in {log.name}; merge them with: "
             f"sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
         )
     if first.startswith(_SQLITE):
         page = int.from_bytes(first[16:18]) or 1
         needs = (_PAGE if page == 1 else page) * int.from_bytes(first[28:32])
         if (size := path.stat().st_size) < needs:
-            raise RecordingError(f"{path.name}: {size} bytes, its header tells of {needs}: cut")
+            raise RecordingError(
+                f"{path.name}: {size} bytes, but its header declares {needs}: truncated"
+            )
 
 
 def _recognises(path: Path) -> bool:
@@ -107,7 +108,7 @@ def _recognises(path: Path) -> bool:
 
 ROSBAG = Reader(
     "rosbag",
-    "a bag of ROS",
+    "a ROS bag",
     _recognises,
     read_bag,
     "it is SQLite with messages and topics, a folder with metadata of rosbag2, or begins with "

@@ -64,8 +64,8 @@ def _opened(path: Path, folder: Path) -> Iterator[_Bag]:
         if error.args != ("unknown",):
             raise
         raise RecordingError(
-            "it holds types without a definition, which is not read; take them out of the bag or "
-            'of a copy: sqlite3 FILE.db3 "DELETE FROM message_definitions WHERE '
+            "it has types without a definition, which are not read; remove them from a copy of "
+            'the bag: sqlite3 FILE.db3 "DELETE FROM message_definitions WHERE '
             "encoding = 'unknown'\""
         ) from None
     with closing(reader):

@@ -84,8 +84,8 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
         streams |= shown
     if not streams:
         raise RecordingError(
-            f"{path.name}: {len(t)} frames, no image and no transform in them is OK; "
-            f"never seen: {', '.join(never) or 'none'}"
+            f"{path.name}: {len(t)} frames, no image and no transform in them is OK; never "
+            f"visible: {', '.join(never) or 'none'}"
         )
     streams = begun(streams)
     told = {
@@ -106,8 +106,8 @@ def _require_no_volume(path: Path, held: Sequence) -> None:
     count = len(held.images)
     if held.deep and count > 1 and not held.fields and held.times is None:
         raise RecordingError(
-            f"{path.name}: {count} slices of a volume ({held.deep}), not images over time; save a "
-            "film with its images on an axis of the kind list, or as TIFF or MP4"
+            f"{path.name}: {count} slices of a volume ({held.deep}), not images over time; save "
+            f"an image sequence with an axis of kind list, or as TIFF or MP4"
         )
 
 
@@ -127,7 +127,7 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
         first = next(i for i in range(count) if i not in set(stamped))
         raise RecordingError(
             f"{path.name}: {count - len(stamped)} of {count} frames without a time, the first is "
-            f"{first}; cut, or say --map rate=HZ"
+            f"{first}; the file is truncated, or give --map rate=HZ"
         )
     t = np.array([_numbers(path, held.fields[i]["Timestamp"], 1, i)[0] for i in range(count)])
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
@@ -136,7 +136,7 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
 def _rate(path: Path, options: Options) -> float:
     if "rate" not in options:
         raise UsageError(
-            f"{path.name}: its frames have no times; say --map rate=HZ (a volume is not read)"
+            f"{path.name}: its frames have no times; give --map rate=HZ (a volume is not read)"
         )
     return above_zero(options, "rate")
 
@@ -196,8 +196,8 @@ def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
     if way[:2] not in ("MF", "MN", "UF", "UN"):
         if way[:1] in ("F", "N") and way[1:2] in ("M", "U"):
             raise RecordingError(
-                f"{path.name}: its lines lie along rows (orientation {way}); save it as MF, or say "
-                "--map images=no"
+                f"{path.name}: its lines lie along rows (orientation {way}); save it as MF, or "
+                f"give --map images=no"
             )
         return held, {}
     across, along = (-1 if way[0] == "U" else 1), (-1 if way[1] == "N" else 1)
@@ -205,7 +205,7 @@ def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
         return held, {}
     turned = tuple(image[::along, ::across] for image in held.images)
     sides = " and ".join((["columns"] if across < 0 else []) + (["rows"] if along < 0 else []))
-    told = f"{sides} reversed: the file has them as {way}, its transforms are for MF"
+    told = f"{sides} reversed: the file stores them as {way}, but its transforms need MF"
     return replace(held, images=turned), {IMAGES: told}
 
 
@@ -216,7 +216,7 @@ def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:
         return side, side
     if held.spacing == (1.0, 1.0):
         raise UsageError(
-            f"{path.name}: states a spacing of 1 1, which means pixels, not mm; say --map "
-            "m_per_px=0.1mm, or --map images=no for the transforms alone"
+            f"{path.name}: has a spacing of 1 1, which means pixels, not mm; give --map "
+            f"m_per_px=0.1mm, or --map images=no for the transforms only"
         )
     return _MM * held.spacing[0], _MM * held.spacing[1]

@@ -22,7 +22,9 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     if data[:4] == b"PK\x03\x04":
         require_unpacked(path)
     elif len(data) % _SECTOR:
-        raise RecordingError(f"{len(data)} bytes, no multiple of its sectors of {_SECTOR}: cut")
+        raise RecordingError(
+            f"{len(data)} bytes, not a multiple of its sector size {_SECTOR}: truncated"
+        )
     book = python_calamine.CalamineWorkbook.from_path(str(path))
     names = list(book.sheet_names)
     texts = [sheet_text(book.get_sheet_by_name(name).to_python()) for name in names]

@@ -38,7 +38,7 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     held = text_rows(path)
     if not held.rows or not held.rows[0].cell(0).encode().startswith((_FCSV, _OLD)):
-        raise RecordingError(f"{path.name}: no FCSV: its first line is not '{_FCSV.decode()}'")
+        raise RecordingError(f"{path.name}: not FCSV: its first line is not '{_FCSV.decode()}'")
     stated = [r.cells for r in held.rows if r.cell(0).startswith("#")]
     header = dict(c[0].lstrip("# ").partition(" = ")[::2] for c in stated)
     system = header.get("CoordinateSystem", header.get("coordinateSystem", "0"))
@@ -78,7 +78,9 @@ def _three(what: str, values: Any) -> Sequence[float]:
     except (TypeError, ValueError, OverflowError):
         x = np.zeros(0)
     if x.shape != (3,) or not np.isfinite(x).all():
-        raise RecordingError(f"{what}: {str(values)[:60]} is no point of 3 finite numbers; damaged")
+        raise RecordingError(
+            f"{what}: {str(values)[:60]} is not a point of 3 finite numbers; damaged"
+        )
     return tuple(x.tolist())
 
 
@@ -90,7 +92,8 @@ def read_markups(path: Path, options: Options) -> Recording:
     units = {unit for m in lists for unit in _units(m)}
     if len(systems) > 1 or len(units) > 1:
         raise RecordingError(
-            f"{path.name}: lists in {sorted(systems)} and {sorted(units)}; save them apart"
+            f"{path.name}: lists in {sorted(systems)} and {sorted(units)}; save them in separate "
+            f"files"
         )
     points = [_control(path, p) for m in lists for p in m.get("controlPoints", ())]
     unit = units.pop()
@@ -112,15 +115,15 @@ def _lists(path: Path) -> list[Mapping[str, Any]]:
             raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
         found = json_value(data)["markups"]
         if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
-            raise ValueError("its 'markups' is no list of lists")
+            raise ValueError("its 'markups' is not a list of lists")
     except (ValueError, TypeError, KeyError) as error:
-        raise RecordingError(f"{path.name}: no markups JSON ({error}); damaged") from None
+        raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
     return found
 
 
 def _control(path: Path, point: Any) -> _Point:
     if not isinstance(point, dict):
-        raise RecordingError(f"{path.name}: a control point that is no object; damaged")
+        raise RecordingError(f"{path.name}: a control point that is not an object; damaged")
     label = str(point.get("label", ""))
     if point.get("positionStatus", "defined") != "defined":
         return label, (np.nan, np.nan, np.nan)
@@ -134,7 +137,7 @@ def _landmarks(
         raise RecordingError(f"{path.name}: no point in it; cut or empty")
     if system not in ("RAS", "LPS"):
         raise RecordingError(
-            f"{path.name}: coordinates in '{system}', which are no lengths; save them as LPS or RAS"
+            f"{path.name}: coordinates in '{system}', not lengths; save them as LPS or RAS"
         )
     factor = length({"unit": "mm", **options}, "unit", "mm")
     x = factor * np.array([p for _, p in points])[None]

@@ -74,7 +74,7 @@ def rows_of(name: str, data: bytes) -> TextRows:
             TextRow(i + 1, tuple(c.strip() for c in found)) for i, found in enumerate(cells)
         )
     except csv.Error as error:
-        raise RecordingError(f"{name}: no table of cells ({error})") from None
+        raise RecordingError(f"{name}: not a table of cells ({error})") from None
     return TextRows(name, rows, not text.endswith(("\n", "\r")))
 
 
@@ -153,7 +153,7 @@ def without_zeros(x: Floats) -> tuple[Floats, int]:
 
 def told_zeros(count: int) -> dict[str, str]:
     """The record's entry about points that are three zeros; none where none is."""
-    return {ZEROS: f"{count} points, taken as not seen"} if count else {}
+    return {ZEROS: f"{count} points, taken as missing"} if count else {}
 
 
 def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:
@@ -162,7 +162,9 @@ def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:
             try:
                 float(_plain(row.cell(i)))
             except ValueError:
-                return f"line {row.line}: '{row.cell(i)[:40]}' is no number; mend or remove it"
+                return (
+                    f"line {row.line}: '{row.cell(i)[:40]}' is not a number; correct or remove it"
+                )
     return "a cell is no number"
 
 

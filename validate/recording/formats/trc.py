@@ -60,7 +60,7 @@ def read_trc(path: Path, options: Options) -> Recording:
 
 def _header(held: TextRows) -> dict[str, str]:
     if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
-        raise RecordingError(f"{held.name}: no TRC file: its first cell is not PathFileType")
+        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
     keys, values = held.rows[1].cells, held.rows[2].cells
     return {k: v for k, v in zip(keys, values, strict=False) if k}
 
@@ -75,7 +75,7 @@ def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
             f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
         )
     if not named:
-        raise RecordingError(f"{held.name}: line 4 names no point; no TRC file, or damaged")
+        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
     return distinct(named, len(named))
 
 
@@ -95,8 +95,8 @@ def _times(
         return np.arange(len(values)) / above_zero(options, "rate"), {}
     t = values[:, 1] - values[0, 1]
     if np.isnan(t).any():
-        raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; say "
-                             "--map rate=HZ")  # fmt: skip
+        raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; give "
+                             f"--map rate=HZ")  # fmt: skip
     if (np.diff(t) > 0).all():
         return np.asarray(t), {}
     rate = as_number(header.get("DataRate", "")) or np.nan
@@ -104,8 +104,10 @@ def _times(
     if not (rate > 0 and np.abs(t - exact).max() <= _ROUNDED):
         row = int(np.argmax(np.diff(t) <= 0)) + 2
         raise RecordingError(f"{held.name}: the time of row {row} is not after the one before it; "
-                             "say --map rate=HZ")  # fmt: skip
-    return exact, {ASSUMED: f"rows of equal times are counted at the {rate:g} Hz that it states"}
+                             f"give --map rate=HZ")  # fmt: skip
+    return exact, {
+        ASSUMED: f"rows of equal times are counted at the {rate:g} Hz that the file declares"
+    }
 
 
 TRC = Reader(

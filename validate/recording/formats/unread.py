@@ -11,24 +11,25 @@ _FFMPEG = "ffmpeg -i {name} -c:v libx264 -crf 0 {stem}.mp4"
 _SAVED = "`scipy.io.savemat('{{stem}}.mat', dict({}))`"
 _NPZ = b"PK\3\4 .npy"  # an archive whose first file is so called
 _FIRST: tuple[tuple[bytes, str, str], ...] = (
-    (b"SQLite format 3\0", "an SQLite database (no bag of ROS)",
+    (b"SQLite format 3\0", "an SQLite database (not a ROS bag)",
      "sqlite3 -header -csv {name} 'SELECT * FROM ...' > {stem}.csv"),
-    (b"TDSm", "a TDMS file of LabVIEW",
-     "export it as CSV, as by npTDMS: `tdmsinfo`, `TdmsFile(...).as_dataframe().to_csv(...)`"),
+    (b"TDSm", "a LabVIEW TDMS file",
+     "export it as CSV, for example with npTDMS: `tdmsinfo`, "
+     "`TdmsFile(...).as_dataframe().to_csv(...)`"),
     (b"GIF8", "a GIF", _FFMPEG),
-    (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a video of Windows Media", _FFMPEG),
+    (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a Windows Media video", _FFMPEG),
     (b"\0\0\1\xba", "a video (MPEG)", _FFMPEG),
     (b"\0\0\1\xb3", "a video (MPEG)", _FFMPEG),
-    (b"\x89HDF", "an HDF5 file that is none of MATLAB",
-     "save its arrays, as by h5py and `scipy.io.savemat('{stem}.mat', ...)`"),
+    (b"\x89HDF", "an HDF5 file that is not from MATLAB",
+     "save its arrays, for example with h5py and `scipy.io.savemat('{stem}.mat', ...)`"),
     *((title, "a text export of Vicon Nexus 1", "export the trial as C3D")
       for title in (b"TRAJECTORIES\r", b"TRAJECTORIES\n", b"ANALOG\r", b"ANALOG\n")),
     (b"FLV\1", "a video (Flash)", _FFMPEG),
-    (b"\x1f\x8b", "packed by gzip", "gunzip -k {name}"),
-    (b"\x28\xb5\x2f\xfd", "packed by Zstandard",
-     "unzstd -k {name} -o {stem}; of a bag of ROS import the folder instead"),
-    (b"\x93NUMPY", "an array of NumPy", _SAVED.format("x=numpy.load('{name}')")),
-    (_NPZ, "an archive of NumPy's arrays", _SAVED.format("numpy.load('{name}')")),
+    (b"\x1f\x8b", "compressed with gzip", "gunzip -k {name}"),
+    (b"\x28\xb5\x2f\xfd", "compressed with Zstandard",
+     "unzstd -k {name} -o {stem}; for a ROS bag, import the folder instead"),
+    (b"\x93NUMPY", "a NumPy array", _SAVED.format("x=numpy.load('{name}')")),
+    (_NPZ, "an archive of NumPy arrays", _SAVED.format("numpy.load('{name}')")),
     (b"PK\3\4", "a ZIP archive", "unzip {name} -d {stem}, then name the folder or a file in it"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and name the file or folder in it"),
     (b"Rar!", "a RAR archive", "unpack it and name the file or folder in it"),
@@ -45,7 +46,7 @@ def known_unread(path: Path) -> str:
         first = _NPZ
     return next(
         (
-            f"{path.name} is {what}, which is not read here; make it one that is: "
+            f"{path.name} is {what}, which is not read; convert it: "
             + how.format(name=path.name, stem=path.stem)
             for magic, what, how in _FIRST
             if first.startswith(magic)

@@ -118,7 +118,11 @@ def _events(held: TextRows) -> dict[str, str]:
     rows = held.rows[begin + 3 :] if begin is not None else ()
     end = next((i for i, r in enumerate(rows) if not any(r.cells)), len(rows))
     told = [f"{' '.join(filter(None, r.cells[1:3]))} {r.cell(3)} s" for r in rows[:end]]
-    return {"events": f"{'; '.join(told)} (of the trial; told, no stream)"} if told else {}
+    return (
+        {"events": f"{'; '.join(told)} (events of the trial, listed but not stored as a stream)"}
+        if told
+        else {}
+    )
 
 
 def _lone(row: TextRow) -> bool:
@@ -132,7 +136,7 @@ def _block(held: TextRows, rows: tuple[TextRow, ...]) -> CsvBlock | None:
     hz = as_number(rate.cell(0)) or 0.0
     if not 0 < hz < np.inf:
         raise RecordingError(
-            f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is no rate in Hz; damaged"
+            f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is not a rate in Hz; damaged"
         )
     end = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
     width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)

@@ -39,7 +39,7 @@ def read_video(path: Path, options: Options) -> Recording:
     require_known(options, _OPTIONS)
     _require_whole(path)
     if "m_per_px" not in options:
-        raise UsageError(f"{path.name}: a video states no scale; say it: --m-per-px 0.1mm")
+        raise UsageError(f"{path.name}: a video has no scale; give it, as --m-per-px 0.1mm")
     side, every = length(options, "m_per_px", "0.1mm"), _every(options)
     found = decoded("video_arrays", path, {"every": every}, _SECONDS)
     declared, count = int(found["declared"]), int(found["decoded"])
@@ -55,7 +55,7 @@ def read_video(path: Path, options: Options) -> Recording:
         "kind": "video",
         "frames": f"{len(images)} of {count}" + (f", one in {every}" if every > 1 else ""),
         "times": told,
-        "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
+        "colour": "converted to grey (ITU-R 601)" if bool(found["colour"]) else "grey, as recorded",
         "m_per_px": f"{options['m_per_px']} (entered)",
         **lens,
     }
@@ -77,12 +77,12 @@ def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> 
         return every * np.arange(len(t)) / hz, f"{options['rate']} Hz (entered)"
     if len(t) > 1 and not (np.diff(t) > 0).all():
         if not (np.isfinite(rate) and rate > 0):
-            raise UsageError(f"{path.name}: {len(t)} frames without times; say --rate HZ")
+            raise UsageError(f"{path.name}: {len(t)} frames without times; give --rate HZ")
         return every * np.arange(len(t)) / rate, f"{rate:.6g} Hz as declared; frames have no times"
     steps = 1e3 * np.diff(t)
-    words = "the container's, even"
+    words = "from the container, evenly spaced"
     if len(steps) and np.ptp(steps) > _EVEN:
-        words = f"the container's, uneven: {steps.min():.3g} to {steps.max():.3g} ms apart"
+        words = f"from the container, uneven: steps of {steps.min():.3g} to {steps.max():.3g} ms"
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9), words
 
 
@@ -96,7 +96,7 @@ def _require_whole(path: Path) -> None:
     else:
         at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
     if at > size:
-        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: cut")
+        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
 
 
 def _riff_end(first: bytes) -> int:
@@ -114,7 +114,9 @@ def _segment_end(path: Path, size: int) -> int:
     end, begin = _sized(first, 4)
     at = begin + (end or 0)
     if first[at : at + 4] != _SEGMENT:
-        raise RecordingError(f"{path.name}: a head of Matroska without its segment: cut or damaged")
+        raise RecordingError(
+            f"{path.name}: a Matroska header without its segment: truncated or damaged"
+        )
     count, begin = _sized(first, at + 4)
     return size if count is None else begin + count
 

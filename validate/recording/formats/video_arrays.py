@@ -43,10 +43,10 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
         if sum(image.size for image in images[:1]) * len(images) > MOST:
             raise RecordingError(
                 f"frames of {images[0].shape[1]} x {images[0].shape[0]} beyond {MOST} bytes after "
-                f"{made}; take fewer: --map every=10, or cut it"
+                f"{made}; read fewer with --map every=10, or shorten the video"
             )
     if not images:
-        raise RecordingError("no frame of it can be decoded: cut, damaged, or no video")
+        raise RecordingError("no frame can be decoded: truncated, damaged, or not a video")
     return {
         "images": np.stack(images),
         "t": np.array(t),
@@ -81,8 +81,8 @@ def _require_few(count: float, width: float, height: float, every: float) -> Non
 def _require_square(wide: float, high: float) -> None:
     if wide > 0 and high > 0 and wide != high:
         raise RecordingError(
-            f"its pixels are {wide:g}:{high:g}, not square; make them square first, as by "
-            "`ffmpeg -i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
+            f"its pixels are {wide:g}:{high:g}, not square; convert them first, as with `ffmpeg "
+            f"-i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
         )
 
 

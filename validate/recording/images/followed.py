@@ -122,7 +122,7 @@ def _next(
     if away > _JUMP * last.radius:
         raise RecordingError(
             f"the nearest region lies {1e3 * away:.1f} mm from the last outline, whose radius is "
-            f"{1e3 * last.radius:.1f} mm: another one"
+            f"{1e3 * last.radius:.1f} mm: it is another region"
         )
     return outline
 
@@ -147,7 +147,8 @@ def _require_sure(rivals: tuple[RivalRegion, ...], confidence: float, least: flo
     if rivals and confidence < least:
         named = "; ".join(r.words for r in rivals)
         raise RecordingError(
-            f"the outline has the confidence {confidence:.2f}, {least:g} is needed beside rivals: "
-            f"{named}; say which is meant (--centre X,Y) or take it (--confidence "
+            f"the outline has confidence {confidence:.2f}, but {least:g} is needed, as other "
+            f"regions "
+            f"are as distinct: {named}; choose one (--centre X,Y) or accept it (--confidence "
             f"{floor(100 * confidence) / 100:g})"
         )

@@ -67,7 +67,7 @@ def foreign_outlines(
 def _scale(path: Path, frames: Frames, unit: str) -> Floats:
     metres = None if unit == "px" else in_si(1.0, unit, "m")
     if unit != "px" and metres is None:
-        raise UsageError(f"unit {unit} of {path.name}: px, or a length as mm")
+        raise UsageError(f"unit {unit} of {path.name}: expected px, or a unit of length as mm")
     drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
 
@@ -81,7 +81,7 @@ def _require_inside(path: Path, outlines: Outlines, frames: Frames) -> None:
             x, y = at[out][0]
             raise RecordingError(
                 f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
-                f"{size[0]} x {size[1]}: drawn in images of another size, or --unit is another"
+                f"{size[0]} x {size[1]}: check the size of the images it was drawn in, and --unit"
             )
 
 
@@ -117,7 +117,7 @@ def _of_label(path: Path, masks: Any, named: Mapping[str, int], label: str) -> A
     values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
     if len(values) > _MOST:
         raise RecordingError(
-            f"{path.name}: {len(values)} values, no mask of regions: make it of 0 and one other"
+            f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other value"
         )
     names = {v: name for name, v in named.items()}
     regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
@@ -135,7 +135,7 @@ def _meant(path: Path, label: str, regions: Sequence[tuple[str, str]]) -> int:
         return at[0]
     if len(regions) > 1:
         raise UsageError(
-            f"{path.name}: {len(regions)} regions, {there}: say which, as --label {regions[0][0]}"
+            f"{path.name}: {len(regions)} regions, {there}: choose one, as --label {regions[0][0]}"
         )
     return 0
 
@@ -160,8 +160,8 @@ def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
 def _require_each(path: Path, count: int, what: str, images: int) -> None:
     if count != images:
         raise RecordingError(
-            f"{path.name}: {count} {what} for {images} images leave open whose they are; give one "
-            "an image (an empty mask where there is no outline), or a CSV of frame, x, y"
+            f"{path.name}: {count} {what} for {images} images do not show which belongs to which "
+            f"image; give one per image (an empty mask for no outline), or a CSV of frame, x, y"
         )
 
 
@@ -173,7 +173,7 @@ def _array(path: Path) -> Any:
     if path.suffix.lower() == ".npz":
         held = npz_arrays(path, MAX_FILE)
         if len(held) != 1:
-            raise RecordingError(f"{path.name}: arrays {sorted(held)}; keep the masks alone")
+            raise RecordingError(f"{path.name}: arrays {sorted(held)}; keep only the masks")
         masks = next(iter(held.values()))
     else:
         try:
@@ -281,7 +281,7 @@ def _coco(path: Path, told: Any, frames: Frames, label: str) -> Outlines:
         if _number(a) == _number(b):
             raise RecordingError(
                 f"{path.name}: '{a['file_name']}' and '{b['file_name']}' have the same number: "
-                "which is the earlier image is open; number them"
+                f"their order is not known; number them"
             )
     for i, image in enumerate(listed):
         _require_size(path, i, (image.get("width"), image.get("height")), frames)
@@ -292,8 +292,8 @@ def _coco(path: Path, told: Any, frames: Frames, label: str) -> Outlines:
     chosen = [n for name, n in drawn if name == meant]
     if any(isinstance(n["segmentation"], dict) for n in chosen):
         raise RecordingError(
-            f"{path.name}: '{meant}' is drawn as masks (RLE), expected polygons; save the masks as "
-            "PNG, one an image, and name their folder"
+            f"{path.name}: '{meant}' is drawn as masks (RLE), expected polygons; save the masks "
+            f"as PNG, one per image, and name their folder"
         )
     polygons = [(order[n["image_id"]], p) for n in chosen for p in n["segmentation"]]
     if len(polygons) > len({i for i, _ in polygons}):
@@ -314,5 +314,7 @@ def _grouped(path: Path, points: Iterable[tuple[Any, Any]]) -> Outlines:
         try:
             found.setdefault(int(image), []).append((float(x), float(y)))
         except (TypeError, ValueError):
-            raise RecordingError(f"{path.name}: frame {image}, ({x}, {y}) are no numbers") from None
+            raise RecordingError(
+                f"{path.name}: frame {image}, ({x}, {y}) are not numbers"
+            ) from None
     return {i: np.array(p) for i, p in found.items()}

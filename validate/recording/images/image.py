@@ -69,7 +69,7 @@ def png_size(data: bytes) -> tuple[int, int]:
     """Width and height px that the first bytes of a PNG declare; raises `RecordingError` for a PNG
     that `decode_png` does not take, or whose header fails its checksum."""
     if not data.startswith(_SIGNATURE):
-        raise RecordingError("no PNG (wrong first bytes); only PNG images are read")
+        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
     kind, content = next(_chunks(data), (b"", b""))
     header = _header(kind, content)
     return header.width, header.height
@@ -78,7 +78,7 @@ def png_size(data: bytes) -> tuple[int, int]:
 def _checked(data: bytes) -> tuple[_Header, bytes]:
     """Header and packed pixels of a PNG whose chunks are whole."""
     if not data.startswith(_SIGNATURE):
-        raise RecordingError("no PNG (wrong first bytes); only PNG images are read")
+        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
     header, packed, ended = None, [], False
     for kind, content in _chunks(data):
         if header is None:
@@ -98,7 +98,9 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         length = int.from_bytes(head[:4], "big")
         end = at + 8 + length
         if len(head) < 8 or end + 4 > len(data):
-            raise RecordingError(f"damaged PNG: cut at byte {len(data)}, its chunk ends at {end}")
+            raise RecordingError(
+                f"damaged PNG: truncated at byte {len(data)}, its chunk ends at {end}"
+            )
         if zlib.crc32(data[at + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
             raise RecordingError(f"damaged PNG: wrong CRC of the chunk at byte {at}")
         yield head[4:], data[at + 8 : end]
@@ -120,7 +122,7 @@ def _header(kind: bytes, content: bytes) -> _Header:
 
 def _require_size(width: int, height: int) -> None:
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} a side")
+        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side")
 
 
 def _require_unpacked(packed: bytes, size: int) -> None:
@@ -151,7 +153,8 @@ def _grey(image: Pixels) -> Pixels:
     clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
     if coloured or clear:
         raise RecordingError(
-            f"{coloured} coloured and {clear} transparent pixels; cut the overlay off and save grey"
+            f"{coloured} coloured and {clear} transparent pixels; remove the overlay and save it "
+            f"as grey"
         )
     return np.ascontiguousarray(image[..., 0])
 
@@ -221,7 +224,7 @@ def demosaiced(mosaic: NDArray[Any], order: str) -> NDArray[Any]:
     import cv2
 
     if min(mosaic.shape) < _MOSAIC:
-        raise RecordingError(f"a mosaic of {mosaic.shape}, at least {_MOSAIC} px a side")
+        raise RecordingError(f"a mosaic of {mosaic.shape}, at least {_MOSAIC} px per side")
     return np.asarray(cv2.cvtColor(mosaic, getattr(cv2, f"COLOR_Bayer{order}2GRAY")))
 
 

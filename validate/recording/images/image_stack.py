@@ -50,7 +50,7 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     said = {
         "kind": "images", "images": str(len(images)), "m_per_px": scale, "times": times,
         "levels": levels,
-        "colour": "made grey (ITU-R 601)" if bool(found["colour"]) else "grey as recorded",
+        "colour": "converted to grey (ITU-R 601)" if bool(found["colour"]) else "grey, as recorded",
         **lens,
     }  # fmt: skip
     name = path.resolve().name if path.is_dir() else path.stem
@@ -69,11 +69,11 @@ def _sides(
     factor = in_si(1.0, unit, "m") if unit else None
     if factor is None:
         raise UsageError(
-            f"{path.name}: states no scale{f' (unit {unit})' if unit else ''}; say it: "
+            f"{path.name}: has no scale{f' (unit {unit})' if unit else ''}; give it, as "
             f"--m-per-px 0.1mm{offered(found['dots']) if 'dots' in found else ''}"
         )
     x, y = (factor * float(side) for side in found["side"])
-    return (x, y), f"{found['side'][0]:.6g} {unit} a pixel (stated by {found['by']})"
+    return (x, y), f"{found['side'][0]:.6g} {unit} per pixel (declared by {found['by']})"
 
 
 def _times(
@@ -86,11 +86,11 @@ def _times(
     if np.isfinite(interval) and interval > 0:
         return np.asarray(
             interval * np.arange(count)
-        ), f"every {interval:g} s (stated by {found['by']})"
+        ), f"every {interval:g} s (declared by {found['by']})"
     if count == 1:
         return np.zeros(1), "one image"
     raise UsageError(
-        f"{path.name}: {count} images without times; say --rate HZ (a volume is not read)"
+        f"{path.name}: {count} images without times; give --rate HZ (a volume is not read)"
     )
 
 

@@ -34,7 +34,9 @@ def straightened(
     if not (np.isfinite(K).all() and np.isfinite(D).all() and K[0, 0] > 0 and K[1, 1] > 0):
         raise RecordingError(f"{path.name}: focal lengths and distortion must be numbers, above 0")
     if len(D) not in _LENGTHS:
-        raise RecordingError(f"{path.name}: {len(D)} coefficients of distortion; one of {_LENGTHS}")
+        raise RecordingError(
+            f"{path.name}: {len(D)} coefficients of distortion; expected one of {_LENGTHS}"
+        )
     sizes = {(image.shape[1], image.shape[0]) for image in images}
     if np.isfinite(size).all() and sizes != {tuple(int(v) for v in size)}:
         shown = ", ".join(f"{w} x {h}" for w, h in sorted(sizes))

@@ -28,11 +28,9 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     file = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     model = file.getNode("distortion_model")
     if model.isString() and model.string() not in _MODELS:
-        raise RecordingError(
-            f"distortion model '{model.string()}'; read are plumb_bob and rational"
-        )
+        raise RecordingError(f"distortion model '{model.string()}'; expected plumb_bob or rational")
     if _number(file, ("fisheye_model",)) == 1:
-        raise RecordingError("a fisheye model; the one of OpenCV's calibrateCamera is read")
+        raise RecordingError("a fisheye model; expected the model of OpenCV's calibrateCamera")
     return {
         "K": _matrix(file, _MATRIX).reshape(3, 3),
         "D": _matrix(file, _DISTORTION).ravel(),
@@ -56,7 +54,7 @@ def _matrix(file: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
             return np.asarray(node.mat(), dtype=np.float64)
         data = node.getNode("data") if node.isMap() else node  # as ROS writes it
         return np.array([data.at(i).real() for i in range(data.size())])
-    raise RecordingError(f"no {names[0]} in it")
+    raise RecordingError(f"it has no {names[0]}")
 
 
 def _number(file: Any, names: tuple[str, ...]) -> float:

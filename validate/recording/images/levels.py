@@ -30,7 +30,7 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
     for image in deep:
         if max(image.shape) > MAX_SIDE:
             raise RecordingError(f"an image of {image.shape[1]} x {image.shape[0]} px, the limit "
-                                 f"is {MAX_SIDE} a side")  # fmt: skip
+                                 f"is {MAX_SIDE} per side")  # fmt: skip
     if all(image.dtype == np.uint8 for image in deep):
         return tuple(np.ascontiguousarray(image) for image in deep), AS_IT_IS
     low, top = _range(deep)
@@ -39,7 +39,7 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
     white = above_zero(options, "white") if "white" in options else top or 1.0
     bits = "floating point" if any(image.dtype.kind == "f" for image in deep) else "16 bits"
     said = "entered" if "white" in options else "the largest"
-    told = f"{bits} made 8: 0 to {white:g} ({said}) became 0 to 255"
+    told = f"{bits} converted to 8: 0 to {white:g} ({said}) became 0 to 255"
     return tuple(_scaled(image, white) for image in deep), told
 
 

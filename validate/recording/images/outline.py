@@ -240,18 +240,18 @@ def _refusal(wall: Wall, judged: Quality) -> str:
     place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
     if wall.missing > MAX_MISSING:
         return (
-            f"the one {place} mm is cut by the border, {100 * wall.missing:.0f} % of its wall "
-            "lie outside; take an image with all of it"
+            f"the region {place} mm is cut by the border, {100 * wall.missing:.0f} % of its "
+            f"wall lies outside; use an image that shows all of it"
         )
     if judged.gcnr < MIN_GCNR or wall.evidence < MIN_EVIDENCE:
         return (
-            f"the best one {place} mm has contrast {judged.gcnr:.2f} (needs {MIN_GCNR:g}) and "
+            f"the best region {place} mm has contrast {judged.gcnr:.2f} (needs {MIN_GCNR:g}) and "
             f"evidence {wall.evidence:.0f} nats (needs {MIN_EVIDENCE:g}); give its rough centre "
             "and radius, or raise the gain"
         )
     if judged.closed < MIN_CLOSED:
         return (
-            f"the best one {place} mm is closed along {100 * judged.closed:.0f} % of its wall "
+            f"the best region {place} mm is closed along {100 * judged.closed:.0f} % of its wall "
             f"(needs {100 * MIN_CLOSED:g} %); give its rough centre and radius"
         )
     return ""

@@ -36,16 +36,18 @@ def decode_picture(data: bytes) -> NDArray[Any]:
                     return np.asarray(opened).astype(np.uint16)
                 return np.asarray(opened.convert("L"), dtype=np.uint8).copy()
     except UnidentifiedImageError:
-        raise RecordingError(f"no picture of {', '.join(FORMATS)} in {len(data)} bytes") from None
+        raise RecordingError(
+            f"{len(data)} bytes are not an image; expected {', '.join(FORMATS)}"
+        ) from None
     except RecordingError:
         raise
     except _DAMAGE as error:
-        raise RecordingError(f"damaged picture ({' '.join(str(error).split())[:120]})") from None
+        raise RecordingError(f"damaged image ({' '.join(str(error).split())[:120]})") from None
 
 
 def _require_small(picture: Image.Image) -> None:
     width, height = picture.size
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} a side")
+        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side")
     if picture.mode in ("I", "F"):
-        raise RecordingError(f"a picture of mode {picture.mode}: over 16 bits; save 16-bit grey")
+        raise RecordingError(f"an image of mode {picture.mode}: over 16 bits; save 16-bit grey")

@@ -55,7 +55,7 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         said = offered(_dots(folder)) if folder.is_dir() and "m_per_px" not in options else ""
         raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
     if not folder.is_dir():
-        raise UsageError(f"{folder} is no folder of PNG images")
+        raise UsageError(f"{folder} is not a folder of PNG images")
     side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
     images, lens = straightened(_images(folder), options)
     _require_meant(options["m_per_px"], side, images[0])
@@ -83,10 +83,10 @@ def offered(dots: Floats) -> str:
     for printers and screens too; empty where they are none or not the same both ways."""
     if len(dots) != 2 or not (np.isfinite(dots).all() and dots[0] > 0 and dots[0] == dots[1]):
         return ""
-    stated = f"; the file states {dots[0]:.6g} dots an inch"
+    stated = f"; the file declares {dots[0]:.6g} dots an inch"
     if np.isclose(dots[0], _PRINTERS, atol=0.05).any():
-        return f"{stated}, as printers and screens have them: no scale"
-    return f"{stated}: where they are of the instrument, --m-per-px {25.4 / dots[0]:.6g}mm"
+        return f"{stated}, as for printers and screens: not a scale"
+    return f"{stated}: if the instrument wrote them, give --m-per-px {25.4 / dots[0]:.6g}mm"
 
 
 def _dots(folder: Path) -> Floats:

@@ -48,7 +48,7 @@ def grey(image: RawImage) -> NDArray[Any]:
     if image.encoding in _DEEP:
         return _luma(_numbers(image, _DEEP[image.encoding], 2), image.encoding)
     raise RecordingError(
-        f"encoding '{image.encoding}'; read are grey, colour and bayer of 8 and 16 bits, and yuv422"
+        f"encoding '{image.encoding}'; expected grey, colour or bayer of 8 or 16 bits, or yuv422"
     )
 
 
@@ -57,7 +57,7 @@ def _numbers(image: RawImage, channels: int, size: int) -> NDArray[Any]:
     wide, height, step = image.width * channels * size, image.height, image.step
     if step < wide or len(image.data) < height * step or min(height, image.width) < 1:
         raise RecordingError(
-            f"{len(image.data)} bytes for {image.width} x {height} px of {channels}; cut"
+            f"{len(image.data)} bytes for {image.width} x {height} px of {channels}; truncated"
         )
     rows = np.frombuffer(image.data, np.uint8, height * step).reshape(height, step)
     numbers = np.ascontiguousarray(rows[:, :wide]).view(f"{'>' if image.big else '<'}u{size}")

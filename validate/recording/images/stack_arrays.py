@@ -55,7 +55,7 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
     if head(file, len(_BIG)) == _BIG:
         raise RecordingError(
             f"{file.name}: a BigTIFF whose numbers are big-endian, which Pillow does not read; "
-            "write it little-endian, as by tiffcp -L x.tif y.tif"
+            "write it little-endian, as with tiffcp -L x.tif y.tif"
         )
     try:
         with Image.open(file) as opened:
@@ -142,13 +142,13 @@ def _require_times(pages: int, times: int, channels: int, planes: int, by: str) 
     """Refuse pages that are no times alone: channels of an instant, or planes of a volume."""
     if times == 1 and planes > 1:
         raise RecordingError(
-            f"{pages} pages are {planes} planes of a volume ({by}), not images over time; of a "
-            "film call them frames, as by ImageJ's Image > Properties"
+            f"{pages} pages are {planes} planes of a volume ({by}), not images over time; if they "
+            f"are a film, declare them as frames, as with ImageJ's Image > Properties"
         )
     if (times > 1 and pages > times) or (channels > 1 and pages > times * planes):
         raise RecordingError(
             f"{pages} pages are {times} times of {channels} channels and {planes} planes ({by}); "
-            "write one of each, as by ImageJ's Image > Duplicate"
+            f"keep one channel and one plane, as with ImageJ's Image > Duplicate"
         )
 
 

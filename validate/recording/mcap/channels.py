@@ -87,7 +87,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         why = why_not(error, path, written)
         raise RecordingError(f"{path.name}: cannot be written ({why})") from error
     except UnicodeEncodeError as error:
-        raise RecordingError(f"{path.name}: text that is no UTF-8 ({error.reason})") from error
+        raise RecordingError(f"{path.name}: text that is not UTF-8 ({error.reason})") from error
 
 
 def _check(path: Path, channels: Sequence[WrittenChannel]) -> None:
@@ -120,7 +120,7 @@ def _write(
     for message in messages:
         topic, ns = message.topic, message.ns
         if topic not in numbers:
-            raise RecordingError(f"{name}: message of {topic!r}, declared are {sorted(numbers)}")
+            raise RecordingError(f"{name}: topic {topic!r} is not one of {sorted(numbers)}")
         if not before <= ns <= LAST_NS:
             raise RecordingError(
                 f"{name}: {topic!r} at {ns} ns, expected {before} .. {LAST_NS}: put the messages "

@@ -127,8 +127,8 @@ def binary(value: Any) -> bytes:
         try:
             return base64.b64decode(value, validate=True)
         except ValueError as error:
-            raise RecordingError(f"no base64 ({error})") from None
+            raise RecordingError(f"not base64 ({error})") from None
     try:
         return bytes(value)
     except (TypeError, ValueError) as error:
-        raise RecordingError(f"no bytes ({error})") from None
+        raise RecordingError(f"not bytes ({error})") from None

@@ -100,7 +100,7 @@ def _parts(
     if known is None:
         name = schema.name if schema else "no schema"
         return (
-            f"its messages mean nothing here ({name}); a number of them comes in by "
+            f"messages of unknown meaning ({name}); import a number with "
             f"--map {channel.topic}.FIELD=UNIT"
         )
     return _both(decode, known)
@@ -136,7 +136,7 @@ def _numbers(found: Any, key: str) -> Floats:
     try:
         return np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()
     except (TypeError, ValueError):
-        raise RecordingError(f"'{key}' is {str(found)[:40]!r}, no numbers") from None
+        raise RecordingError(f"'{key}' is {str(found)[:40]!r}, not numbers") from None
 
 
 def _at(message: Any, path: str) -> Any:
@@ -199,7 +199,7 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
             except RecordingError as error:
                 never[topic] = str(error)
                 continue
-            late = f"{moved} of {len(order)} samples were not in order of their stamps"
+            late = f"{moved} of {len(order)} samples were not in the order of their stamps"
             if notes := [*filter(None, (levels, late if moved else "", gone, unset))]:
                 told[topic] = "; ".join(notes)
             ns[topic] = times[order]
@@ -227,7 +227,9 @@ def _times(samples: Sequence[Sample]) -> tuple[Ints, str]:
     if not zero.any() or 0 < stamps.max() < _DATE:
         return stamps, ""
     published = np.array([p for _, p, _ in samples], np.int64)
-    return np.where(zero, published, stamps), f"{int(zero.sum())} stamps of 0: when published"
+    return np.where(
+        zero, published, stamps
+    ), f"{int(zero.sum())} stamps of 0: replaced by the publish time"
 
 
 def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:
@@ -261,7 +263,7 @@ def _why_none(parts: list[MessagePart], side: float | None) -> str:
     """Why samples are no one stream; empty where they are."""
     first = parts[0]
     if first.image is not None:
-        return "" if side else "images without a scale; say --map m_per_px=0.1mm"
+        return "" if side else "images without a scale; give --map m_per_px=0.1mm"
     if len({p.frame for p in parts}) > 1:
         return f"frames change: {sorted({p.frame for p in parts})[:4]}"
     counts = {p.values.shape for p in parts}

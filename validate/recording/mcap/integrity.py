@@ -155,7 +155,7 @@ class _Walk:
         got = self._read(min(len(MAGIC), self.size - self._at))
         if got != MAGIC:
             kind = _ShortError if which == "last" and MAGIC.startswith(got) else RecordingError
-            raise kind(f"the {which} 8 bytes are no MCAP magic ({got.hex()})")
+            raise kind(f"the {which} 8 bytes are not the MCAP magic ({got.hex()})")
         self._sums.update(got)
 
     def _record(self) -> int:

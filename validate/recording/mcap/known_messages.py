@@ -53,12 +53,12 @@ def stamp_ns(stamp: Any) -> int:
     if isinstance(stamp, str):
         return _moment_ns(stamp)
     if not isinstance(stamp, Mapping):
-        raise RecordingError(f"{type(stamp).__name__} is no time")
+        raise RecordingError(f"{type(stamp).__name__} is not a time")
     sec, nsec = stamp["sec"], stamp.get("nanosec", stamp.get("nsec"))
     try:
         return int(sec) * 10**9 + int(nsec)
     except OverflowError:
-        raise RecordingError(f"{sec} s is no time") from None
+        raise RecordingError(f"{sec} s is not a time") from None
 
 
 def _moment_ns(text: str) -> int:
@@ -68,7 +68,7 @@ def _moment_ns(text: str) -> int:
         at = datetime.fromisoformat(whole).replace(tzinfo=UTC)
         return int(at.timestamp()) * 10**9 + int(fraction.ljust(9, "0")[:9])
     except ValueError:
-        raise RecordingError(f"'{text[:40]}' is no time, as 2023-11-14T22:13:20.5Z") from None
+        raise RecordingError(f"'{text[:40]}' is not a time, as 2023-11-14T22:13:20.5Z") from None
 
 
 def _header(message: Plain) -> tuple[int, str]:
@@ -202,7 +202,7 @@ def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, co
             raise RecordingError(f"a cloud without '{axis}' as a float")
         dtype = np.dtype(order + _FLOATS[kind])
         if len(data) < count * stride or at + dtype.itemsize > stride:
-            raise RecordingError(f"{len(data)} bytes for {count} points of {stride}; cut")
+            raise RecordingError(f"{len(data)} bytes for {count} points of {stride}; truncated")
         column = np.ndarray((count,), dtype, data, int(at), (stride,))
         columns.append(column.astype(np.float64))
     return np.stack(columns, axis=1)

@@ -45,7 +45,9 @@ def all_records(recording: Recording) -> dict[str, Record]:
         raise RecordingError(f"{recording.name}: metadata names {taken} are reserved; rename them")
     for name, values in recording.metadata.items():
         if not all(isinstance(text, str) for pair in values.items() for text in pair):
-            raise RecordingError(f"{recording.name}: metadata {name!r} holds more than texts")
+            raise RecordingError(
+                f"{recording.name}: metadata {name!r} has values that are not text"
+            )
     return {**own, **recording.metadata}
 
 

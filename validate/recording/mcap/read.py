@@ -59,10 +59,12 @@ def _topics(verified: Verified) -> dict[int, Collected]:
     topics = Counter(c.channel.topic for c in collected.values())
     twice = sorted(topic for topic, n in topics.items() if n > 1)
     if twice:
-        raise RecordingError(f"topics on two channels: {twice}; their samples have no one order")
+        raise RecordingError(
+            f"topics on two channels: {twice}; the order of their samples is not known"
+        )
     if verified.claimed_messages not in (None, verified.messages):
         raise RecordingError(
-            f"its statistics claim {verified.claimed_messages} messages, it holds "
+            f"its statistics claim {verified.claimed_messages} messages, it has "
             f"{verified.messages}; see `validate inspect`"
         )
     return collected
@@ -111,7 +113,9 @@ def _read_all(path: Path, options: Options) -> Recording:
     own = read_recording(path) if ours(verified) else None
     if own is None and not found.make:
         why = "; ".join(f"{topic}: {reason}" for topic, reason in never.items())
-        raise RecordingError(f"{path.name}: no message in it becomes a stream; {why or 'empty'}")
+        raise RecordingError(
+            f"{path.name}: none of its messages can be read as a stream; {why or 'empty'}"
+        )
     return _together(path, verified, own, found, never)
 
 

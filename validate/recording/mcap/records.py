@@ -258,7 +258,7 @@ def _zstd(data: memoryview, size: int) -> bytes:
             return b""
         return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     except zstandard.ZstdError as error:
-        raise RecordingError(f"chunk is no valid zstd ({error})") from None
+        raise RecordingError(f"chunk is not valid zstd ({error})") from None
 
 
 def _lz4(data: memoryview, size: int) -> bytes:
@@ -266,7 +266,7 @@ def _lz4(data: memoryview, size: int) -> bytes:
     try:
         plain: bytes = unpacker.decompress(data, max_length=size + 1)
     except (RuntimeError, EOFError) as error:
-        raise RecordingError(f"chunk is no valid lz4 ({error})") from None
+        raise RecordingError(f"chunk is not valid lz4 ({error})") from None
     return plain
 
 

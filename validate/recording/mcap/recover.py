@@ -35,13 +35,13 @@ def recover(path: Path, out: Path) -> Recovered:
     written.
     """
     if out.resolve() == path.resolve():
-        raise UsageError(f"{out}: is the file to recover; name another")
+        raise UsageError(f"{out}: this is the file to recover; name another output")
     with opened(path) as stream:
         verified = verify(stream, path, cut=True)
         if verified.cut is None:
-            raise UsageError(f"{path.name}: is whole; nothing to recover, import it as it is")
+            raise UsageError(f"{path.name}: the file is complete; import it without --recover")
         if not verified.messages:
-            raise RecordingError(f"{path.name}: no whole message before byte {verified.cut.at}")
+            raise RecordingError(f"{path.name}: no complete message before byte {verified.cut.at}")
         told = _told(stream, verified, verified.cut)
         with replacing(out) as target:
             _copy(stream, target, verified.cut, _metadata(told))
@@ -64,7 +64,7 @@ def _told(stream: BinaryIO, verified: Verified, cut: Cut) -> dict[str, str]:
 def _missing(stream: BinaryIO, size: int, cut: Cut, last: int) -> str:
     """What the bytes after the whole part still tell."""
     if cut.ended:
-        return f"no message: only the summary is cut, at byte {cut.at}"
+        return f"no message: only the summary is truncated, at byte {cut.at}"
     after = "how many messages followed is not known"
     if cut.at == size:
         return f"the end of the data after byte {cut.at}; {after}"
@@ -76,7 +76,7 @@ def _missing(stream: BinaryIO, size: int, cut: Cut, last: int) -> str:
         start, end = (int.from_bytes(head[k : k + 8], "little") for k in (9, 17))
         found += (
             f", a chunk of {declared} bytes with log times {start} ns to {end} ns, up to "
-            f"{(end - last) / 1e9:.6f} s after the last that is saved"
+            f"{(end - last) / 1e9:.6f} s after the last saved message"
         )
     return f"{found}; {after}"
 

@@ -180,7 +180,7 @@ def parse_json(data: bytes) -> Json:
             data.decode("utf-8"), parse_constant=_no_constant, object_pairs_hook=_once
         )
     except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or nested without end
-        raise RecordingError(f"no readable JSON ({error})") from None
+        raise RecordingError(f"not readable JSON ({error})") from None
     if not isinstance(message, dict):
         raise RecordingError(f"JSON {type(message).__name__}, expected an object")
     return message
@@ -233,11 +233,11 @@ def _picture(message: Json) -> bytes:
     try:
         return base64.b64decode(_text(message, "data"), validate=True)
     except (binascii.Error, ValueError) as error:
-        raise RecordingError(f"field 'data' is no base64 ({error})") from None
+        raise RecordingError(f"field 'data' is not base64 ({error})") from None
 
 
 def _no_constant(token: str) -> float:
-    raise RecordingError(f"{token} is no JSON number; write null for 'not seen'")
+    raise RecordingError(f"{token} is not a JSON number; write null for a missing value")
 
 
 def _once(pairs: list[tuple[str, Any]]) -> Json:
@@ -274,7 +274,7 @@ def _stamp_ns(message: Json, name: str) -> int | None:
     parts = (value.get("sec"), value.get("nsec")) if isinstance(value, dict) else (None, None)
     sec, nsec = (p if type(p) is int else -1 for p in parts)
     if not (0 <= sec < 2**63 // 10**9 and 0 <= nsec < 10**9):
-        raise RecordingError(f"stamp sec {parts[0]}, nsec {parts[1]}: no int64 nanoseconds")
+        raise RecordingError(f"stamp sec {parts[0]}, nsec {parts[1]}: not int64 nanoseconds")
     return sec * 10**9 + nsec
 
 

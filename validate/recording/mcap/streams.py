@@ -193,8 +193,7 @@ def own_of(topic: str, samples: Sequence[Sample]) -> Floats | None:
     told = [s.each for s in samples if s.each is not None]
     if told and len(told) != len(samples):
         raise RecordingError(
-            f"{topic!r}: only some outlines have their own sd and confidence; give them to all or "
-            "none"
+            f"{topic!r}: only some outlines have an sd and a confidence; give them for all or none"
         )
     return np.array(told) if told else None
 
@@ -210,7 +209,7 @@ def require_all_stamped(topic: str, stamped: int, messages: int) -> None:
     """Raises `RecordingError` where only some messages have a stamp."""
     if stamped != messages:
         raise RecordingError(
-            f"{topic!r}: {stamped} of {messages} messages are stamped; stamp all or none"
+            f"{topic!r}: {stamped} of {messages} messages have a stamp; stamp all or none"
         )
 
 
@@ -261,8 +260,8 @@ def in_order(topic: str, i: int, sample: Sample, first: Sample) -> Floats:
     if sorted(names) != sorted(first.names):
         differ = sorted(set(names) ^ set(first.names))
         raise RecordingError(
-            f"{topic!r}: names change at message {i}, not in both: {differ}; "
-            "write null for a point that is not seen"
+            f"{topic!r}: names change at message {i}, not in both: {differ}; write null for a "
+            f"missing point"
         )
     place = {name: k for k, name in enumerate(names)}
     return values[[place[name] for name in first.names]]

@@ -114,7 +114,7 @@ def realtime(*, wanted: bool) -> Iterator[None]:
         os.sched_setscheduler(0, first, os.sched_param(_behind() + 1))
     except (AttributeError, OSError) as error:
         raise UsageError(
-            f"--realtime: {error}; it takes Linux and the right to it (CAP_SYS_NICE, or ulimit -r)"
+            f"--realtime: {error}; it needs Linux and the permission (CAP_SYS_NICE, or ulimit -r)"
         ) from error
     try:
         yield

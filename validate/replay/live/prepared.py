@@ -52,12 +52,14 @@ def prepared(experiment: Experiment, options: Options, method: str = "") -> Prep
     scene = out.experiment.build(recording, road.parameters, chosen.scene)
     if isinstance(scene, Meshless) or len(scene.tools) != 1:
         raise UsageError(
-            f"experiment '{experiment.name}' has no needle or probe: live is for those with one"
+            f"experiment '{experiment.name}' has no needle or probe, which `validate live` needs"
         )
     seen = out.experiment.place(recording, road.parameters, scene)
     given = out.experiment.sets(road.parameters, seen)
     stepper = chosen.prepare(build_system(scene), seen, given)
     if not isinstance(stepper, HandStepper):
-        raise UsageError(f"method '{name}' of '{experiment.name}' is no loop for a hand")
+        raise UsageError(
+            f"method '{name}' of '{experiment.name}' cannot run in real time under a tool"
+        )
     path = RecordedPath(seen.t, seen.inputs + np.array(stepper.tool.tip))
     return Prepared(out.experiment, name, road.parameters, stepper, path, seen.findings)

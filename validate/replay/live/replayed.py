@@ -17,7 +17,9 @@ def as_given(experiment: Experiment, recording: Recording) -> Experiment:
     Raises `ComparisonError` for an experiment without a twin, which every live loop's has.
     """
     if experiment.twin is None:
-        raise ComparisonError(f"experiment '{experiment.name}' has no twin to replay a loop with")
+        raise ComparisonError(
+            f"experiment '{experiment.name}' has no twin, which replaying a loop needs"
+        )
     method = recording.record(LIVE)["method"]
     names = sorted(name for name in recording.signals if name.startswith("given."))
     accept = tuple(Accept(name, _SAME, "rounding: the same method, replayed") for name in names)

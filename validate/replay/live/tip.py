@@ -41,5 +41,5 @@ def recorded_tip(
 
 def _require_dimension(recording: Recording, found: int, wanted: int, hint: str) -> None:
     if found != wanted:
-        words = f"{recording.name}: a tip of {found} coordinates, a body of {wanted}"
+        words = f"{recording.name}: the tip has {found} coordinates, the body has {wanted}"
         raise RecordingError(f"{words}; {hint}" if hint else words)
