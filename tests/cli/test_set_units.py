@@ -17,7 +17,7 @@ from validate.replay.options import Options, configure
     [
         ("material.E=15mm", "material.E=15mm: expected Pa"),
         ("inclusion.radius=8kPa", "inclusion.radius=8kPa: expected m"),
-        ("loads=3,6,9mm", "each with its own"),
+        ("loads=3,6,9mm", "each with its unit"),
         ("material.nu=0.4kPa", "without unit"),
         ("methods.p1_loop.tolerance=1kg", "tolerance=1kg: expected a number without unit"),
     ],

@@ -262,7 +262,7 @@ def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
         event_time(wide, "onset")
     with pytest.raises(RecordingError, match=r"between 3 and 3.02 s; "):
         event_time(one, "onset", (3.0, 3.02))
-    with pytest.raises(RecordingError, match="samples meet the reference, 10 are needed"):
+    with pytest.raises(RecordingError, match="samples lie within the reference; 10 are needed"):
         refined_lag(one, one, 9.95)
 
 

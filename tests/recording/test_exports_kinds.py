@@ -21,7 +21,7 @@ from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.types import Recording
 
 BARE = "Time (s),Displacement (mm),Load (N)\n"
-ASKED = "the file does not tell compression from tension: .*--map test=compression or --map test=t"
+ASKED = "unclear whether compression or tension: .*--map test=compression or --map test=t"
 
 
 def read(folder: Path, text: str, **mapping: str) -> Recording:

@@ -122,7 +122,7 @@ def test_pounds_inches_and_capitals(
 
 def test_kilograms_are_refused_with_what_to_pass(tmp_path: Path) -> None:
     text = "Time (s),Extension (mm),Load (kg)\n" + rows()
-    with pytest.raises(RecordingError, match="say kgf"):
+    with pytest.raises(RecordingError, match="write kgf"):
         read(tmp_path, text)
     assert_test(read(tmp_path, text, force="Load:kgf"), f=F * 9.80665)
 

@@ -116,7 +116,7 @@ def test_number_and_unit_of_a_text(text: str, parts: tuple[float, str] | None) -
 def test_a_unit_that_nobody_stated_is_itself_alone() -> None:
     assert in_si(2.5, "force unit", "force unit") == 2.5
     assert split("26 force unit/m") == (26.0, "force unit/m")
-    with pytest.raises(RecordingError, match="nobody stated"):
+    with pytest.raises(RecordingError, match="its kind is not declared"):
         si_factor("force unit", "force")
 
 

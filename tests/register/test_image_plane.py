@@ -111,7 +111,7 @@ def test_the_claim_holds_over_many_draws(make) -> None:  # type: ignore[no-untyp
 
 def test_what_leaves_the_plane_open_is_refused() -> None:
     rng = np.random.default_rng(2)
-    with pytest.raises(RegistrationError, match="2 points tell 6 numbers of 8 unknown ones"):
+    with pytest.raises(RegistrationError, match="2 points give 6 equations for 8 unknowns"):
         image_plane(landmarks(rng, 1, 2))
     still = wired(rng, 1)
     with pytest.raises(RegistrationError, match=r"mark targets at larger distances|do not fix"):

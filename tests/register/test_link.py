@@ -40,7 +40,7 @@ def test_links_of_a_known_motion_are_right() -> None:
 def test_two_clouds_that_have_nothing_in_common_are_refused() -> None:
     rng = np.random.default_rng(1)
     one, other = (rng.uniform(0, 200, (500, 3)) for _ in range(2))
-    with pytest.raises(RegistrationError, match="neighbours agree, 60 are needed"):
+    with pytest.raises(RegistrationError, match="neighbours agree; 60 are needed"):
         link(one, other)
 
 

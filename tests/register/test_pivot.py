@@ -85,7 +85,7 @@ def test_a_motion_that_leaves_the_tip_open_is_refused(tilt: Any, says: str) -> N
 
 def test_too_few_poses_and_a_tip_that_wanders_are_refused() -> None:
     R, T, point = turned(np.random.default_rng(4), WIDE)
-    with pytest.raises(RegistrationError, match="10 poses, at least 20"):
+    with pytest.raises(RegistrationError, match="10 poses; at least 20"):
         pivot(R[:10], T[:10], point[:10])
     moved = T + 0.05 * np.sin(np.linspace(0, 40, N))[:, None] * [1, 0.5, -0.7]
     with pytest.raises(RegistrationError, match=r"does not stay on one point|fewer than half"):

@@ -210,7 +210,7 @@ def test_fewer_than_four_left_is_an_error():
     y = cloud(1, 5)
     x = y.copy()
     x[0] = np.nan
-    assert "3 of 5 usable (1 not seen, 1 excluded)" in message(x, y, exclude=["m04"])
+    assert "3 of 5 usable (1 not visible, 1 excluded)" in message(x, y, exclude=["m04"])
 
 
 def test_wrong_inputs_are_refused():
@@ -325,7 +325,7 @@ def test_three_permuted_markers_are_named():
     y = cloud(5, d=2)
     x = y + np.random.default_rng(5).normal(0, SD, y.shape)
     x[[1, 4, 9]] = x[[4, 9, 1]]
-    assert "markers m01, m04 and m09 seem permuted" in message(x, y)
+    assert "markers m01, m04 and m09 look permuted" in message(x, y)
 
 
 @pytest.mark.slow
@@ -335,7 +335,7 @@ def test_any_permutation_of_a_jittered_grid_is_found(seed):
     x, _ = measured(y, seed)
     order = np.random.default_rng(seed).permutation(42)
     said = message(x[order], y)
-    assert "seem permuted" in said
+    assert "look permuted" in said
     assert "ambiguous" not in said
     found = relabellings(x[order], y, fit_rigid, SD)
     assert len(found) == 1

@@ -226,7 +226,7 @@ SPOILED: tuple[tuple[str, Spoil, type[ValidateError], str], ...] = (
         "markers in mm",
         lambda r: with_markers(r, lambda m: replace(m, x=1000 * m.x, sd=1000 * m.sd)),
         RegistrationError,
-        "wrong unit",
+        "check the unit",
     ),
     (
         "late signal",

@@ -41,7 +41,7 @@ def test_the_table_counts_looks_and_says_when() -> None:
 def test_a_filter_that_rejects_most_of_its_looks_is_warned_of() -> None:
     assert gate_warnings({"kf": gated(slice(0, 10))}) == ()
     (words,) = gate_warnings({"kf": gated(slice(0, 11))})
-    assert "its gate rejected 11 of 20 looks, 0.2 expected" in words
+    assert "its gate rejected 11 of 20 samples, 0.2 expected" in words
     found = gate_exhibit({"kf": gated(slice(0, 11))}, {})
     assert found is not None
     assert found.words == (words,)

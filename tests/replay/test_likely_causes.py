@@ -113,7 +113,7 @@ RAMP = np.clip(T, 0.2, 1.8) - 0.2  # N
 @pytest.mark.parametrize(("measured", "name", "words"), [
     (RAMP + 0.3, "zero", "a mean of 0.300 N"),
     (1000 * RAMP, "wrong unit", "near 1000"),
-    (1.3 * RAMP, "load or modulus", "as if the modulus were"),
+    (1.3 * RAMP, "load or modulus", "that multiple of the modulus"),
     (np.interp(T - 0.1, T, RAMP), "clock", "later than the simulated one"),
 ])  # fmt: skip
 def test_a_force_alone_has_causes(measured: Floats, name: str, words: str) -> None:

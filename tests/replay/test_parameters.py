@@ -93,7 +93,7 @@ def test_values_that_must_agree_change_together() -> None:
         ("inner.kind", "c", "one of a, b"),
         ("on", "yes", "true or false"),
         ("loads", "1,x", "not a number"),
-        ("loads", "3,6,9mm", "all in m without unit, or each with its own"),
+        ("loads", "3,6,9mm", "all in m without unit, or each with its unit"),
         ("loads", "3mm,6kPa", "loads=6kPa: expected m"),
         ("inner.E", "15mm", "inner.E=15mm: expected Pa"),
         ("inner.E", "15 furlong Pa", "expected Pa"),
@@ -135,7 +135,7 @@ def test_a_bare_number_a_thousand_off_is_asked_about() -> None:
         "a factor 1000? gel.loads=6mm",
     ]
     assert said[0].startswith("gel.E=15.2: 15.2 Pa is outside 100 to 1e+09 Pa (default 15200.0)")
-    assert doubts(Gel(), {"E": "2e10"})[0].endswith("; with its unit it is taken: E=2e+10Pa")
+    assert doubts(Gel(), {"E": "2e10"})[0].endswith("; with its unit it is accepted: E=2e+10Pa")
 
 
 @pytest.mark.parametrize(

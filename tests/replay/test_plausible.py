@@ -66,7 +66,7 @@ def test_a_value_beyond_soft_tissue(value: float, unit: str, path: str, factor: 
 
 def test_what_the_recording_says_otherwise() -> None:
     (found,) = said(sized(0.06), block=0.05)
-    assert found == "block = 0.06 m was entered; the recording says 0.05 m, 1.2 times"
+    assert found == "block = 0.06 m was entered; the recording has 0.05 m, 1.2 times"
 
 
 def test_strain_and_stress_of_the_whole_recording() -> None:

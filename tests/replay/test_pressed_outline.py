@@ -106,7 +106,7 @@ def test_a_uniformly_pressed_cylinder_has_the_outline_it_should(body: Mesh) -> N
 
 
 def test_what_places_the_images_is_asked_for(body: Mesh) -> None:
-    with pytest.raises(UsageError, match=r"where the images of 'seen' lie .* outline\.origin"):
+    with pytest.raises(UsageError, match=r"images 'seen' is not recorded: give outline\.origin"):
         registered(body, replace(PLACE, origin=()))
     with pytest.raises(UsageError, match=r"outline\.sd \(standard uncertainty"):
         registered(body, replace(PLACE, sd=None))

@@ -68,4 +68,4 @@ def test_json_is_one_document(reports: Path, tmp_path: Path) -> None:
 
 def test_an_experiment_without_runs_is_one_line(tmp_path: Path) -> None:
     assert "nearest: kf_cube" in refused("history", "kf_cub", cwd=tmp_path)
-    assert "`validate run kf_cube` makes one" in refused("history", "kf_cube", cwd=tmp_path)
+    assert "start one with `validate run kf_cube`" in refused("history", "kf_cube", cwd=tmp_path)

@@ -109,13 +109,13 @@ def _step(at: Floats) -> float:
     near, far = int(gaps.argmin()), int(gaps.argmax())
     if gaps[near] <= 0.1 * step:
         raise RegistrationError(
-            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, the others "
-            f"{1e3 * step:.2f} mm steps; keep one of them"
+            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, in "
+            f"steps of {1e3 * step:.2f} mm otherwise; keep one of them"
         )
     if gaps[far] > _GAP * step:
         raise RegistrationError(
-            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, the others are "
-            f"{1e3 * step:.2f} mm steps: outline the missing image"
+            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, and "
+            f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
         )
     return step
 

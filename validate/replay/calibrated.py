@@ -227,7 +227,7 @@ def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
         mark = part.recordings[0].source.sha256[:8]
         same = "" if part.on.judged else f", and the checks use the same recording ({mark})"
         raise ComparisonError(
-            f"'{twice}' of {part.name} calibrates f'{problem.calibration.method}'{same}: each "
+            f"'{twice}' of {part.name} calibrates '{problem.calibration.method}'{same}: each "
             f"value can be used only once; check other loads, quantities or recordings, or set "
             f"{', '.join(problem.space.names)}"
         )

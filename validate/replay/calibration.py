@@ -81,7 +81,7 @@ class Calibration:
     def __post_init__(self) -> None:
         if not self.free or not any(on.quantities for on in self.on):
             raise UsageError(
-                f"calibration of f'{self.method}': {len(self.free)} parameters on "
+                f"calibration of '{self.method}': {len(self.free)} parameters on "
                 f"{sum(len(on.quantities) for on in self.on)} quantities; name at least one of each"
             )
         paths = self.paths

@@ -192,7 +192,7 @@ def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:
             raise ComparisonError(
-                f"window f'{window.label}': {len(window.t)} samples of {recording.name}; "
+                f"window '{window.label}': {len(window.t)} samples of {recording.name}; "
                 f"{MIN_SAMPLES} are needed to check a prediction: widen fit_from, fit_to or limit"
             )
     if p.outline.topic is None:

@@ -158,7 +158,7 @@ def _frequency(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     return Cause(
         "modulus or density", found.explained(_at(found, since)),
         f"it rings at {rung[0].frequency:.4g} Hz, simulated at {rung[1].frequency:.4g} Hz: "
-        f"consistent with an E / rho of {ratio**2:.3g} times the given value",
+        f"consistent with {ratio**2:.3g} times the given E / rho",
         "weigh the body (rho); identify E on a static log; --set material.E=VALUE",
     )  # fmt: skip
 
@@ -292,8 +292,8 @@ def _factor(found: Difference, shown: RecordedMotion | None) -> Cause | None:
         )  # fmt: skip
     of = "load over modulus" if found.history.unit == "m" else "the modulus"
     return Cause(
-        "load or modulus", share, f"measured is {factor:.3g} times simulated, at all places and "
-                                  f"times: consistent with {of} of that many times the given value",
+        "load or modulus", share, f"measured is {factor:.3g} times simulated, at all places "
+                                  f"and times: consistent with that multiple of {of}",
         "identify E on a static log with a force; calibrate the force",
     )  # fmt: skip
 

@@ -187,7 +187,7 @@ def _require_apart(displacement: Pick, force: Pick, table: Table) -> None:
     other = "displacement" if force.said else "force"
     left = [c.label for c in table.columns if role_of(c) == kept and c is not force.column]
     raise UsageError(
-        f"column f'{force.column.label}' would be both displacement and force; name the other "
+        f"column '{force.column.label}' would be both displacement and force; name the other "
         f"column, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
     )
 

@@ -41,7 +41,7 @@ def signs(
     kind = kind or _by_strain(d, f, strain, stress)
     if kind is None:
         raise UsageError(
-            f"the file does not tell compression from tension: '{displacement.column.label}' goes "
+            f"unclear whether compression or tension: '{displacement.column.label}' goes "
             f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}{_of_neither(displacement, force)}"
         )
     if kind.name == "tension" and not kind.said and d + f < 0 and d * f >= 0:
