@@ -42,7 +42,9 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
             raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
     found = {f.stem: f for folder in searched_folders(start, named) for f in _files(folder)}
     if not found:
-        raise UsageError("no experiments/ folder here or in this project, and none was installed")
+        raise UsageError(
+            "no experiments/ folder here or in this project; give one with --experiments DIR"
+        )
     return found
 
 

@@ -116,7 +116,7 @@ def inside(folder: Path, name: str) -> Path:
         raise RecordingError(f"'{name[:60]}' cannot be followed; expected a file name") from None
     if said.startswith("/") or said[1:2] == ":" or not path.is_relative_to(root):
         raise RecordingError(
-            f"'{name[:60]}' lies outside its folder '{root.name}' and is not read; copy it there "
+            f"'{name[:60]}' is outside its folder '{root.name}' and is not read; copy it there "
             f"and give only its name"
         )
     return path

@@ -205,7 +205,7 @@ def test_inspect_and_import(tmp_path: Path, project_root: Path, shared_data: Pat
     assert code == 0
     told = " ".join(told.split())
     for found in (told, " ".join(here("inspect", str(out))[1].split())):
-        assert "test: compression: the header says 'Compression test'" in found
+        assert "test: compression: the header contains 'Compression test'" in found
         assert "signs: flipped: none, so that compression is positive" in found
         assert "units: 'Time (s)' in s x 1, 'Compression (mm)' in mm x 0.001, 'Load (N)'" in found
     topics = json.loads(here("inspect", str(out), "--json")[1])["topics"]

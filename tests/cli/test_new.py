@@ -325,7 +325,7 @@ def test_the_header_s_lengths_stand_beside_the_question_for_a_size(tmp_path: Pat
     said = {"width_m": "0.02", "thickness_m": "0.01"}
     write_recording(log(**said), tmp_path / "gel.mcap")
     _, listed = in_folder(tmp_path, "new", "a", "--from", "gel.mcap", "--questions")
-    assert listed.count("; the header says width 20 mm, thickness 10 mm, in m or as") == 2
+    assert listed.count("; the header gives width 20 mm, thickness 10 mm, in m or as") == 2
 
 
 def test_several_lengths_of_a_strip_are_shown_and_none_is_taken(tmp_path: Path) -> None:
@@ -335,7 +335,7 @@ def test_several_lengths_of_a_strip_are_shown_and_none_is_taken(tmp_path: Path) 
     (tmp_path / "z.csv").write_text(f"{top}Zeit (s);Weg (mm);Kraft (N)\n{rows}", "utf-8")
     assert in_folder(tmp_path, "import", "z.csv", "-o", "z.mcap")[0] == 0
     _, listed = in_folder(tmp_path, "new", "a", "--from", "z.mcap", "--questions")
-    assert "the header says width 10 mm, thickness 2 mm, Einspannlänge 100 mm, Messlä" in listed
+    assert "the header gives width 10 mm, thickness 2 mm, Einspannlänge 100 mm, Messlä" in listed
     assert "specimen.diameter" not in listed
 
 

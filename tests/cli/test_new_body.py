@@ -232,7 +232,7 @@ def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
         (here / "answers" / "a.toml").write_text(text, "utf-8")
         code, said = called("new", "other", "--from", "seen.mcap", "--answers", "answers/a.toml")
         assert code == 2
-        assert f"body.file: '{name[:60]}' lies outside its folder 'answers'" in said
+        assert f"body.file: '{name[:60]}' is outside its folder 'answers'" in said
 
 
 def test_outlines_without_a_pose_are_asked_where_they_lie(here: Path) -> None:

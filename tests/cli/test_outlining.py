@@ -114,7 +114,7 @@ def test_what_is_meant_is_said(two: Path, tmp_path: Path) -> None:
     found = read_recording(tmp_path / "c.mcap")
     (outline,) = found.contour("outline").outlines
     assert found.record("found/outline")["rivals"] == "none"
-    assert found.record("found/outline")["beside the place said"].startswith("(9.")
+    assert found.record("found/outline")["near the given centre"].startswith("(9.")
     assert radii(outline, np.array([110, 55])).mean() == pytest.approx(21, abs=0.5)
 
 
@@ -353,7 +353,7 @@ def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
 ) -> None:
     frames = read_recording(moving).frame("images")
     (tmp_path / "a.csv").write_text("frame,x,y\n")
-    with pytest.raises(UsageError, match=r"--label cyst: of masks and polygons; a.csv has none"):
+    with pytest.raises(UsageError, match=r"--label cyst: a.csv has no labels"):
         foreign_outline._read(tmp_path / "a.csv", frames, "cyst")
     with pytest.raises(UsageError, match=r"unit kg of a.csv: expected px, or a unit of length"):
         foreign_outline._scale(tmp_path / "a.csv", frames, "kg")

@@ -39,7 +39,7 @@ def test_points_of_a_motion_capture_are_metres_at_their_times(shared_data: Path)
     between = np.linalg.norm(markers.x[:, 3] - markers.x[:, 4], axis=-1)
     assert between.mean() == pytest.approx(0.0578, abs=5e-4)  # rigid clamp
     assert between.std() < 2e-4
-    assert got.metadata["provenance"]["unit"] == "m (stated)"
+    assert got.metadata["provenance"]["unit"] == "m (declared)"
     assert float(got.metadata["provenance"]["residual_median_m"]) == pytest.approx(3e-4, rel=0.1)
 
 

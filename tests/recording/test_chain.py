@@ -105,7 +105,7 @@ def test_a_left_handed_pose_is_told() -> None:
     lines = list(chain_faults(recording(StylusToTracker=(mirrored, x))))
     assert "40 of 40 are left-handed (determinant -1)" in lines[0]
     scaled = next(chain_faults(recording(StylusToTracker=(1.1 * R, x))))
-    assert "off a rotation by 0.21" in scaled
+    assert "not a rotation (error 0.21)" in scaled
 
 
 def test_poses_at_other_times_are_not_compared() -> None:

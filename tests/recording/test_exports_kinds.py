@@ -62,7 +62,7 @@ def test_the_words_of_a_language_decide_both_ways(language: str, tmp_path: Path)
     for line, wanted in ((pulls, PULLS), (presses, PRESSES)):
         recording = read(tmp_path, f"{line}\n{table}\n{rows()}")
         assert sense(recording) == wanted
-        assert recording.record(ASSUMED)["test"] == f"{wanted[0]}: the header says '{line}'"
+        assert recording.record(ASSUMED)["test"] == f"{wanted[0]}: the header contains '{line}'"
     with pytest.raises(UsageError, match=ASKED):
         read(tmp_path, f"{table}\n{rows()}")
 
@@ -88,7 +88,7 @@ def test_every_word_of_the_table_is_found_and_only_of_its_kind(kind: str) -> Non
 def test_names_of_columns_decide(names: str, wanted: tuple[str, int, int], tmp_path: Path) -> None:
     recording = read(tmp_path, f"{names}\n{rows()}")
     assert sense(recording) == wanted
-    assert "the column says '" in recording.record(ASSUMED)["test"]
+    assert "the column contains '" in recording.record(ASSUMED)["test"]
 
 
 def with_strain(strain: float, stress: float = 0.0, d: float = 1.0, f: float = 1.0) -> str:
@@ -193,7 +193,7 @@ def test_a_kind_that_is_neither_is_refused() -> None:
 def test_an_aborted_run_is_remarked(line: str, tmp_path: Path) -> None:
     for text in (f"{line}\n{BARE}{rows()}", f"{BARE}{rows()}\n{line}\n"):
         recording = read(tmp_path, text, test="compression")
-        assert recording.record(ASSUMED)["run"].startswith(f"aborted: the file says '{line}'")
+        assert recording.record(ASSUMED)["run"].startswith(f"aborted, by the words '{line}'")
         assert len(recording.signals["force"].t) == len(T)
 
 

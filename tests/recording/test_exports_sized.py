@@ -42,8 +42,8 @@ def test_engineering_measures_are_multiplied(tmp_path: Path) -> None:
     recording = read(tmp_path, table(PLAIN, 100 * E, SIGMA), **SIZES, test="tension")
     assert_pulled(recording)
     told = recording.record(ASSUMED)["sizes"]
-    assert "displacement = engineering strain 'Strain (%)' x length 0.02 m (said)" in told
-    assert "force = engineering stress 'Stress (kPa)' x area 0.000314 m2 (said)" in told
+    assert "displacement = engineering strain 'Strain (%)' x length 0.02 m (given)" in told
+    assert "force = engineering stress 'Stress (kPa)' x area 0.000314 m2 (given)" in told
     assert float(recording.record("specimen")["area_m2"]) == pytest.approx(AREA)
     assert float(recording.record("specimen")["height_m"]) == pytest.approx(LENGTH)
 

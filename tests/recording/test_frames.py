@@ -370,7 +370,7 @@ def test_files_of_a_stack_are_bounded_alone_and_together(
     monkeypatch.undo()
     (tmp_path / "2.png").symlink_to(tmp_path / "nowhere.png")
     with pytest.raises(
-        RecordingError, match=r"2.png. lies outside its folder|cannot be read \(No such file"
+        RecordingError, match=r"2.png. is outside its folder|cannot be read \(No such file"
     ):
         read_png_stack(tmp_path, options)
 

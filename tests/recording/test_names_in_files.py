@@ -77,23 +77,23 @@ def series(folder: Path) -> Path:
 
 
 ODD = {
-    "nrrd absolute": (nrrd("data file: {secret}"), "lies outside its folder"),
-    "nrrd above": (nrrd("data file: ../secret"), "lies outside its folder"),
-    "nrrd link": (nrrd("data file: link"), "'link' lies outside its folder"),
-    "nrrd old key": (nrrd("datafile: ../secret"), "lies outside its folder"),
+    "nrrd absolute": (nrrd("data file: {secret}"), "is outside its folder"),
+    "nrrd above": (nrrd("data file: ../secret"), "is outside its folder"),
+    "nrrd link": (nrrd("data file: link"), "'link' is outside its folder"),
+    "nrrd old key": (nrrd("datafile: ../secret"), "is outside its folder"),
     "nrrd list": (nrrd("data file: LIST"), "cannot be read"),
     "nrrd pipe": (nrrd("data file: pipe"), "a folder, pipe or device"),
-    "mha absolute": (mha("{secret}"), "lies outside its folder"),
-    "mha above": (mha("../secret"), "lies outside its folder"),
-    "mha link": (mha("link"), "'link' lies outside its folder"),
+    "mha absolute": (mha("{secret}"), "is outside its folder"),
+    "mha above": (mha("../secret"), "is outside its folder"),
+    "mha link": (mha("link"), "'link' is outside its folder"),
     "mha list": (mha("LIST"), "one file in the same folder is read"),
     "mha pattern": (mha("%03d.raw 1 4 1"), "one file in the same folder is read"),
     "mha pipe": (mha("pipe"), "a folder, pipe or device"),
     "images pipe": (pictures(os.mkfifo), r"2\.png: a folder, pipe or device"),
-    "images zero": (pictures(lambda p: p.symlink_to("/dev/zero")), "'2.png' lies outside"),
-    "images link": (pictures(outside), "'2.png' lies outside its folder 'images'"),
-    "bag link": (bag, "'bag_0.db3' lies outside its folder 'bag'"),
-    "dicom link": (series, "'b.dcm' lies outside its folder 'series'"),
+    "images zero": (pictures(lambda p: p.symlink_to("/dev/zero")), "'2.png' is outside"),
+    "images link": (pictures(outside), "'2.png' is outside its folder 'images'"),
+    "bag link": (bag, "'bag_0.db3' is outside its folder 'bag'"),
+    "dicom link": (series, "'b.dcm' is outside its folder 'series'"),
 }
 
 
@@ -121,7 +121,7 @@ def test_a_log_folder_s_links_and_pipes_are_refused(tmp_path: Path) -> None:
     (tmp_path / "secret.csv").write_text("Time (s),Load (N)\n0,0\n1,2\n2,4\n")
     (folder / "a.csv").symlink_to(tmp_path / "secret.csv")
     line = refused("import", str(folder), "-o", str(tmp_path / "o.mcap"))
-    assert "'a.csv' lies outside its folder 'logs'" in line
+    assert "'a.csv' is outside its folder 'logs'" in line
     (folder / "a.csv").unlink()
     os.mkfifo(folder / "a.csv")
     assert "a.csv" in refused("import", str(folder), "-o", str(tmp_path / "o.mcap"))

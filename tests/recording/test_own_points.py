@@ -143,7 +143,7 @@ def test_a_row_a_point_and_instant_is_markers_over_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("without", "said"),
     [
-        ("time (s)+frame", "every one of 2 names stands in several rows"),
+        ("time (s)+frame", "every one of 2 names occurs in several rows"),
         ("marker", "1.8 rows at each|is not after the one before"),
         ("marker+frame", "its time is not after the one before"),
     ],
@@ -159,7 +159,7 @@ def test_a_rate_makes_no_motion_of_points_without_names(tmp_path: Path) -> None:
     """Two points at each instant, by a rate one that jumps between them."""
     lines = [f"{t:.1f},{i},{i},0" for t in (0, 0.1, 0.2) for i in (1, 9)]
     (tmp_path / "p.csv").write_text("\n".join(["time (s),x (mm),y (mm),z (mm)", *lines]) + "\n")
-    with pytest.raises(RecordingError, match=r"2 rows at each 'time \(s\)', and no column says"):
+    with pytest.raises(RecordingError, match=r"2 rows at each 'time \(s\)', and no column names"):
         read(tmp_path / "p.csv", {"rate": "20"})
 
 

@@ -64,7 +64,7 @@ def test_a_comma_separated_trc_is_read_and_says_that_it_is_a_part(shared_data: P
     assert markers.names[:3] == ("ASISl", "ASISr", "PSISl")
     assert markers.x[0, 0] == pytest.approx([0.7337041, 0.0809832, 0.1918668])
     assert got.clock["markers"].rate_hz == pytest.approx(100)
-    assert got.metadata["provenance"]["rows"] == "93, the header states 652"
+    assert got.metadata["provenance"]["rows"] == "93, the header declares 652"
 
 
 def test_seven_zeros_of_a_tracker_are_not_seen(shared_data: Path) -> None:

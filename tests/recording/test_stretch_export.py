@@ -47,7 +47,7 @@ def test_a_plane_has_two_of_both(tmp_path: Path) -> None:
         (f"stretch,load_[N]\n{ROWS}", "1 columns of stretch and 0 of stress"),
         ("stretch,stress_[kPa]\n0,0\n25,2\n50,3\n75,4\n", "line 2: stretch 0"),
         ("stretch,stress_[kPa]\n1,0\n25,2\n50,3\n75,4\n", "is it a strain in per cent"),
-        ("stretch,stress_[kPa]\n1,0\n.9,2\n.8,3\n.7,4\n", "other signs in 3 of 4 rows"),
+        ("stretch,stress_[kPa]\n1,0\n.9,2\n.8,3\n.7,4\n", "differ in sign in 3 of 4 rows"),
     ],
 )
 def test_what_is_no_such_curve_is_refused(tmp_path: Path, text: str, match: str) -> None:

@@ -202,7 +202,9 @@ def test_a_trajectory_of_words_and_numbers_at_spaces(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_without_names_is_told_which_to_write(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="are poses in time: # timestamp tx ty tz qx qy qz qw"):
+    with pytest.raises(
+        RecordingError, match="for poses over time, the line: # timestamp tx ty tz qx qy qz qw"
+    ):
         read_instron(log(tmp_path / "t.txt", *TUM), {})
 
 

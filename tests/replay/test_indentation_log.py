@@ -48,4 +48,4 @@ def test_with_the_compliance_the_verdict_is_right_and_without_it_wrong(
     checks = {c.name: c for c in wrong.checks}
     assert checks["force.max@high"].validation == "differs"
     assert wrong.warnings[0].startswith("machine.compliance is not set")
-    assert "largest doubt: the machine's compliance" in wrong.sentence
+    assert "largest warning: the machine's compliance" in wrong.sentence

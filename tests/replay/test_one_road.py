@@ -124,7 +124,7 @@ def test_without_a_twin_nothing_is_scored_or_drawn_against_a_truth(untold: Resul
 
 def test_a_case_that_nobody_can_record_is_refused() -> None:
     case = Case("stiff", "no twin makes it", stiffer)
-    with pytest.raises(ComparisonError, match="case 'stiff' is not shipped, and no declared twin"):
+    with pytest.raises(ComparisonError, match="case 'stiff' has no shipped recording"):
         compare(declared(TINY, twin=None, uncertainty=FINER, cases=(case,)), Options({}))
 
 

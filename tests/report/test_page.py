@@ -159,7 +159,7 @@ def test_sentences_say_what_can_and_cannot_be_told_apart() -> None:
     first, second = found["discrimination"].exhibit.words
     assert "can distinguish it, by force.plate" in first
     assert "cannot be distinguished" in second
-    assert "would decide: a better cell" in second
+    assert "try sensors: a better cell" in second
 
 
 def test_references_without_noise_are_no_sensors() -> None:

@@ -75,7 +75,7 @@ def test_the_liver(shared_data: Path) -> None:
         (inp(body("tet4"), extra="*Include, input=body.inp"), "'body.inp' in line 36 includes its"),
         (inp(body("tet4"), extra="*Include, input=a.inp, password=b"),
             "encrypted; export it without encryption"),
-        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is no name of a file"),
+        (inp(body("tet4"), extra="*Include, input=a\0.inp"), "is not a file name"),
         (inp(body("tet4"), extra=f"*Include, input={300 * 'a'}"), "cannot be followed"),
         (inp(body("tet4")).replace("*Part", "*Ngen\n1, 5\n*Part"), r"\*Ngen in line 3: is not"),
         (inp(body("tet4")).replace("*Node", "*System\n1., 0\n*Node"), r"\*System in line 4: exp"),
@@ -140,7 +140,7 @@ def test_what_a_deck_includes_stands_in_its_place(tmp_path: Path) -> None:
         read_foreign(path, "m")
     (tmp_path / "low.txt").unlink()
     (tmp_path / "low.txt").symlink_to("/etc/passwd")
-    with pytest.raises(SceneError, match="lies outside its folder"):
+    with pytest.raises(SceneError, match="is outside its folder"):
         read_foreign(path, "m")
 
 

@@ -292,7 +292,7 @@ def test_a_body_of_an_unusual_size_is_asked_about_its_unit(tmp_path: Path) -> No
     for said in (["--unit", "m"], ["--unit", "mm", "--size", "180um"], ["--unit", "cm"]):
         assert run.invoke(cli, ["body", str(path), *said]).exit_code == 0
     other = run.invoke(cli, ["body", str(path), "--unit", "m", "--size", "18mm"])
-    assert "--size 18mm: its largest side is 180 mm in m; check" in str(other.exception)
+    assert "--size 18mm: the largest side is 180 mm in m; check" in str(other.exception)
     write_mesh(replace(mesh, nodes=1e3 * mesh.nodes), out)
     large = run.invoke(cli, ["body", str(out)])
     assert "3e+04 mm (lengths in m); 10 x 20 x 30 mm in mm" in str(large.exception)
@@ -330,7 +330,7 @@ def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]
         ("<VTKFile><DataSet file='a.vtu'/></VTKFile>", r"not a list of files \('timestep'\)"),
         ("<VTKFile><DataSet timestep='x' file='a'/></VTKFile>", r"not a list of files \(could not"),
         ("<VTKFile></VTKFile>", "lists no file"),
-        ("<VTKFile><DataSet timestep='0' file='../a.vtu'/></VTKFile>", "'../a.vtu' lies outside"),
+        ("<VTKFile><DataSet timestep='0' file='../a.vtu'/></VTKFile>", "'../a.vtu' is outside"),
         (
             "<!DOCTYPE x><VTKFile></VTKFile>",
             "declares XML entities, which a list of files does not need",

@@ -133,7 +133,7 @@ def test_a_series_of_vtu_is_an_answer_as_arrays_are(tmp_path: Path, binary: bool
         ("m = meshio.read(folder / 'step0.vtu'); m.points = m.points[::-1]; m.write(folder / "
          "'step0.vtu')", "points that differ from the 12 nodes of the job"),
         ("(folder / 'fields.pvd').write_text((folder / 'fields.pvd').read_text()"
-         ".replace('step1.vtu', '../step1.vtu'))", "lies outside its folder"),
+         ".replace('step1.vtu', '../step1.vtu'))", "is outside its folder"),
         ("(folder / 'fields.pvd').write_text('<!DOCTYPE a>' + '<a/>')", "declares XML entities"),
         ("m = meshio.read(folder / 'step1.vtu'); m.point_data = {'speed': m.points}; "
          "m.write(folder / 'step1.vtu')", "expected a displacement"),

@@ -173,4 +173,4 @@ def _drawn(pair: _Pair, offset: Offset, out: Path, *, several: bool) -> None:
     picture = out.with_name(f"{out.stem}{own}-aligned.png")
     drawing = aligned(pair.reference, pair.stream, pair.names, offset.seconds)
     picture.write_bytes(png(drawing))
-    say(f"{picture}shows both channels on one clock: check it", indent="  ")
+    say(f"{picture}: both channels on one clock; check it", indent="  ")

@@ -117,8 +117,8 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
     fallen = [p for p in content["published"] if p["fault"]]
     moved, overall = content["moved"], content["overall"]
     parts = [f"the verdict is {overall['verdict']}"]
-    parts += [f"{len(moved)} verdicts changed"] if moved else []
-    parts += [f"{len(fallen)} printed figures no longer hold"] if fallen else []
+    parts += [f"verdicts changed: {len(moved)}"] if moved else []
+    parts += [f"printed figures that no longer hold: {len(fallen)}"] if fallen else []
     holds = "holds" if document["holds"] else "does not hold"
     warnings = [f"{m['method']}: {m['check']} is {m['found']}; expected: "
                 f"{m['expected'] or 'not declared'}" for m in moved]  # fmt: skip

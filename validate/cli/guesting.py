@@ -74,7 +74,7 @@ def job(
 
 
 def _print(found: Sequence[OffBy]) -> None:
-    head = ["scene", "capable", "quantity", "error", "exact", "unit"]
+    head = ["scene", "solved", "quantity", "error", "exact", "unit"]
     table("", head, [_row(row) for row in found])
     for row in found:
         if row.why:

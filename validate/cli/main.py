@@ -154,12 +154,10 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
     "--case",
     default="",
     metavar="NAME",
-    help="Run this case only, in addition to the recording.",
+    help="Run only this case (variant) in addition to the recording.",
 )
 @GUESTS
-@click.option(
-    "--anyway", is_flag=True, help="Predict also with parameters that are not identifiable."
-)
+@click.option("--anyway", is_flag=True, help="Predict even if parameters are not identifiable.")
 @click.option("--json", "as_json", is_flag=True, help="Print results.json of all runs as one list.")
 @click.option(
     "--vtu", is_flag=True, help="Also write a ParaView series to paraview/ in the report."
@@ -353,7 +351,7 @@ def _common(options: dict[str, Any]) -> Any:
     "hold_out",
     default="",
     metavar="each|A,B",
-    help="Markers withheld from all filters.",
+    help="Markers withheld from all filters: names, or each in turn.",
 )
 @_studied
 def filters(name: str, **options: Any) -> int:
@@ -450,7 +448,7 @@ def coverage(name: str, **options: Any) -> int:
     "--parameters",
     default="",
     metavar="A,B=LOW:HIGH",
-    help="Parameters (default: those without a value). One that is not declared needs bounds.",
+    help="Parameters to identify (default: those without a value); give bounds of undeclared ones.",
 )
 @click.option(
     "--seeds", type=int, help="Number of starting points (default: 10; 5 for one parameter)."
@@ -489,7 +487,7 @@ def identify(name: str, **options: Any) -> int:
 @output("Recording to write (default: NAME-live.mcap in reports/).", required=False)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
 def live_(name: str, **options: Any) -> int:
-    """Run a model in real time under a tool.
+    """Run a model in real time, driven by a tool.
 
     \b
     Example:

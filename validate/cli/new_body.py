@@ -155,7 +155,7 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
         asked.append(Question("moved.markers", text, open=True, check=three_of(names)))
     elif unit_of(recording, by) == "m":
         if by == NOTED:
-            asked.append(by_path("moved.noted", "noted displacements, evenly spaced from the "
+            asked.append(by_path("moved.noted", "displacements you noted, evenly spaced from the "
                                                 "first to "
                                "the last instant, linear between, as 0,2mm,5mm"))  # fmt: skip
         asked += of_the_indenter(recording, found)

@@ -19,7 +19,7 @@ def _fits(recording: Recording) -> bool:
 
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
     length = quantity_in("m")
-    along = {"x": "from the fixed plate to the moving one", "y": "height", "z": "lateral size"}
+    along = {"x": "length (fixed to moving plate)", "y": "height", "z": "lateral size"}
     return [
         Question(
             f"block.{c}", f"{what} of the block, in m or as 60mm; empty: left open", check=length

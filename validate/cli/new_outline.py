@@ -123,7 +123,7 @@ def fields(found: Answers) -> dict[str, str]:
                 "E": "None"}  # fmt: skip
     inside = found["outline.shows"] == _WALL
     return {
-        "outline": f"    # The images, and where they lie, m.\n    outline={_card(found)},\n",
+        "outline": f"    # The images and their position, m.\n    outline={_card(found)},\n",
         "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
         "body": _mesh(found) if inside else "",
         "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside else "None",

@@ -65,7 +65,7 @@ def _what(name: str, recording: Recording) -> str:
         "diameter": "diameter of the specimen (if not round: of a circle of the same area)",
         "height": "height of the specimen (in tension: length between the grips)",
     }[name]
-    return f"{what}{'; the header says ' + ', '.join(lengths) if lengths else ''}"
+    return f"{what}{'; the header gives ' + ', '.join(lengths) if lengths else ''}"
 
 
 def _called(size: str) -> str:

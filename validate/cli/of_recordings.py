@@ -66,14 +66,16 @@ def inspect(
     "mapping",
     multiple=True,
     metavar="ROLE=COLUMN[:UNIT][:-]",
-    help="Column, unit and sign of time, displacement or force; specimen=2; unit=mm.",
+    help="Column, unit and sign of a quantity, or a reader's option, as specimen=2.",
 )
 @click.option(
     "--m-per-px", metavar="LENGTH", help="Images and videos: size of a pixel, as 1e-4 (m) or 0.1mm."
 )
 @click.option("--rate", type=float, help="Images and videos: images per second, Hz.")
 @click.option("--topic", help="Images and videos: topic to write (default: images).")
-@click.option("--specimens", metavar="one|each|A,A,B", help="Several logs: the specimen of each.")
+@click.option(
+    "--specimens", metavar="one|each|A,A,B", help="Specimens of several logs: one, each, or labels."
+)
 @click.option("--recover", is_flag=True, help="Truncated MCAP: save all complete messages.")
 def import_(
     files: tuple[Path, ...],
@@ -169,7 +171,7 @@ def merge(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
 )
 @click.option("--within", type=float, metavar="SECONDS", help="Largest offset to search.")
 @click.option("--correlation", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
-              show_default=True, metavar="SHARE", help="Lowest correlation.")  # fmt: skip
+              show_default=True, metavar="SHARE", help="Lowest accepted correlation.")  # fmt: skip
 @click.option("--coverage", type=click.FloatRange(0.0, 1.0, min_open=True), default=0.5,
               show_default=True, metavar="SHARE",
               help="Lowest share of a file's samples within the first file's time.")  # fmt: skip
@@ -256,7 +258,7 @@ def calibrate(
 def digitise(file: Path, out: Path, **how: Any) -> None:
     """Find the landmarks touched with a tracked tool.
 
-    Known landmarks name them; each is then also predicted from the others.
+    With --known, landmarks get their names, and each is also predicted from the others.
 
     \b
     Example:
@@ -281,7 +283,7 @@ def new(
 ) -> None:
     """Write an experiment from a recording and your answers.
 
-    What the recording does not contain is asked on a terminal, or taken from --answers.
+    The command asks for what the recording does not contain, or reads it from --answers.
 
     \b
     Example:

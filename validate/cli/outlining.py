@@ -132,7 +132,7 @@ def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
         "rivals": _named(found.rivals),
     }
     if found.beside:
-        told["beside the place said"] = _named(found.beside)
+        told["near the given centre"] = _named(found.beside)
     if found.without:
         told["left out"] = ", ".join(map(str, found.without))
     return told

@@ -37,7 +37,7 @@ def show_run(
     """Print the answer of a run on one screen; "full" adds every check and notice."""
     verbose = detail == "full"
     ranking = _ranking(result)
-    causes = "Likely causes: share of the squared error, what would decide"
+    causes = "Likely causes: share of the squared error, next check"
     end = f"{seconds:.1f} s wall time; report: {relative(page)}"
     show(
         (

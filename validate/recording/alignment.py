@@ -111,8 +111,8 @@ def _require_coverage(offset: Offset, total: int, least: float) -> None:
     if offset.coverage < least:
         raise RecordingError(
             f"at an offset of {offset.seconds:+.6g} s {offset.count} of {total} samples "
-            f"({100 * offset.coverage:.0f} %) meet the reference, at least {100 * least:.0f} % are "
-            "needed; record longer together or lower the stated share (--coverage)"
+            f"({100 * offset.coverage:.0f} %) meet the reference; at least {100 * least:.0f} % are "
+            "needed; record longer together or lower the required share (--coverage)"
         )
 
 

@@ -92,7 +92,7 @@ def _improper(link: Link) -> Iterator[str]:
             f"axis was reversed; export it right-handed"
         )
     elif off > _PROPER:
-        yield f"{where}: off a rotation by {off:.2g}: scaled, sheared, or from other columns"
+        yield f"{where}: not a rotation (error {off:.2g}): scaled, sheared or wrong columns"
 
 
 def _way(tree: dict[str, list[Link]], start: str, end: str) -> list[Link] | None:
@@ -129,7 +129,7 @@ def _differing(direct: Link, way: Sequence[Link]) -> Iterator[str]:
         f"pose of '{direct.child}' in '{direct.parent}' contradicts the way by {by} in "
         f"{int(beyond.sum())} of {len(apart)} samples, by up to {1e3 * apart.max():.3g} mm and "
         f"{turned.max():.3g} degrees ({1e3 * allowed:.3g} mm and {TURNED:g} degrees are allowed): "
-        "a transform is turned round, or of another session"
+        "a transform is inverted, or from another session; export it again"
     )
 
 

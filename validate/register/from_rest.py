@@ -61,7 +61,7 @@ def since_rest(
         seen = Markers(np.arange(len(whole.x), dtype=float), whole.names, whole.x, 0.0, "body")
         unit = another_unit(seen, size)
         raise RegistrationError(
-            f"{error}; {unit or 'of markers on stalks say how far: --set seen.stands=15mm'}"
+            f"{error}; {unit or 'for markers on stalks give their length: --set seen.stands=15mm'}"
         ) from None
     moved = np.nan_to_num(whole.x - rest)
     most = moved[np.linalg.norm(moved, axis=2).max(axis=1).argmax()]

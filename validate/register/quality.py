@@ -332,5 +332,5 @@ def _excess(
     without = f" without {outliers} outliers" if outliers else ""
     return [
         f"residual{without} {1e3 * per_axis:.3g} mm per axis is {per_axis / noise:.3g} times the "
-        f"noise of {1e3 * noise:.3g} mm (declared; for exact data, rounding), unexplained"
+        f"noise of {1e3 * noise:.3g} mm (declared, or rounding); check marker names and layout"
     ]

@@ -81,7 +81,7 @@ def label_fault(
             f"manually"
         )
     verb = "swapped" if len(best.moved) == 2 else "permuted"
-    return f"markers {moved} look {verb}: {change}; correct the names or exclude them"
+    return f"markers {moved} seem {verb}: {change}; correct the names or exclude them"
 
 
 def _explains(best: Relabelling, source: Floats, target: Floats, fit: Fit, noise: float) -> bool:

@@ -184,5 +184,5 @@ def windows_of(
             raise ComparisonError(
                 f"window {label}: 0 samples {span}; '{drive.name}' covers {covered}"
             )
-        found.append(Selection(label, drive.t[inside], f"every sample with the drive {span}"))
+        found.append(Selection(label, drive.t[inside], f"every sample whose drive is {span}"))
     return tuple(found)

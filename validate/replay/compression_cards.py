@@ -67,7 +67,7 @@ class Gel:
     )
     nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
     by_method: tuple[tuple[str, float, float], ...] = quantity(
-        (), "1", "found by the run: of each model, its modulus Pa and where its load begins, m"
+        (), "1", "set by the run: modulus (Pa) and start of the load (m) of each model"
     )
     coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
 
@@ -82,7 +82,7 @@ class CylinderGrid:
 
 @dataclass(frozen=True)
 class CompressionRanges(Ranges):
-    E: float = quantity(0.05, "1", "relative, of a modulus that is given")
+    E: float = quantity(0.05, "1", "relative, of a given modulus")
     diameter: float = quantity(0.005, "1", "relative, of the diameter")
     height: float = quantity(0.005, "1", "relative, of the height; of outlines or an identified E")
     nu: float = quantity(0.01, "1", "of the Poisson ratio; of outlines or an identified E")
@@ -105,4 +105,4 @@ class Compression:
     outline: PressedOutline = PressedOutline()
     fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
     fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
-    limit: float = quantity(0.10, "1", "strain to which the models are shown; linear: about 0.1")
+    limit: float = quantity(0.10, "1", "largest strain compared; linear laws hold to about 0.1")

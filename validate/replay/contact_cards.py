@@ -45,7 +45,7 @@ class Indenter:
             )
         if len(self.tip) not in (0, 3) or not self.reach >= 0:
             raise UsageError(
-                f"indenter.tip = {self.tip}, indenter.reach = {self.reach:g} m: a point of three "
+                f"indenter.tip = {self.tip}, indenter.reach = {self.reach:g} m: expected three "
                 "lengths (or none), and a radius of 0 or above"
             )
 
@@ -61,7 +61,7 @@ class Machine:
     compliance: float | None = quantity(None, "m/N", "of the machine; none: not known, taken as 0")
     sd: float = quantity(0.0, "m/N", "standard uncertainty of a compliance that is given")
     measured: str | None = quantity(
-        None, "1", "recording of a rigid block (same topics), of which compliance and sd are found"
+        None, "1", "recording of a rigid block (same topics) that gives compliance and sd"
     )
 
     def __post_init__(self) -> None:

@@ -27,10 +27,10 @@ def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | 
         "estimates",
         "Parameters at the end of the run with their 95 % intervals, as the filter claims them, "
         "and the remaining share of the initial sd (of a scale's logarithm).",
-        ("case", "filter", "parameter", "value", "95 % from", "to", "sd left / 1", "says"),
+        ("case", "filter", "parameter", "value", "95 % from", "to", "sd left / 1", "finding"),
         tuple(_row(f, name) for f in runs for name in parameters_of(f)),
         "Intervals hold if the truth is of the model's kind: check NIS and its alarm, too.",
-        below="says",
+        below="finding",
     )
     told = tuple(s for f in main.values() for s in sentences(f))
     charts = tuple(_chart(f, name) for f in main.values() for name in parameters_of(f))

@@ -24,7 +24,7 @@ def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
         "Samples of a marker with an innovation beyond the gate of the filter; they were treated "
         "as missing. Expected: number for a filter whose claimed errors hold. Far: largest "
         "rejected innovation, in its standard deviations.",
-        ("case", "filter", "marker", "looks", "rejected", "expected / 1", "first / s", "last / s",
+        ("case", "filter", "marker", "samples", "rejected", "expected / 1", "first / s", "last / s",
          "far / 1"),
         tuple(_row(f, marker) for f in gated for marker in _markers(f)),
         "NIS and whiteness above use the accepted samples.",

@@ -23,7 +23,7 @@ _WORDS = (
     "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
     "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
     "peak of the external simulator's largest process; for our methods it is the peak of the "
-    "whole workbench until then."
+    "whole `validate` process until then."
 )
 
 
@@ -38,7 +38,7 @@ def guest_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, .
     said = [(main[n].label, line) for n in guests for line in _findings(main[n])]
     tables = [NumberTable("guests", "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
-        head = ("guest", "deviations and failures")
+        head = ("simulator", "deviations and failures")
         tables.append(NumberTable("guest_findings", "Findings", head, tuple(said)))
     return (Exhibit("guests", "External simulators", (_WORDS,), tables=tuple(tables)),)
 

@@ -48,7 +48,7 @@ _PLANE = (
 
 @dataclass(frozen=True)
 class BlockCard:
-    x: float | None = quantity(None, "m", "from the fixed plate to the moving one", asked=True)
+    x: float | None = quantity(None, "m", "distance from the fixed to the moving plate", asked=True)
     y: float | None = quantity(None, "m", "height", asked=True)
     z: float | None = quantity(None, "m", "lateral size", asked=True)
 
@@ -60,7 +60,7 @@ class BlockCard:
 
 @dataclass(frozen=True)
 class GelCard:
-    E: float = quantity(15_000.0, "Pa", "Young's modulus; moves forces and pressures only")
+    E: float = quantity(15_000.0, "Pa", "Young's modulus; affects only forces and pressures")
     nu: float = quantity(0.485, "1", "Poisson ratio")
 
 
@@ -84,7 +84,7 @@ class BlockGrid(BlockNodes):
 class InclusionRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of the modulus")
     nu: float = quantity(0.005, "1", "of the Poisson ratio")
-    friction: float = quantity(0.03, "1", "of the share k/(k + 4 E/x) that the plates rub")
+    friction: float = quantity(0.03, "1", "absolute, of the plates' friction share k/(k + 4 E/x)")
 
 
 @dataclass(frozen=True)

@@ -277,7 +277,7 @@ def _points(
     for level in levels:
         points = points[barycentric_rows(linear(own.at(level).mesh), points).outside <= near]
     if not len(points):
-        raise SceneError("the meshes of the ladder have no point in common")
+        raise SceneError("the meshes have no common point; declare a ladder in the experiment")
     probes = [np.array(p.point)[None] for p in own.scene.probes]
     return np.vstack([*probes, _spread(points)])
 

@@ -138,7 +138,7 @@ def _identified(
     why = doubt(p, recordings[0], min(limits, default=None))
     if not why:
         return found
-    headline = f"{found.headline}; largest warning: " if found.headline else "largest doubt: "
+    headline = f"{found.headline}; largest warning: " if found.headline else "largest warning: "
     return replace(
         found, doubts=(why, *found.doubts), headline=headline + "the machine's compliance"
     )
@@ -196,8 +196,8 @@ def _across(text: str, mesh: Mesh) -> int:
     spread = np.ptp(x, axis=0)
     if spread.min() > _FLAT * spread.max():
         raise SceneError(
-            f"held.slides = {text}: {1e3 * spread.min():.3g} mm from flat along an axis; a place "
-            "slides in a plane across x, y or z"
+            f"held.slides = {text}: {1e3 * spread.min():.3g} mm out of flat; a sliding place must "
+            "be a plane normal to x, y or z"
         )
     return int(spread.argmin())
 

@@ -51,7 +51,7 @@ class Tissue:
     nu: float = quantity(0.45, "1", "Poisson ratio")
     rho: float = quantity(1000.0, "kg/m3", "density: its weight, and its inertia in motion")
     by_method: tuple[tuple[str, float, float], ...] = quantity(
-        (), "1", "found by the run: of each model, its modulus Pa; the last number is 0"
+        (), "1", "set by the run: modulus (Pa) of each model; the last number is 0"
     )
     coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
 
@@ -67,7 +67,7 @@ class HeldAt:
     slides: str | None = quantity(
         None,
         "1",
-        "stands on a slippery plate: held normal to it; its middle stays and does not turn",
+        "rests on a slippery plate: held normal to it; its middle is fixed and cannot turn",
     )
 
 
@@ -105,7 +105,7 @@ class SeenOf:
     stands: float = quantity(2e-3, "m", "largest distance of a marker from the body, as on a stalk")
     outline: str | None = quantity(None, "1", "outlines' topic")
     surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")
-    pose: Pose = quantity("recorded", "1", "where the images lie: as recorded, declared or fitted")
+    pose: Pose = quantity("recorded", "1", "pose of the images: recorded, declared or fitted")
     origin: tuple[float, ...] = quantity((), "m", "of the images, where it is declared")
     image_x: str = quantity("+x", "1", "direction of the images' x (columns), where not recorded")
     image_y: str = quantity("-z", "1", "direction of the images' y (rows), where not recorded")
@@ -117,8 +117,8 @@ class SeenOf:
     def __post_init__(self) -> None:
         if not (2 <= self.states <= 500 and 0 < self.fit_to < 1 and self.still >= 0):
             raise UsageError(
-                f"seen: {self.states} states (2 to 500), fit_to {self.fit_to:g} (between 0 and 1), "
-                f"still {self.still:g} s (0 or above)"
+                f"seen.states {self.states} (2 to 500), fit_to {self.fit_to:g} (between 0 and 1), "
+                f"still {self.still:g} s (0 or above): set them within these limits"
             )
 
 
@@ -133,7 +133,9 @@ class BodyMotion:
     """
 
     how: Literal["static", "dynamic"] = quantity("static", "1", "static: no inertia; or dynamic")
-    start: float | None = quantity(None, "s", "of the recording's clock; none: found in it")
+    start: float | None = quantity(
+        None, "s", "start of the motion on the recording's clock; none: detected"
+    )
     length: float | None = quantity(None, "s", "solved and compared; none: to the end")
     dt: float | None = quantity(None, "s", "time step; none: 40 or more in the recorded period")
     stiffness_damping: float | None = quantity(None, "s", "beta of C = beta K")
@@ -154,7 +156,7 @@ class BodyMotion:
         if any(value is not None and not value >= 0 for value in damping) or None not in damping:
             raise UsageError(
                 f"motion.stiffness_damping = {damping[0]}, motion.damping_ratio = {damping[1]}: "
-                "one of them, 0 or above"
+                "set only one of them, to 0 or above"
             )
         times = (self.length, self.dt, self.fit_window)
         if any(value is not None and not value > 0 for value in times):
@@ -166,7 +168,7 @@ class BodyMotion:
 
 @dataclass(frozen=True)
 class BodyRanges(Ranges):
-    E: float = quantity(0.05, "1", "relative, of a modulus that is given")
+    E: float = quantity(0.05, "1", "relative, of a given modulus")
     nu: float = quantity(0.01, "1", "of the Poisson ratio")
     load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
     rho: float = quantity(0.01, "1", "relative, of the density; of a motion in time")

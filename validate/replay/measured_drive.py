@@ -44,7 +44,7 @@ def drive_kind(recording: Recording, p: MeasuredBody) -> Kind:
     if unit not in _KINDS:
         known = [f"{t} ({s.unit})" for t, s in recording.signals.items() if s.unit in _KINDS]
         raise UsageError(
-            f"moved.by = {p.moved.by}: {'in f' + unit if unit else 'no signal of that name'}; "
+            f"moved.by = {p.moved.by}: {'unit ' + unit if unit else 'no signal of that name'}; "
             f"expected one of {', '.join([*known, 'markers', 'gravity', NOTED, RELEASE])}"
         )
     return _KINDS[unit]
@@ -106,7 +106,7 @@ def zeroed_force(recording: Recording, p: MeasuredBody, kind: Kind, until: float
     if kind != "moves":
         raise ComparisonError(
             f"seen.force = {p.seen.force}: a force is predicted only if a displacement moves a "
-            f"place; here the body {kind}. Set seen.force=none"
+            f"place, but moved.by = {p.moved.by} is no signal in m. Set seen.force=none"
         )
     return zeroed(recording, str(p.seen.force), "N", until)
 

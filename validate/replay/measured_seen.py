@@ -144,8 +144,8 @@ def _require_along(p: MeasuredBody, markers: MarkerObservation, kind: Kind, amou
     most = float(np.linalg.norm(seen, axis=1).max())
     if along < -_AGAINST * most and -along > 5 * markers.sd / np.sqrt(len(seen)):
         raise RegistrationError(
-            f"the markers went {-1e3 * along:.3g} mm against {p.moved.along}, along which "
-            f"'{p.moved.by}' moves the body (the farthest by {1e3 * most:.3g} mm): another axis "
+            f"the markers moved {-1e3 * along:.3g} mm against {p.moved.along}, although "
+            f"'{p.moved.by}' acts along it (farthest marker: {1e3 * most:.3g} mm): another axis "
             f"is up in their frame, or the sign is reversed; set moved.along, or seen.layout"
         )
 

@@ -122,7 +122,9 @@ def _instants(
     picked = [first, *(first + int(np.abs(d[first:] - goal).argmin()) for goal in goals[1:])]
     steps: Ints = np.unique(nearest_samples(stage.t, own[picked], stage.name))
     if len(steps) < 2:
-        raise ComparisonError(f"'{card.topic}': the body does not move between its outlines")
+        raise ComparisonError(
+            f"'{card.topic}': the body does not move between its outlines; set outline.topic=none"
+        )
     return stage.t[steps], stage.y[steps, 0]
 
 

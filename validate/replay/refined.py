@@ -71,7 +71,7 @@ class Refined:
         if len(set(sizes)) < 3:
             raise ComparisonError(
                 f"{name}, {part}: sizes {', '.join(f'{s:.3g}' for s in sizes)}; u_num needs three "
-                "different ones"
+                "different sizes; declare more mesh or step sizes"
             )
         return sizes
 

@@ -44,7 +44,7 @@ def coarser(name: str, parameters: Any, share: float) -> str:
     by = _MARGIN * share**_POWER
     mesh = [p for p in describe(parameters) if p.path.startswith("mesh.")]
     sets = [f"--set {p.path}={value}" for p in mesh if (value := _coarsened(p, by))]
-    return f"for example {' '.join(sets)}" if sets else f"see `validate list {name}`"
+    return f"such as {' '.join(sets)}" if sets else f"see `validate list {name}`"
 
 
 def _coarsened(parameter: Parameter, by: float) -> str:

@@ -125,7 +125,7 @@ class Road:
         else:
             if experiment.twin is None:
                 raise ComparisonError(
-                    f"case '{case.name}' is not shipped, and no declared twin records it"
+                    f"case '{case.name}' has no shipped recording; declare a twin that simulates it"
                 )
             true = case.change(self._true)
             recordings = (experiment.twin.made(true, self.tell),)

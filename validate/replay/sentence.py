@@ -104,8 +104,8 @@ def _corrected(found: Overall) -> str:
         )
     if found.alone:
         return (
-            f" Corrected for {found.total} checks (Holm) none differs: a perfect model shows "
-            f"as much by chance."
+            f" Corrected for {found.total} checks (Holm), none differs: chance alone explains "
+            f"such differences."
         )
     return ""
 

@@ -156,7 +156,9 @@ def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: C
         tuple(rows),
     )
     words = tuple(f"{case.name}: {case.doc}" for case in experiment.cases if case.name in others)
-    return Exhibit("cases", f"Other {kind}s than the recorded one", words, tables=(table,))
+    return Exhibit(
+        "cases", f"{kind.capitalize()}s other than the recorded one", words, tables=(table,)
+    )
 
 
 def _speeds(experiment: Experiment, main: Mapping[str, Followed]) -> Exhibit:

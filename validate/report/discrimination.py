@@ -153,9 +153,9 @@ def _sentence(effect: Effect) -> str:
         )
     if effect.would_see:
         return (
-            f"{opening}: cannot be distinguished{size}; would decide: {_listed(effect.would_see)}."
+            f"{opening}: cannot be distinguished{size}; try sensors: {_listed(effect.would_see)}."
         )
-    return f"{opening}: cannot be distinguished{size}; no listed sensor would decide."
+    return f"{opening}: cannot be distinguished{size}; no listed sensor measures it."
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -112,7 +112,7 @@ def _by_load(measured: _Outlines, judged: _Sections, drawn: list[_Sections]) -> 
     label, loads = judged.method.label, measured.loads
     ringed = "".join(
         f" Ringed: the image angle {np.rad2deg(c.angle):.0f}°, {c.quantity}; its displacement "
-        "from rest stands in the table."
+        "from rest is in the table."
         for c in measured.seen.corners
     )
     return Picture(

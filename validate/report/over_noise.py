@@ -51,7 +51,7 @@ def over_noise(result: Result) -> tuple[Picture, ...]:
         f"(no unit, logarithmic; the title gives the noise). Filled: checked models; hollow: the "
         f"others. Grey: 95 % of repetitions with noise alone (chi-square with the number of "
         f"values). To the right of it, the recording shows the model's error. Where all models "
-        f"lie on grey, that quantity cannot choose between them. Ratios below {_LOWEST:g} are "
+        f"are on grey, that quantity cannot distinguish them. Ratios below {_LOWEST:g} are "
         f"arrows.",
         "Dot chart: rms error over measurement noise for each quantity and model.",
         pixels,

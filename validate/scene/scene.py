@@ -324,7 +324,7 @@ class Scene:
             if material.law == "svk" or material.coefficients.volumetric == "coupled":
                 raise SceneError(
                     f"Poisson ratio nu = 0.5 with law '{material.law}' "
-                    f"({material.coefficients.volumetric})has no incompressible form; use "
+                    f"({material.coefficients.volumetric}) has no incompressible form; use "
                     "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
                     "'split'"
                 )

@@ -110,7 +110,7 @@ def _poses(row: Sequence[str]) -> str:
     """What to do with a trajectory without names."""
     if not (len(row) == 8 and is_row(row, 8)):
         return ""
-    return "; where its lines are poses in time: # timestamp tx ty tz qx qy qz qw"
+    return "; for poses over time, the line: # timestamp tx ty tz qx qy qz qw"
 
 
 def _blocks(split: Split) -> list[TextBlock]:

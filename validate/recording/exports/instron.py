@@ -200,7 +200,7 @@ def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
     what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
     asks = dict.fromkeys(ask for e in missing for ask in e.asks)
     if missing and not kind:
-        asks[f"{ASK.removeprefix('say ')}, as neither strain nor stretch shows it"] = None
+        asks[f"{ASK.removeprefix('give ')}, as neither strain nor stretch shows it"] = None
     return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
 
 
@@ -307,7 +307,7 @@ def _stop(header: Mapping[str, str]) -> Record:
     told = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
     said = next((text for text in told if tells_a_stop(text)), None)
     return (
-        {"run": f"aborted: the file says '{said[:60]}'; rows up to there are read"} if said else {}
+        {"run": f"aborted, by the words '{said[:60]}'; rows up to there are read"} if said else {}
     )
 
 

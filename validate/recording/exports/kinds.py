@@ -61,5 +61,5 @@ def _stated(texts: Iterable[str], where: str) -> dict[KindName, Kind]:
         words = {"compression": kind_word(text, COMPRESSION), "tension": kind_word(text, TENSION)}
         named = [KINDS[name] for name, word in words.items() if word]
         if len(named) == 1:
-            found.setdefault(named[0], Kind(named[0], f"the {where} says '{text[:60]}'"))
+            found.setdefault(named[0], Kind(named[0], f"the {where} contains '{text[:60]}'"))
     return found

@@ -110,5 +110,5 @@ def refuse_cut(rows: Sequence[Line]) -> None:
     if len(ends) > 2 and ends[-1] < min(ends[:-1]) == max(ends[:-1]):
         raise RecordingError(
             f"line {rows[-1][0]}: the file is truncated: its last number '{rows[-1][1][-1]}' has "
-            f"{ends[-1]} digits after the sign, all others {ends[0]}; remove the row or copy again"
+            f"{ends[-1]} decimals, all others {ends[0]}; remove the row or copy again"
         )

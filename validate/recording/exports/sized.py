@@ -77,7 +77,7 @@ def sizes_of(mapping: Mapping[str, str], specimen: Mapping[str, float], kind: Ki
         "length": specimen.get("height_m") if pressed else None,
     }
     found = {k: said.get(k, told[k]) for k in told}
-    words = {k: "said" if k in said else "from the header" for k in told}
+    words = {k: "given" if k in said else "from the header" for k in told}
     return Sizes(found["area"], found["length"], measure, words)
 
 
@@ -203,7 +203,7 @@ def _measure(pick: Pick, sizes: Sizes) -> tuple[str, list[str]]:
             f"--map measure={sizes.measure}: '{pick.column.label}' names {by_name} itself; leave "
             f"the option out"
         )
-    ask = "whether stress and strain refer to the undeformed body, as --map measure=engineering"
+    ask = "the measure of stress and strain, as --map measure=engineering (undeformed body)"
     found = by_name or sizes.measure
     return found or "", [] if found else [f"{ask}, or measure=true"]
 

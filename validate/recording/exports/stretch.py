@@ -68,7 +68,7 @@ def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
         labels = ", ".join(repr(c.label) for c in table.columns)
         raise RecordingError(
             f"{len(stretches)} columns of stretch and {len(stresses)} of stress among {labels}; "
-            "one of each, or two"
+            "expected one of each, or two of each; rename or remove columns"
         )
     units = {unit or c.unit or "" for c in stresses}
     if len(units) != 1 or "" in units:
@@ -100,6 +100,6 @@ def _require_sense(stretch: Floats, stress: Floats, lines: tuple[int, ...]) -> N
     turned = (stress[:, 0] * (stretch[:, 0] - 1) < -_ROUNDING * np.abs(stress).max()).sum()
     if 2 * turned > len(stress):
         raise RecordingError(
-            f"stress and stretch less 1 have other signs in {turned} of {len(stress)} rows; "
-            "tension is positive, of stretches above 1"
+            f"stress and stretch - 1 differ in sign in {turned} of {len(stress)} rows; "
+            "in tension stress is positive and stretch above 1; correct the signs"
         )

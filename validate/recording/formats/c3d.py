@@ -83,7 +83,9 @@ def _require_whole(path: Path) -> None:
     """The header's own account of its length, before a library believes it."""
     first = head(path, BLOCK)
     if not path.is_file():
-        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+        raise RecordingError(
+            f"{path}: no such file" if not path.exists() else f"{path}: not a file"
+        )
     if len(first) < BLOCK or first[1] != _KEY:
         raise RecordingError(
             f"{path.name}: not a C3D file, or truncated in its first {BLOCK} bytes"

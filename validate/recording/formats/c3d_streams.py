@@ -77,7 +77,7 @@ def analog_of(found: Held, rate: float, frame: str) -> Found:
         odd = int((~np.isfinite(values[:, i])).sum())
         if not len(t) or odd:
             never[f"analog/{name}"] = (
-                f"{odd} values are not numbers" if odd else "no rate is stated"
+                f"{odd} values are not numbers" if odd else "no rate is declared"
             )
         else:
             unit = units[i] or NOT_STATED
@@ -95,7 +95,7 @@ def poses_of(found: Held, rate: float, factor: float, frame: str) -> Found:
         T = poses[:, i]
         seen = np.isfinite(T).all(axis=(1, 2)) & T[:, :3, :3].any(axis=(1, 2))
         if rate <= 0 or not seen.any():
-            never[name] = _NEVER if rate > 0 else "no rate is stated"
+            never[name] = _NEVER if rate > 0 else "no rate is declared"
         else:
             x = factor * T[seen, :3, 3]
             streams |= pose_signals(name, np.flatnonzero(seen) / rate, T[seen, :3, :3], x, frame)

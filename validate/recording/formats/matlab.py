@@ -146,7 +146,9 @@ def _version(path: Path) -> str:
 def _integrity(path: Path) -> str:
     """What the file's bytes prove; raises `RecordingError` for one that is not whole."""
     if not path.is_file():
-        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+        raise RecordingError(
+            f"{path}: no such file" if not path.exists() else f"{path}: not a file"
+        )
     if head(path, len(_MAGIC_73)) == _MAGIC_73:
         return "HDF5 of MATLAB 7.3 keeps no checksum of its numbers: integrity not provable"
     try:

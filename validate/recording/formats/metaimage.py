@@ -56,7 +56,9 @@ def _deep(fields: Mapping[str, str]) -> str:
 def _header(path: Path) -> tuple[dict[str, str], int]:
     """Texts by key, and where the header ends; the name of the pixels' file is its last line."""
     if not path.is_file():
-        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+        raise RecordingError(
+            f"{path}: no such file" if not path.exists() else f"{path}: not a file"
+        )
     text = head(path, _HEADER) if _recognises(path) else b""
     last = re.search(rf"\n{_LAST}[ \t]*=[^\n]*\n".encode(), text)
     if last is None:
@@ -114,7 +116,7 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
     local = name.upper() == "LOCAL"
     if not local and (name.upper().startswith("LIST") or "%" in name):
         raise RecordingError(
-            f"{path.name}: its pixels lie in '{name[:60]}'; only one file in the same folder is "
+            f"{path.name}: its pixels are in '{name[:60]}'; only one file in the same folder is "
             f"read"
         )
     try:

@@ -22,7 +22,9 @@ def read_nrrd(path: Path, options: Options) -> Recording:
     of 8 or 16 bits; `UsageError` without the library, and as `recorded`.
     """
     if not path.is_file():
-        raise RecordingError(f"{path}: no such file" if not path.exists() else f"{path}: no file")
+        raise RecordingError(
+            f"{path}: no such file" if not path.exists() else f"{path}: not a file"
+        )
     if not _recognises(path):
         raise RecordingError(f"{path.name}: not an NRRD file, or truncated in its first bytes")
     found = decoded("nrrd_arrays", path)

@@ -46,4 +46,4 @@ def metres(options: Options, stated: str, what: str) -> tuple[float, str]:
     if factor is None:
         states = f"has the unit '{stated}'" if stated else "has no unit"
         raise UsageError(f"{what}: {states} of length; give --map unit=mm")
-    return factor, f"{text} ({'entered' if 'unit' in options else 'stated'})"
+    return factor, f"{text} ({'entered' if 'unit' in options else 'declared'})"

@@ -96,7 +96,7 @@ def _require_motion(held: TextRows, layout: PointLayout, values: Floats) -> None
         raise RecordingError(
             f"{rows} on a grid of {len(np.unique(values[:, 0]))} x {len(np.unique(values[:, 1]))} "
             "places at one instant, not the motion of one point; add a column called name (a "
-            "landmark a row), or of one point a column of time"
+            "landmark per row), or for a single point a column called time"
         )
 
 
@@ -220,8 +220,8 @@ def _require_one_row_each(held: TextRows, layout: PointLayout, instants: Floats)
     count, column = len(instants) / len(np.unique(instants)), layout.instant or 0
     if count >= 2 and len(layout.points) == 1:
         raise RecordingError(
-            f"{held.name}: {count:.3g} rows at each '{layout.names[column]}', and no column says "
-            "of which point each is; add one, called marker, or, of one point, remove that column"
+            f"{held.name}: {count:.3g} rows at each '{layout.names[column]}', and no column names "
+            "the point of each row; add one called marker, or for a single point remove that column"
         )
     if layout.time is None and (np.diff(instants) <= 0).any():
         line = layout.rows[1 + int(np.argmax(np.diff(instants) <= 0))].line
@@ -260,8 +260,8 @@ def _labels(held: TextRows, layout: PointLayout, rows: Sequence[TextRow]) -> tup
     often = Counter(labels)
     if len(often) > 1 and min(often.values()) > 1:
         raise RecordingError(
-            f"{held.name}: every one of {len(often)} names stands in several rows, and no column "
-            "tells when; add one called frame or time"
+            f"{held.name}: every one of {len(often)} names occurs in several rows, and no column "
+            "gives the time; add one called frame or time"
         )
     return distinct(labels, len(rows))
 

@@ -30,8 +30,8 @@ def rotations(q: Floats, what: str) -> Floats:
     if (wrong := np.abs(size - 1) > _UNIT).any():
         i = int(wrong.argmax())
         raise RecordingError(
-            f"{what}: sample {i + 1}: a quaternion of length {size[i]:.3g}, expected 1; other "
-            "columns than it seems, or damaged"
+            f"{what}: sample {i + 1}: a quaternion of length {size[i]:.3g}, expected 1; wrong "
+            "columns, or a damaged file"
         )
     x, y, z, w = (q / size[:, None]).T
     rows = [

@@ -66,7 +66,7 @@ def read_qualisys(path: Path, options: Options) -> Recording:
         "kind": "motion capture (Qualisys TSV)",
         "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
         "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
-        "rows": f"{len(values)}, the header states {header.get('NO_OF_FRAMES', 'none')}",
+        "rows": f"{len(values)}, the header declares {header.get('NO_OF_FRAMES', 'none')}",
         **_events(held), **told_zeros(zeros), **told_left(left),
     }  # fmt: skip
     source = source_of(path, "text file: integrity not provable")

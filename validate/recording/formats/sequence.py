@@ -196,7 +196,7 @@ def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
     if way[:2] not in ("MF", "MN", "UF", "UN"):
         if way[:1] in ("F", "N") and way[1:2] in ("M", "U"):
             raise RecordingError(
-                f"{path.name}: its lines lie along rows (orientation {way}); save it as MF, or "
+                f"{path.name}: its scan lines are rows (orientation {way}); save it as MF, or "
                 f"give --map images=no"
             )
         return held, {}

@@ -51,7 +51,7 @@ def read_trc(path: Path, options: Options) -> Recording:
         "unit": stated,
         "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
         "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
-        "rows": f"{len(values)}, the header states {header.get('NumFrames', 'none')}",
+        "rows": f"{len(values)}, the header declares {header.get('NumFrames', 'none')}",
     }
     source = source_of(path, "text file: integrity not provable")
     told |= counted | told_zeros(zeros) | told_left(left)

@@ -89,7 +89,7 @@ def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> 
 def _require_whole(path: Path) -> None:
     """Raises `RecordingError` for a file that ends before its own account of lengths."""
     if not path.is_file():
-        raise RecordingError(f"{path.name}: no file")
+        raise RecordingError(f"{path.name}: not a file")
     size, first = path.stat().st_size, head(path, 12)
     if _matroska(path):
         at = _segment_end(path, size)

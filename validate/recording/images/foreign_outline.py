@@ -95,7 +95,7 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
             raise RecordingError(f"{path.name}: {size} bytes, limit {MAX_FILE}")
         if kind == ".csv":
             if label:
-                raise UsageError(f"--label {label}: of masks and polygons; {path.name} has none")
+                raise UsageError(f"--label {label}: {path.name} has no labels; leave it out")
             return _table(path)
         if kind == ".json":
             return _polygons(path, files, frames, label)

@@ -100,7 +100,7 @@ def _check(path: Path, channels: Sequence[WrittenChannel]) -> None:
         if known.setdefault(channel.schema.name, channel.schema) != channel.schema:
             raise RecordingError(
                 f"{path.name}: schema '{channel.schema.name}' of {channel.topic!r} differs from "
-                "that of another topic; one name, one definition"
+                "that of another topic; rename one schema"
             )
 
 
