@@ -148,7 +148,7 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     assert "specimen.diameter = 30 m is 1000 times 30 mm: check its unit" in first
     assert "material.E (identified) is a modulus of 0.02 Pa" in first
     assert "is a stress of" in first
-    assert "was entered; the recording says 0.03 m, 1e+03 times" in first
+    assert "was entered; the recording has 0.03 m, 1e+03 times" in first
     (folder,) = (tmp_path / "reports").glob("big+*")
     stored = json.loads((folder / "results.json").read_text("utf-8"))
     assert stored["parameters"]["specimen.diameter"] == {

@@ -90,7 +90,7 @@ def test_the_tour_of_the_readme_runs_word_by_word(
         program, *arguments = shlex.split(line)
         code, out, err = called(arguments)
         assert (program, code) == ("validate", 0), (arguments, out, err)
-    timing = re.compile(r"[\d.]+ (s wall time|[µm]?s$|k?Hz) *", flags=re.MULTILINE)
+    timing = re.compile(r"[\d.]+ (s wall time|[µm]?s$|k?Hz) *|(?<=rate) +", flags=re.MULTILINE)
     assert [timing.sub("", line) for line in out.splitlines()] == [
         timing.sub("", line) for line in printed(tour, "text").splitlines()
     ]

@@ -198,7 +198,7 @@ def test_votes_by_hand() -> None:
 def test_a_damaged_share_is_refused(tmp_path: Path) -> None:
     (one,) = logs(tmp_path, 1.0)
     object.__setattr__(one, "metadata", {**one.metadata, REPEATS: {"share": "nan"}})
-    with pytest.raises(RecordingError, match="share 'nan' is no number"):
+    with pytest.raises(RecordingError, match="share 'nan' is not a number"):
         repeats_share(one)
 
 
@@ -218,6 +218,6 @@ def test_a_share_that_is_no_number_names_its_record(share: str, tmp_path: Path) 
     assert repeats_share(one) == 0.0
     damaged = replace(one, metadata={REPEATS: {SHARE: share}})
     with pytest.raises(
-        RecordingError, match=f"log0: record '{REPEATS}': {SHARE} '{share}' is no n"
+        RecordingError, match=f"log0: record '{REPEATS}': {SHARE} '{share}' is not a n"
     ):
         repeats_share(damaged)

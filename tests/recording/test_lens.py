@@ -104,7 +104,7 @@ def test_dots_are_where_they_are_once_the_lens_is_known(
     ("b.yml", lambda p: opencvs(p, coefficients=D[:3]), "3 coefficients of distortion; expected "
                                                         "one of"),
     ("c.yml", lambda p: opencvs(p, matrix=-K), "focal lengths and distortion must be numbers"),
-    ("d.yml", lambda p: ross(p, "equidistant"), "distortion model 'equidistant'; read are"),
+    ("d.yml", lambda p: ross(p, "equidistant"), "distortion model 'equidistant'; expected"),
     ("e.yml", lambda p: p.write_bytes(b"\xff\x00{"), "e.yml: damaged"),
     ("f.yml", lambda p: None, "f.yml: cannot be read"),
     ("g.yml", lambda p: p.write_bytes(opencvs(p).read_bytes()[:150]), "g.yml: "),

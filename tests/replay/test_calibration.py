@@ -53,7 +53,10 @@ def test_what_stands_open_is_identified_and_what_calibrated_is_fitted() -> None:
     assert modulus.value == pytest.approx(10e3, rel=0.05)
     assert {p.path: p.origin for p in result.parameters}["E"] == "identified"
     assert result.sentence.startswith("Fitted: E = ")
-    assert "with 'fem' on force@0.1mm of moved; predicted: force@0.3mm off by" in result.sentence
+    assert (
+        "with 'fem' on force@0.1mm of moved; predicted: force@0.3mm has an error of"
+        in result.sentence
+    )
     assert {i.name: i.source for i in result.inputs}["identified E"].startswith("identified on")
 
 

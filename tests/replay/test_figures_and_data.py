@@ -35,7 +35,7 @@ def test_run_fails_and_says_so_where_our_value_moved() -> None:
     moved = tiny(4.0)
     assert moved.fallen
     assert [p.verdict for p in moved.published] == ["moved"]
-    assert moved.sentence.endswith("1 of 1 printed figures do not stand (frames).")
+    assert moved.sentence.endswith("1 of 1 printed figures do not hold (frames).")
 
 
 def test_other_settings_are_not_compared_with_a_printed_figure() -> None:

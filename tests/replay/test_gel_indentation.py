@@ -92,7 +92,7 @@ def test_a_ratio_at_its_bound_has_no_standard_deviation() -> None:
 def test_which_files_are_a_pair_is_asked_for(tmp_path: Path) -> None:
     folder = pair(tmp_path / "other")
     savemat(folder / "three.mat", {"R": np.ones((4, 3))})
-    with pytest.raises(RecordingError, match="3 MATLAB files, a pair is needed"):
+    with pytest.raises(RecordingError, match="3 MATLAB files; a pair is needed"):
         load(GelIndentation(data=str(folder), voxel=1e-6), tmp_path)
     named = GelIndentation(data=str(folder), voxel=1e-6, before="one.mat", after="two.mat")
     assert load(named, tmp_path)[0].name == "one to two"

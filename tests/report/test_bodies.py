@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import report_samples
 from report_samples import small_result
 
 from validate.report import gl
@@ -102,7 +103,7 @@ for factor in (1.0, 2.0):
 @pytest.mark.slow
 def test_renders(tmp_path: Path, project_root: Path) -> None:
     """In a process of its own: VTK keeps the window class of its first import."""
-    paths = os.pathsep.join([str(project_root), str(Path(__file__).parent)])
+    paths = os.pathsep.join([str(project_root), str(Path(report_samples.__file__).parent)])
     environment = {k: v for k, v in os.environ.items() if k != "VALIDATE_NO_GL"}
     done = subprocess.run(
         [sys.executable, "-c", RENDER, str(tmp_path)],

@@ -54,7 +54,7 @@ def test_one_screen_of_80_columns_and_the_largest_change_first(
     shown = [int(row.split("node_")[1].split(".")[0]) for row in rows]
     assert shown == sorted(shown, reverse=True)
     assert f"left out: {64 - len(rows)} scores; --all" in out
-    assert "22 more, see --all" in out
+    assert "22 more: see --all" in out
     whole = here("compare", *runs, "--all", cwd=tmp_path, COLUMNS="80")[1]
     assert whole.count("node_") == 64
     assert "step.p50" in whole
@@ -85,7 +85,7 @@ def test_a_closed_place_costs_the_pictures_only(
     runs = two(tmp_path, 2)
     monkeypatch.setattr("validate.cli.comparing.try_results", closed)
     code, out, err = here("compare", *runs, cwd=tmp_path)
-    assert (code, err) == (0, "validate: no pictures: cannot write there\n")
+    assert (code, err) == (0, "validate: no charts: cannot write there\n")
     assert "node_1.rmse" in out
     assert "report.html" not in out
     assert here("compare", *runs, "--out", str(tmp_path / "x"), cwd=tmp_path)[0] == 2

@@ -102,7 +102,7 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
     line = refused(*common, "--parameters", "E=1e5:1e3")
     assert "bounds 100000 to 1000" in line
     line = refused(*common, "--parameters", "E,E")
-    assert "E stands twice" in line
+    assert "E is given twice" in line
     line = refused(*common, "--parameters", "methods.newton.tolerance=1e-9:1e-3")
     assert "a setting of a method cannot be identified" in line
     line = refused(*common, "--seeds", "0")

@@ -1,6 +1,7 @@
 """One method on one case: scene, registration, runs, residuals, and the truth beside."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.residual import Residual, reached_end
-from validate.errors import SceneError
+from validate.errors import ComparisonError, SceneError
 from validate.register.observation import History, Observation, OverTime
 from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
@@ -93,13 +94,18 @@ class Followed:
             return ()
         seen = [o for o in self.seen.observations if o.role == "validates"]
         found = [(o, o.history(self.run)) for o in seen if isinstance(o, OverTime)]
-        return tuple(h.at(self._compared(o)) for o, h in found if h is not None)
+        compared = [h.at(self._compared(o)) for o, h in found if h is not None]
+        return tuple(h for h in compared if len(h.t))
 
     def _compared(self, of: Observation) -> Ints:
         """Indices of an observation's samples at the selected instants, or in the run's time."""
-        parts = [s for s in self.seen.selections if not s.of or of.name in s.of]
-        at = [s.samples(of.t, self.run.t, of.name) for s in parts]
-        return np.unique(np.concatenate([*at, np.zeros(0, dtype=np.int64)]))
+        at = [np.zeros(0, dtype=np.int64)]
+        for selection in self.seen.selections:
+            if selection.of and of.name not in selection.of:
+                continue
+            with suppress(ComparisonError):  # instants of another observation: a sag and a swing
+                at.append(selection.samples(of.t, self.run.t, of.name))
+        return np.unique(np.concatenate(at))
 
     @property
     def over_time(self) -> bool:
