@@ -186,7 +186,7 @@ def test_what_rings_is_proposed_as_dynamic_and_its_questions_are_open(here: Path
     assert "motion.damping (damping: stiffness-proportional" in said
     listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
     assert 'motion.how = "dynamic"' in listing[1]
-    assert "first mode of the body at 2.93 Hz (with an assumed density of 1000" in listing[1]
+    assert "first mode of the body at 2.86 Hz (with an assumed density of 1000" in listing[1]
     assert "inertia matters above 0.33 of it" in listing[1]
 
 
@@ -213,14 +213,14 @@ def test_answers_on_damping_and_release_are_parameters() -> None:
 
 
 def test_a_release_from_a_displacement_is_one_from_its_force(here: Path) -> None:
-    """The end of the beam hangs by 3.87 mm under the 15 mN of the benchmark."""
+    """The end of the beam hangs by 3.87 mm under the 15 mN of the benchmark's coarser mesh."""
     new(here, "swinging")
     by_force = run(experiment(here), "modal")
     sag = -by_force.seen.inputs[0, 0]
     assert sag == pytest.approx(0.015)
     new(here, "swinging", ('held = "0.015N"', 'held = "3.87mm"'))
     found = -run(experiment(here), "modal").seen.inputs[0, 0]
-    assert found == pytest.approx(0.015, rel=0.01)
+    assert found == pytest.approx(0.015, rel=0.02)
 
 
 def test_a_damping_ratio_is_that_of_the_first_mode(here: Path) -> None:
@@ -250,14 +250,14 @@ def test_an_assumed_density_is_said_where_it_makes_a_frequency(here: Path) -> No
     """Statics asks for none: 1000 kg/m3 in place of the true 1050."""
     changes = (STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""))
     assert new(here, "pushed", *changes)[0] == 0
-    words = "first mode of the body at 2.93 Hz (with an assumed density of 1000 kg/m3, near that"
+    words = "first mode of the body at 2.86 Hz (with an assumed density of 1000 kg/m3, near that"
     listing = called("new", "mine", "--from", "pushed.mcap", "--answers", "a.toml", "--questions")
     assert words in listing[1]
     mine = experiment(here)
     recordings = mine.load(mine.parameters, folder_of(mine))
     assert mine.identify is not None
     assert words in mine.identify(recordings, mine.parameters, mine.methods).headline
-    assert "of the body: 2.93, 2.94, 15.1 Hz (with an assumed density" in described(mine)[-1]
+    assert "of the body: 2.86, 2.86, 14.9 Hz (with an assumed density" in described(mine)[-1]
     p = replace(mine.parameters, material=replace(mine.parameters.material, rho=1050.0))
     assert "assumed" not in "".join(described(replace(mine, parameters=p)))
 

@@ -94,9 +94,9 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
     assert [type(m.settings).__name__ for m in mine.methods.values()] == ["ExactPressure"] * 2
     assert [m.scene.order for m in mine.methods.values()] == [2, 2]
     (seen / "experiments" / "mine.py").unlink()
-    write_mesh(box((0.02, 0.02, 0.03), (4, 4, 4)), seen / "cyst.npz")
+    write_mesh(box((0.02, 0.02, 0.03), (10, 10, 10)), seen / "cyst.npz")
     said, text = written(seen, inside)
-    assert "cyst.npz has 384 cells: linear ones are proposed (order=1)" in said
+    assert "cyst.npz has 6000 cells: linear ones are proposed (order=1)" in said
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
     assert [m.scene.order for m in mine.methods.values()] == [1, 1]

@@ -131,10 +131,22 @@ def test_differences_below_rounding_are_the_uncertainty() -> None:
     assert (alike.u, alike.deciding(1.0)) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize("h", [(1.0, 0.5), (1.0, 0.5, 0.5), (1.0, 0.5, 0.0)])
-def test_fewer_than_three_meshes_are_refused(h: tuple[float, ...]) -> None:
-    with pytest.raises(ComparisonError, match="u_num needs at least three different ones"):
+@pytest.mark.parametrize("h", [(1.0,), (1.0, 1.0), (1.0, 0.5, 0.0)])
+def test_a_single_mesh_is_refused(h: tuple[float, ...]) -> None:
+    with pytest.raises(ComparisonError, match="u_num needs at least two different ones"):
         convergence(h, scalars(h, 2.0), 0, 2.0)
+
+
+@pytest.mark.parametrize("h", [(1.0, 0.5), (0.5, 1.0), (1.0, 0.5, 0.5)])
+def test_two_meshes_have_the_error_of_the_formal_order_and_the_larger_factor(
+    h: tuple[float, ...],
+) -> None:
+    """f = 1 + h^2: the error of the judged mesh is h^2, and the band three times that."""
+    found = convergence(h, scalars(h, 2.0), 0, 2.0)
+    assert found.u == pytest.approx(3 * h[0] ** 2 / 2)
+    assert (found.conduct, found.asymptotic, found.order) == ("two sizes", False, None)
+    assert found.words == "two sizes, formal order 2 assumed, safety 3"
+    assert 0 < found.deciding(found.u) < 1
 
 
 @pytest.mark.parametrize("h", [(2.0, 1.4, 1.0), (1.27, 1.0, 0.79), (2.0, 1.0, 0.5), H])

@@ -37,7 +37,7 @@ def test_twice_u_num_holds_the_true_error_of_random_bodies() -> None:
     missed = [seed for seed, one in found.items() if not one.covered]
     assert len(missed) <= 0.08 * len(SOME), missed
     ratios = [one.ratio for one in found.values()]
-    assert np.median(ratios) < 4
+    assert np.median(ratios) < 8  # the formal order is that of corners, hexahedra converge faster
     assert all(np.isfinite(ratios))
     # The bodies are no trifles: errors of per cents.
     assert np.median([one.error / one.answer for one in found.values()]) > 0.005

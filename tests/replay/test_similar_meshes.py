@@ -10,8 +10,9 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
-from validate.replay import load, similar_grids
-from validate.replay.measured_body import body_of, gridded, measured_body, solid
+from validate.replay import cost, load
+from validate.replay.cost import fits
+from validate.replay.measured_body import body_of, gridded, measured_body, solid, unknowns_of
 from validate.replay.measured_cards import HeldAt, MeasuredBody, Solid
 from validate.replay.similar_grids import divided, fitting, member, similarity
 
@@ -36,9 +37,10 @@ def family(p: MeasuredBody) -> list[tuple[int, ...]]:
 def test_every_grid_of_a_block_is_similar_to_the_nominal_one(
     size: tuple[float, ...], cells: int, slides: str | None
 ) -> None:
-    p = MeasuredBody(body=Solid(block=size, cells=cells), held=HeldAt(slides=slides))
+    p = MeasuredBody(body=Solid(block=size, cells=cells, budget=False), held=HeldAt(slides=slides))
     nominal, *levels = family(p)
-    assert max(nominal) == pytest.approx(cells, abs=2)
+    across = 2 * max(size) / min(size) / 2  # cells twice as long as they are thick
+    assert max(nominal) == pytest.approx(max(cells, across), abs=2)
     different = {nominal, *levels}
     assert len(different) >= 3
     for grid in different:
@@ -77,18 +79,38 @@ def test_divisions_that_are_given_are_kept_and_refined_alike(tmp_path: Path) -> 
 def test_a_grid_that_does_not_fit_into_the_memory_is_replaced_by_a_coarser_similar_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def unknowns(cells: tuple[int, ...]) -> int:
-        return 3 * int(np.prod(2 * np.array(cells) + 1))
+    def in_memory(cells: tuple[int, ...]) -> bool:
+        return fits(3 * int(np.prod(2 * np.array(cells) + 1)), 0.0, None)
 
-    assert fitting((12, 12, 6), unknowns) == (12, 12, 6)
-    monkeypatch.setattr(similar_grids, "free_memory", lambda: 2e8)
-    smaller = fitting((12, 12, 6), unknowns)
+    assert fitting((12, 12, 6), in_memory) == (12, 12, 6)
+    monkeypatch.setattr(cost, "free_memory", lambda: 2e8)
+    smaller = fitting((12, 12, 6), in_memory)
     assert (2, 2, 1) < smaller < (12, 12, 6)
     assert similarity((12, 12, 6), smaller) == 1.0
-    monkeypatch.setattr(similar_grids, "free_memory", lambda: 1.0)
-    assert fitting((12, 12, 6), unknowns) == (2, 2, 1)
+    monkeypatch.setattr(cost, "free_memory", lambda: 1.0)
+    assert fitting((12, 12, 6), in_memory) == (2, 2, 1)
     p = MeasuredBody(body=Solid(cylinder=(0.03, 0.04), cells=6))
     assert min(family(p)[1:]) == family(p)[-1]
+
+
+def test_a_grid_too_slow_for_a_first_answer_waits_for_refine() -> None:
+    quick = MeasuredBody(body=Solid(block=BRICK, cells=20))
+    whole = replace(quick, body=replace(quick.body, budget=False))
+    assert np.prod(family(quick)[-1]) < np.prod(family(whole)[-1])
+    assert family(quick)[0] == family(whole)[0]
+
+
+@pytest.mark.parametrize("body", [
+    Solid(block=(0.1, 0.01, 0.01)), Solid(block=(0.05, 0.05, 0.001)), Solid(cylinder=(0.01, 0.1)),
+])  # fmt: skip
+def test_a_slender_or_thin_body_has_two_cells_across_and_stays_small(body: Solid) -> None:
+    grid = gridded(MeasuredBody(body=body)).body.divisions
+    assert min(grid) >= 2
+    lengths = body.block or (body.cylinder[0] / 2, body.cylinder[1])
+    edges = np.array(lengths) / grid
+    unknowns = unknowns_of(MeasuredBody(body=body), 2, Path())
+    assert unknowns < 1.6e4
+    assert edges.max() / edges.min() < 2.5 or unknowns > 6e3
 
 
 def test_a_grid_without_a_common_factor_has_the_most_similar_neighbours() -> None:

@@ -83,7 +83,7 @@ def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:
         seen = Residual("force", "3mm", force, 0.0, 0.0, "N", "force")
         return SimpleNamespace(residuals={seen.name: seen})
 
-    declared = SimpleNamespace(surrogate="m", inputs=inputs)
+    declared = SimpleNamespace(surrogate="m", inputs=inputs, draws=12)
     experiment = SimpleNamespace(
         name="x", uncertainty=declared, accept=(Accept("force", 1.0, "assumed"),)
     )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.scene.cylinder import quarter_cylinder
-from validate.scene.mesh import boundary_facets, cell_volumes
+from validate.scene.cylinder import hexahedral_cylinder, quarter_cylinder
+from validate.scene.mesh import boundary_facets, cell_volumes, require_positive_cells
 
 EXACT = np.pi * 0.05**2 / 16 * 0.03
 
@@ -69,3 +69,20 @@ def test_grading_shrinks_cells_towards_rim_and_plates_and_keeps_the_volume() -> 
     assert z + z[::-1] == pytest.approx(np.full(9, 0.03))
     r = np.unique(np.round(np.linalg.norm(graded.nodes[:, :2], axis=1), 9))
     assert r[-1] - r[-2] == pytest.approx(0.025 / 36)
+
+
+@pytest.mark.parametrize(("radial", "axial"), [(1, 2), (2, 5), (3, 4), (6, 7)])
+def test_hexahedra_of_a_cylinder_have_its_volume_and_its_faces(radial: int, axial: int) -> None:
+    """The rim is a polygon of 4 `radial` sides of the circle's area; its second moment follows."""
+    mesh = hexahedral_cylinder(0.02, 0.03, radial, axial)
+    assert mesh.kind == "hex8"
+    assert len(mesh.cells) == axial * radial * (radial + 4 * ((radial + 1) // 2))
+    require_positive_cells(mesh)
+    assert cell_volumes(mesh).sum() == pytest.approx(np.pi * 0.01**2 * 0.03, rel=1e-12)
+    disc = radial * (radial + 4 * ((radial + 1) // 2))
+    assert len(mesh.facets["lower_plate"]) == len(mesh.facets["upper_plate"]) == disc
+    assert len(mesh.facets["rim"]) == 4 * radial * axial
+    rim = mesh.nodes[mesh.facet_nodes("rim")]
+    assert np.ptp(np.hypot(rim[:, 0], rim[:, 1])) < 1e-15
+    with pytest.raises(SceneError, match="0 x 3 hexahedra: all must be positive"):
+        hexahedral_cylinder(0.02, 0.03, 0, 3)

@@ -157,6 +157,7 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
     help="Run only this case (variant) in addition to the recording.",
 )
 @GUESTS
+@click.option("--refine", is_flag=True, help="Finer meshes, more load steps, no time limit.")
 @click.option("--anyway", is_flag=True, help="Predict even if parameters are not identifiable.")
 @click.option("--json", "as_json", is_flag=True, help="Print results.json of all runs as one list.")
 @click.option(

@@ -27,7 +27,9 @@ from validate.errors import UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
+from validate.replay.find import load_file
 from validate.replay.remade import kind_of_recordings
+from validate.replay.run_estimate import RunEstimate, estimated
 
 KINDS = (PLATES, INCLUSION, BODY)
 _LARGEST = 20_000  # bytes of such a file
@@ -70,6 +72,16 @@ def new(
     for topic in _unused(recording, kind.used(recording, found)):
         complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
+    if expected := estimated(load_file(path)):
+        say(f"first answer: {_about(expected)}", indent="  ")
+
+
+def _about(expected: RunEstimate) -> str:
+    """Time, memory and size of a run, as the order of magnitude that an estimate is."""
+    return (
+        f"about {float(f'{expected.seconds:.1g}'):.0f} s, "
+        f"{expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} unknowns at most (estimated)"
+    )
 
 
 def _unused(recording: Recording, used: Collection[str]) -> list[str]:

@@ -29,10 +29,10 @@ from validate.cli.new_body_questions import (
 )
 from validate.cli.new_contact import CONTACT_WORDS, contact_values, of_the_indenter
 from validate.cli.new_kind import (
-    FEW_CELLS,
     NewKind,
     accept_line,
     limit_question,
+    quadratic_fits,
     reason_question,
 )
 from validate.cli.new_motion import (
@@ -49,7 +49,13 @@ from validate.errors import UsageError
 from validate.parameters import describe, with_values
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
-from validate.replay.measured_body import body_of
+from validate.replay.cost import (
+    FEWEST_STATES,
+    RUNS,
+    newton_seconds,
+    states_within,
+)
+from validate.replay.measured_body import body_of, unknowns_of
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import NOTED, RELEASE
 from validate.replay.measured_markers import AS_SEEN
@@ -292,24 +298,24 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
             "seen.force, seen.markers and seen.outline are all none: choose at least one to compare"
         )
     require_dynamic(found)
-    order = (
-        2 if mesh is None or found["body.shape"] != "file" or len(mesh.cells) <= FEW_CELLS else 1
-    )
+    here = with_values(MeasuredBody(), _values(found))
+    order = 2 if found["body.shape"] != "file" or _few(mesh, here) else 1
     parameters = _card(source, folder, found, contact_values(recording, found))
     pressed = found.get("indenter.shape", "none") != "none"
     if _dynamic(found):
-        here = with_values(MeasuredBody(), _values(found))
         parameters, here = (
             replace(p, body=replace(p.body, cells=cells_for(p))) for p in (parameters, here)
         )
-        order = 1 if mesh is not None and mesh.bricks else order  # taken as they are, mixed
         methods = moving_methods(recording, here, found, order)
         names = judged_markers(recording, here)
         accepted = "large" if found["law"] != "linear" else "implicit"
     else:
         maker = "touching" if pressed else "solid"
-        cells = "mixed hexahedra" if pressed and found["body.shape"] != "file" else ""
-        methods = _methods(found["law"], mesh, 1 if pressed else order, maker, cells)
+        order = 1 if pressed else order
+        if found["law"] != "linear" and not pressed:
+            states = states_within(RUNS, unknowns_of(here, order, Path()), here.seen.states)
+            parameters = replace(parameters, seen=replace(parameters.seen, states=states))
+        methods = _methods(found["law"], maker, order, _cells(found, mesh, order))
         names, accepted = (), "solid" if found["law"] != "linear" else "linear"
     return {
         "imports": _MOVING if _dynamic(found) else _PRESSED if pressed else _MOVED,
@@ -345,16 +351,24 @@ def _values(found: Answers) -> dict[str, str]:
     return values | motion_values(found)
 
 
-def _methods(law: str, mesh: Mesh | None, order: int, maker: str, cells: str) -> list[str]:
-    cells = cells or ("quadratic cells" if order == 2 else "linear cells")
-    if mesh is not None and mesh.bricks:  # which are taken as they are, mixed
-        cells, order = "mixed hexahedra", 1
+def _few(mesh: Mesh | None, p: MeasuredBody) -> bool:
+    """Whether quadratic cells of a mesh file fit into a first answer, at large strain, too."""
+    fewest = FEWEST_STATES * newton_seconds(unknowns_of(p, 2, Path())) <= RUNS
+    return fewest and quadratic_fits(mesh)
+
+
+def _cells(found: Answers, mesh: Mesh | None, order: int) -> str:
+    outlined = found.get("seen.outline", NONE) != NONE
+    if outlined or (found["body.shape"] == "file" and not (mesh is not None and mesh.bricks)):
+        return "quadratic tetrahedra" if order == 2 else "linear tetrahedra"
+    return "quadratic hexahedra" if order == 2 else "mixed hexahedra"
+
+
+def _methods(law: str, maker: str, order: int, cells: str) -> list[str]:
     lines = [f'"linear": {maker}("linear law, {cells}", "linear", {order}),']
     if law != "linear":
         words = f"{_LAWS[law]}, {cells}"
         lines.insert(0, f'"solid": {maker}("{words}", "{law}", {order}),')
-    if order == 2:
-        lines.append('"quick": solid("linear law, linear cells", "linear", 1),')
     return lines
 
 

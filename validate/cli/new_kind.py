@@ -7,9 +7,9 @@ from pathlib import Path
 from validate.cli.asking import Answers, Question
 from validate.errors import UsageError
 from validate.recording.types import Recording
+from validate.replay.cost import MESHES, linear_seconds
+from validate.scene.mesh import Mesh, quadratic
 from validate.units import in_si, split
-
-FEW_CELLS = 150  # of a mesh file whose quadratic ones are halved twice in some minutes
 
 
 @dataclass(frozen=True)
@@ -79,3 +79,11 @@ def quantity_in(unit: str) -> Callable[[str], float]:
         return value
 
     return check
+
+
+def quadratic_fits(mesh: Mesh | None) -> bool:
+    """Whether quadratic cells of a mesh file, halved once for u_num, fit into the time of a first
+    answer; hexahedra are taken as they are."""
+    if mesh is None or mesh.bricks:
+        return False
+    return linear_seconds(8 * quadratic(mesh).nodes.size) <= MESHES

@@ -16,7 +16,7 @@ from validate.identify.recorded_motion import FRACTION, motion_of
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.first_modes import first_frequencies
-from validate.replay.measured_body import static_scene
+from validate.replay.measured_body import static_scene, unknowns_of
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.measured_drive import RELEASE, drive_kind
 from validate.replay.moving_body import against_mode
@@ -30,6 +30,9 @@ from validate.units import in_si, split
 DYNAMIC, STATIC, IDENTIFIED = "dynamic", "static", "identified"
 _ACROSS = 2  # cells across the shortest side: a bending body with one is too stiff
 _UNKNOWNS = 6000  # of quadratic cells, at most
+_QUADRATIC = 15_000  # unknowns of quadratic cells up to which a first mode is found in seconds
+#: Answers on which the first mode and the recorded motion depend.
+_OF_A_MODE = ("body.", "material.", "held.", "moved.", "seen.markers", "indenter.")
 _FILTERED = 900  # unknowns of a filter of all nodes: its modes are all taken
 _MARGIN = 0.9  # of the critical step
 _LOAD = 0.1  # of its largest value: how unsure a filter is of the load
@@ -65,7 +68,8 @@ def _topic(recording: Recording, p: MeasuredBody) -> str | None:
 
 def _first(recording: Recording, p: MeasuredBody, folder: Path) -> float | None:
     try:
-        return first_frequencies(_scene(recording, p, folder, 2), 1)[0]
+        order = 2 if unknowns_of(p, 2, folder) <= _QUADRATIC else 1
+        return first_frequencies(_scene(recording, p, folder, order), 1)[0]
     except (ValidateError, np.linalg.LinAlgError):
         return None
 
@@ -90,7 +94,8 @@ def motion_questions(
     if found["moved.by"] == RELEASE:
         proposed = Proposal(DYNAMIC, "a release is a motion in time")
     else:
-        proposed = _proposed(recording, tuple(sorted(values.items())))
+        needed = ((k, v) for k, v in values.items() if k.startswith(_OF_A_MODE))
+        proposed = _proposed(recording, tuple(sorted(needed)))
     asked = [Question("motion.how", "dynamic: solve the motion in time; static: solve states of "
                       "rest, without inertia", proposed.how, proposed.why,
                       choices=(STATIC, DYNAMIC))]  # fmt: skip

@@ -10,9 +10,9 @@ import numpy as np
 from validate.cli.asking import Answers, Question
 from validate.cli.new_body_questions import known_size, there
 from validate.cli.new_kind import (
-    FEW_CELLS,
     accept_line,
     limit_question,
+    quadratic_fits,
     quantity_in,
     reason_question,
 )
@@ -20,6 +20,7 @@ from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of
 
@@ -110,9 +111,10 @@ def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
     if recording.frames and not recording.contours:
         return ("the images are not compared, as the recording has no outlines: find them "
                 "with `validate outline`",)  # fmt: skip
-    if (cells := _cells(found)) > FEW_CELLS:
-        return (f"{found['specimen.mesh']} has {cells} cells: linear ones are proposed (order=1); "
-                "quadratic ones take over ten minutes on the two finer meshes",)  # fmt: skip
+    mesh = _mesh_of(found)
+    if mesh is not None and not quadratic_fits(mesh):
+        return (f"{found['specimen.mesh']} has {len(mesh.cells)} cells: linear ones are proposed "
+                "(order=1), as quadratic ones do not fit into a first answer of 30 s",)  # fmt: skip
     return ()
 
 
@@ -133,15 +135,15 @@ def fields(found: Answers) -> dict[str, str]:
 
 def _of_the_model(found: Answers) -> str:
     """What the models of a mesh file are given: linear cells where it has many, and the fluid."""
-    order = ", order=1" if _cells(found) > FEW_CELLS else ""
+    order = "" if quadratic_fits(_mesh_of(found)) else ", order=1"
     return order + (", fluid=True" if found["outline.fluid"] == "true" else "")
 
 
-def _cells(found: Answers) -> int:
-    """How many cells the specimen's mesh file has; 0 without one."""
+def _mesh_of(found: Answers) -> Mesh | None:
+    """The specimen's mesh file, if it has one."""
     if not found.get("specimen.mesh"):
-        return 0
-    return len(read_mesh(Path(found["specimen.mesh"]), found.get("specimen.mesh_unit")).cells)
+        return None
+    return read_mesh(Path(found["specimen.mesh"]), found.get("specimen.mesh_unit"))
 
 
 def _card(found: Answers) -> str:

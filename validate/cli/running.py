@@ -1,6 +1,7 @@
 """`validate run`."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -11,11 +12,12 @@ from validate.cli.display import relative
 from validate.cli.progress import progress
 from validate.cli.run_screen import called, show_run
 from validate.compare.result import Result
+from validate.errors import UsageError
 from validate.replay.calibrated import Identify, here
 from validate.replay.experiment import Experiment
 from validate.replay.guests import with_guests
 from validate.replay.named_run import run_folder
-from validate.replay.options import Options, Report
+from validate.replay.options import Options, Report, configure, folder_of
 from validate.replay.reused import rests_on
 from validate.replay.road import compare
 from validate.report import gl
@@ -34,6 +36,7 @@ def run(
     methods: str,
     guests: tuple[str, ...] = (),
     case: str = "",
+    refine: bool = False,
     anyway: bool,
     as_json: bool,
     vtu: bool = False,
@@ -50,7 +53,8 @@ def run(
 
     def one(experiment: Experiment) -> bool:
         start = perf_counter()
-        result, page = _reported(with_guests(experiment, guests), options, out, vtu=vtu)
+        used = _refined(experiment, options) if refine else options
+        result, page = _reported(with_guests(experiment, guests), used, out, vtu=vtu)
         if as_json:
             found.append((page.parent / "results.json").read_text(encoding="utf-8").strip())
         else:
@@ -66,6 +70,17 @@ def run(
     elif as_json and code != BAD_INPUT:
         print(found[0])
     return code
+
+
+def _refined(experiment: Experiment, options: Options) -> Options:
+    """The options with what --refine sets; raises `UsageError` where nothing is left to refine."""
+    if experiment.refine is None:
+        raise UsageError(
+            f"--refine: {experiment.name} runs on all its meshes already; leave --refine out"
+        )
+    parameters, _ = configure(experiment, options)
+    finer = experiment.refine(parameters, folder_of(experiment))
+    return replace(options, values={**finer, **options.values})
 
 
 def _reported(

@@ -1,5 +1,7 @@
 """Numerical uncertainty of an answer on one mesh or time step (u_num), by grid refinement.
 
+Two sizes have no observed order: the error follows from the formal one, with F = 3 (Roache 1994).
+
 Answers at three and more sizes h of similar meshes are fitted by f(h) = f0 + a h^p (Eca & Hoekstra
 2014, J. Comput. Phys. 262, 104-130): least squares, with equal weights and with weights 1/h; the
 fit with the smaller standard deviation s counts. The observed order p is trusted from 0.5 to 1.5
@@ -47,7 +49,7 @@ _ZOOMS = 4
 _MANY = 20  # numbers of an answer from which its scatter is known well
 _TINY = 1e-300
 
-Conduct = Literal["monotone", "oscillating", "no order", "at rounding"]
+Conduct = Literal["monotone", "oscillating", "no order", "at rounding", "two sizes"]
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class GridConvergence:
     def words(self) -> str:
         if self.conduct == "at rounding":
             return f"{self.sizes} sizes differ by a negligible amount ({self.u:.1g})"
+        if self.conduct == "two sizes":
+            return f"two sizes, formal order {self.formal:g} assumed, safety {self.safety:.3g}"
         if self.order is None:
             return (
                 f"{self.conduct} over {self.sizes} sizes that can be trusted (formal "
@@ -102,7 +106,7 @@ class GridConvergence:
 class Numerical:
     """Standard uncertainties by what they come from ("mesh", "time step"), in the residual's unit.
 
-    Infinite where fewer than three sizes compare the same points. `words` say how each
+    Infinite where fewer than two sizes compare the same points. `words` say how each
     was found, `deciding` by part what would make it small enough. No parts: no discretisation.
     """
 
@@ -129,13 +133,13 @@ def convergence(
     """Of `answers` (one shape (k, c)) at sizes `h` (n,), the one at index `judged` in question.
 
     Differences up to `rounding` (answers' unit) are rounding, not discretisation. Raises
-    `ComparisonError` for fewer than three different sizes.
+    `ComparisonError` for fewer than two different sizes.
     """
     sizes, values = np.asarray(h, dtype=float), np.array([np.ravel(a) for a in answers])
-    if len(values) != len(sizes) or len(np.unique(sizes)) < 3 or not sizes.min() > 0:
+    if len(values) != len(sizes) or len(np.unique(sizes)) < 2 or not sizes.min() > 0:
         raise ComparisonError(
             f"{len(values)} answers at sizes {', '.join(f'{x:.3g}' for x in sizes)}: u_num "
-            "needs at least three different ones"
+            "needs at least two different ones"
         )
     share = sizes / sizes[judged]
     like = answers[judged]
@@ -143,6 +147,9 @@ def convergence(
     found = (len(share), float(share.min()), formal)
     if distance <= rounding:
         return GridConvergence("at rounding", *found, None, 1.0, distance, distance)
+    if len(np.unique(sizes)) == 2:
+        error = _rms(_fit(share, values, np.ones(len(share)), (formal,), like).error, like)
+        return GridConvergence("two sizes", *found, None, FAR, FAR * error / 2, distance)
     fit = free = _best([_free(share, values, w, formal, like) for w in _weights(share)])
     trusted = _LEAST <= free.order <= _MOST * formal
     if not trusted or free.order > formal:

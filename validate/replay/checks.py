@@ -32,7 +32,6 @@ from validate.replay.followed import Followed
 from validate.replay.refined import Refined, mesh_errors, variants
 from validate.replay.runs import Road
 
-_DRAWS = 12  # of all inputs at once
 _NO_UNIT = "-"  # of a quantity that no observation has
 
 
@@ -188,9 +187,9 @@ def joint_inputs(road: Road) -> tuple[Joint, ...]:
 def _joint_variants(road: Road) -> list[Variant]:
     """The surrogate with all inputs drawn at once; none in a quick run."""
     uncertainty = road.experiment.uncertainty
-    if road.quick or uncertainty is None or not uncertainty.inputs:
+    if road.quick or uncertainty is None or not (uncertainty.inputs and uncertainty.draws):
         return []
-    table = joint_draws(_DRAWS, len(uncertainty.inputs))
+    table = joint_draws(uncertainty.draws, len(uncertainty.inputs))
     return [_drawn(uncertainty, row) for row in table]
 
 

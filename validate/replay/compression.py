@@ -6,11 +6,11 @@ fitted line reaches zero force), force from the cell's own offset; the first win
 the modulus where none is given, the second predicts.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import beside, moved, scaled
 from validate.replay.compression_cards import Compression, stated_sizes
+from validate.replay.cost import affordable
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
@@ -113,6 +114,8 @@ def compression(
             identify_pressed, build=_build, ladder=_MESHES, accepted=accepted,
             declared=inputs if shown else (),
         ),
+        follows=_affordable,
+        refine=lambda p, _: {} if p.specimen.mesh is None else {"mesh.budget": "false"},
         frames=2,
         kind=kind,
         uncertainty=Uncertainty(
@@ -121,6 +124,25 @@ def compression(
             surrogate=accepted[0],
         ),
     )  # fmt: skip
+
+
+def _affordable(
+    experiment: Experiment, recordings: Sequence[Recording], p: Compression
+) -> Experiment:
+    """The experiment with those halvings of a mesh file that fit into memory and `mesh.budget`."""
+    if p.specimen.mesh is None:
+        return experiment
+    assert experiment.uncertainty is not None
+    first = experiment.methods[experiment.accepted[0]].scene
+    scene = _build(recordings[0], p, first)
+    finer = [8 * scene.mesh.nodes.size, 64 * scene.mesh.nodes.size]
+    levels = affordable((_level(None, 1), _level(None, 2)), finer, budget=p.mesh.budget)
+    ladder = replace(_MESHES, levels=levels)
+    return replace(
+        experiment,
+        uncertainty=replace(experiment.uncertainty, mesh=ladder),
+        identify=partial(cast("partial[Any]", experiment.identify), ladder=ladder),
+    )
 
 
 # --- the scene ------------------------------------------------------------------------------------

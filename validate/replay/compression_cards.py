@@ -78,6 +78,9 @@ class CylinderGrid:
     axial: int = quantity(4, "1", "elements along the axis")
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
     halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+    budget: bool = quantity(
+        True, "1", "of a mesh file: keep a first answer to about 30 s; false: as --refine"
+    )
 
 
 @dataclass(frozen=True)

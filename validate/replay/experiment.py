@@ -125,7 +125,7 @@ class Uncertainty:
 
     None for `mesh` or `steps`: the truth is the model's own there, or there is none. `stand_in`
     names, for a method too slow on every mesh, a faster one of the same element that takes its
-    place there; the check says so.
+    place there; the check says so. `draws`: runs with all inputs drawn at once.
     """
 
     mesh: MeshLadder | None = None
@@ -133,6 +133,7 @@ class Uncertainty:
     surrogate: str = ""
     stand_in: Mapping[str, str] = field(default_factory=dict)
     steps: StepLadder | None = None
+    draws: int = 12
 
 
 @dataclass(frozen=True)
@@ -248,6 +249,7 @@ class Experiment:
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     `specimen` names the one that a recording is of: repeats of one specimen count once over all
     experiments; without it all recordings are of one.
+    `refine` returns the settings by path that `--refine` makes: a first answer is coarser.
     `kind` is what its recordings are where no twin makes them; `needs` names the public data set
     (`validate data`) that they come from. `expected` are the verdicts that it
     is known to have, with the reason.
@@ -284,6 +286,7 @@ class Experiment:
     locates: tuple[str, ...] = ()
     specimen: Callable[[Recording], str] | None = None
     quick: Change = unchanged
+    refine: Callable[[Any, Path], Mapping[str, str]] | None = None
     kind: Kind = "measured"
     needs: str = ""
     expected: tuple[Expected, ...] = ()

@@ -93,7 +93,7 @@ def on_meshes(p: Any, ladder: MeshLadder, own: float, modulus: Callable[[Any], f
 
     A mesh's error has the same sign in every repetition, so all of it, not half of its band, is one
     standard uncertainty. Where three sizes show no order the largest difference stands for it; it
-    is infinite where fewer than three can be solved.
+    is infinite where fewer than two can be solved.
     """
     sizes, found, ratios = [ladder.size(p)], [0.0], []
     for change in ladder.levels:
@@ -106,10 +106,12 @@ def on_meshes(p: Any, ladder: MeshLadder, own: float, modulus: Callable[[Any], f
         ratios.append(ratio)
         sizes.append(ladder.size(changed))
         found.append(float(np.log(ratio)))
-    if len(set(sizes)) < 3:
+    if len(set(sizes)) < 2:
         return OnMeshes(float("inf"), tuple(ratios))
     answers = [np.array([[x]]) for x in found]
     conduct = convergence(sizes, answers, 0, ladder.order, _ROUNDING)
+    if conduct.conduct == "two sizes":
+        return OnMeshes(conduct.u, tuple(ratios))
     u = 2 * conduct.u / conduct.safety if conduct.asymptotic else conduct.range
     return OnMeshes(float(u), tuple(ratios))
 

@@ -9,7 +9,7 @@ modulus is identified up to a share of the load, and only what lies beyond is a 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from math import prod
+from math import ceil, prod
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from validate.parameters import known
 from validate.recording.types import Recording
 from validate.replay.body_modulus import identify_body, model_name
 from validate.replay.cards import beside, moved
+from validate.replay.cost import INPUTS, MESHES, affordable, fits, linear_seconds, newton_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
@@ -33,7 +34,7 @@ from validate.replay.experiment import (
 )
 from validate.replay.fitted_moduli import modulus_in
 from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_cards import MeasuredBody, Solid, SolidModel
+from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid, SolidModel
 from validate.replay.measured_contact import (
     contact_of,
     is_quarter,
@@ -47,10 +48,10 @@ from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.moving_body import doubting, following, in_motion
 from validate.replay.similar_grids import divided, fitting, member
-from validate.scene.box import box
-from validate.scene.cylinder import whole_cylinder
+from validate.scene.box import box, grid
+from validate.scene.cylinder import hexahedral_cylinder, whole_cylinder
 from validate.scene.material import LawName, Material
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import linear, of_element, refined
@@ -60,6 +61,10 @@ from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
+_ACROSS = 2  # cells across a slender body
+_ASPECT = 2.0  # length of its cells over their thickness
+_UNKNOWNS = 10_000  # of a nominal mesh that has more cells than `body.cells` says
+_REFINED = 600.0  # s, of the runs that --refine makes of quadratic cells
 _FLAT = 5e-3  # of a sliding place's width
 _NU = 0.4999  # the largest Poisson ratio of these elements
 _AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
@@ -86,20 +91,22 @@ def measured_body(
 
     `folder` is that of the experiment's file, from which a mesh file is found.
     """
-    body = partial(body_of, folder=folder)
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
-        partial(static_scene, body=body, folder=folder), partial(place, folder=folder),
+        partial(static_scene, folder=folder), partial(place, folder=folder),
         frames=parameters.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
-            mesh=MeshLadder(_LEVELS if parameters.body.file is None else _HALVINGS,
-                            partial(_cell, body=body), _order(parameters, methods, accepted)),
+            mesh=MeshLadder(_SHARES if parameters.body.file is None else _HALVINGS,
+                            partial(_cell, body=partial(body_of, folder=folder)),
+                            _order(parameters, methods, accepted)),
             inputs=_inputs_of(parameters),
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
+    bare = replace(bare, refine=partial(_finer_settings, methods=bare.methods))
     if parameters.motion.how == "dynamic":
-        return in_motion(bare, bare.build, folder)
+        made = in_motion(bare, bare.build, folder)
+        return replace(made, follows=partial(_in_motion_as_set, folder=folder))
     return _as_set(bare, (), parameters, folder=folder)
 
 
@@ -109,15 +116,23 @@ def _as_set(
     """The experiment with the inputs that these parameters make uncertain, and charts along the
     axis of the largest motion."""
     assert experiment.uncertainty is not None
-    inputs = _inputs_of(p)
-    made = replace(experiment, uncertainty=replace(experiment.uncertainty, inputs=inputs))
-    made = following(made, recordings, p) if recordings else made
+    uncertainty = replace(experiment.uncertainty, inputs=_inputs_of(p))
+    made = replace(experiment, uncertainty=uncertainty)
+    made = following(_affordable(made, p, folder), recordings, p) if recordings else made
     by_statics = partial(_identified, experiment=made, folder=folder)
     return replace(
         made,
         identify=partial(doubting, identify=by_statics, build=made.build),
         follows=partial(_as_set, folder=folder),
     )
+
+
+def _in_motion_as_set(
+    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
+) -> Experiment:
+    order = experiment.methods[experiment.accepted[0]].scene.order
+    made = _with_levels(experiment, _levels(p, unknowns_of(p, order, folder)))
+    return following(made, recordings, p)
 
 
 def _identified(
@@ -163,7 +178,8 @@ def static_scene(
         **_load(p, recording, (mesh, folder)),
     )  # fmt: skip
     if mesh.bricks:
-        return replace(scene, dilatation="mixed")
+        bricks = quadratic(mesh) if model.order == 2 and p.body.file is None else mesh
+        return replace(scene, mesh=bricks, dilatation="mixed")
     return of_element(scene, "P2" if model.order == 2 else "MD")
 
 
@@ -234,7 +250,7 @@ def _without_weight(
 def _mesh(p: MeasuredBody, body: Any) -> Mesh:
     if p.indenter.there and p.body.file is None:
         return pressed_mesh(gridded(p))
-    mesh: Mesh = body(gridded(p).body, places=_places(p))
+    mesh: Mesh = body(gridded(p).body, places=_places(p), bricks=p.seen.outline is None)
     return mesh
 
 
@@ -252,8 +268,12 @@ def _places(p: MeasuredBody) -> tuple[str, ...]:
     return tuple(text for text in said if text)
 
 
-def body_of(card: Solid, *, folder: Path, places: tuple[str, ...] = ()) -> Mesh:
+def body_of(
+    card: Solid, *, folder: Path, places: tuple[str, ...] = (), bricks: bool = True
+) -> Mesh:
     """The body with the facet set "surface" of all of it; of 3-D cells.
+
+    A block or cylinder is of hexahedra, or of tetrahedra, whose facets outlines need.
 
     The `places` of a mesh file are facet sets by their words, chosen on the mesh as it is and
     halved with it: smaller facets beside a box would enter it, and the nearest one of a point is
@@ -261,14 +281,14 @@ def body_of(card: Solid, *, folder: Path, places: tuple[str, ...] = ()) -> Mesh:
 
     Raises `UsageError` for a card that says none, `SceneError` for a mesh of 2-D cells.
     """
-    mesh = _meshed(card, folder, places)
+    mesh = _meshed(card, folder, places, bricks)
     if mesh.dimension != 3:
         raise SceneError(f"{card.file}: cells of {mesh.kind}; expected 3-D cells")
     return replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
 
 
 @lru_cache(maxsize=8)
-def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
+def _meshed(card: Solid, folder: Path, places: tuple[str, ...], bricks: bool) -> Mesh:
     if card.file is not None:
         whole = linear(read_mesh(folder / card.file, card.unit))
         scene = Scene(_with_places(whole, places), Material(1.0, 0.3))
@@ -276,11 +296,13 @@ def _meshed(card: Solid, folder: Path, places: tuple[str, ...]) -> Mesh:
             scene = refined(scene)
         return scene.mesh
     if card.block:
-        return box(card.block, card.divisions or divided(_ideal(card)))
+        make = grid if bricks else box
+        return make(card.block, card.divisions or divided(_ideal(card)))
     if card.cylinder:
         diameter, height = card.cylinder
         radial, axial = card.divisions or divided(_ideal(card))
-        return whole_cylinder(diameter, height, radial, axial)
+        round_ = hexahedral_cylinder if bricks else whole_cylinder
+        return round_(diameter, height, radial, axial)
     raise UsageError("no body is given; set body.file, body.block or body.cylinder")
 
 
@@ -299,16 +321,30 @@ def gridded(p: MeasuredBody) -> MeasuredBody:
 
 
 def _ideal(card: Solid) -> tuple[float, ...]:
-    """Cells per axis, were they cubes: of a cylinder along radius and height."""
-    edge = max(card.block or card.cylinder) / card.cells
+    """Cells per axis (of a cylinder along radius and height): cubes where the body is compact.
+
+    A slender or thin body has `_ACROSS` cells across it, at most `_ASPECT` times as long as they
+    are thick, as far as `_UNKNOWNS` allow.
+    """
     lengths = card.block or (card.cylinder[0] / 2, card.cylinder[1])
-    return tuple(length / edge for length in lengths)
+    thick = min(lengths) / _ACROSS
+
+    def cells(edge: float) -> tuple[float, ...]:
+        return tuple(max(length / edge, _ACROSS) for length in lengths)
+
+    cubes = max(card.block or card.cylinder) / card.cells
+    edge = min(cubes, _ASPECT * thick)
+    while edge < cubes and _unknowns(cells(edge), round_=bool(card.cylinder)) > _UNKNOWNS:
+        edge = min(1.1 * edge, cubes)
+    return cells(edge)
 
 
-def _unknowns(cells: tuple[int, ...], *, round_: bool) -> int:
-    """Those of quadratic cells; a cylinder is twice its radial cells wide."""
-    along = (2 * cells[0], 2 * cells[0], cells[1]) if round_ else cells
-    return 3 * prod(2 * n + 1 for n in along)
+def _unknowns(cells: Sequence[float], *, round_: bool) -> float:
+    """Those of quadratic hexahedra: of a disc in squares, a core and rings about it."""
+    if round_:
+        n = cells[0]
+        return 3 * (4 * n**2 + 4 * n + 1 + 16 * n * ceil(n / 2)) * (2 * cells[1] + 1)
+    return 3 * prod(2 * n + 1 for n in cells)
 
 
 def _even(p: MeasuredBody) -> tuple[bool, ...]:
@@ -341,14 +377,89 @@ def _level(share: float | None, halvings: int | None) -> Change:
         even = _even(p)
         by = body.finer if share is None else share
         cells = member(gridded(p).body.divisions, by, even)
-        unknowns = partial(_unknowns, round_=bool(body.cylinder))
-        return replace(p, body=replace(body, divisions=fitting(cells, unknowns, even)))
+        return replace(p, body=replace(body, divisions=fitting(cells, partial(_fits, body), even)))
 
     return change
 
 
-_LEVELS = (_level(0.5, 1), _level(0.75, 2), _level(None, None))
+def _fits(body: Solid, cells: tuple[int, ...]) -> bool:
+    """Whether the quadratic system of a grid fits into memory and the time of a first answer."""
+    N = _unknowns(cells, round_=bool(body.cylinder))
+    return fits(N, linear_seconds(N), MESHES if body.budget else None)
+
+
+_SHARES = (_level(0.5, None), _level(0.75, None), _level(None, None))
 _HALVINGS = (_level(None, 1), _level(None, 2))
+
+
+def _affordable(experiment: Experiment, p: MeasuredBody, folder: Path) -> Experiment:
+    """The experiment with meshes of u_num that fit into memory and into the time of a first answer.
+
+    Where they are too slow at large strain, the linear method of the same element stands in; where
+    the surrogate is slow, inputs are moved one by one only.
+    """
+    N = unknowns_of(p, experiment.methods[experiment.accepted[0]].scene.order, folder)
+    levels = _levels(p, N)
+    experiment = _with_levels(experiment, levels)
+    uncertainty = experiment.uncertainty
+    assert uncertainty is not None
+    if p.body.budget and not p.indenter.there:
+        finest = N * (8 ** len(levels) if p.body.file else p.body.finer**3)
+        if p.seen.states * newton_seconds(finest) > MESHES:
+            uncertainty = replace(uncertainty, stand_in=_linear_of(experiment))
+        if (1 + len(uncertainty.inputs) + uncertainty.draws) * linear_seconds(N) > INPUTS:
+            uncertainty = replace(uncertainty, draws=0)
+    return replace(experiment, uncertainty=uncertainty)
+
+
+def _with_levels(experiment: Experiment, levels: tuple[Change, ...]) -> Experiment:
+    declared = experiment.uncertainty
+    assert declared is not None
+    assert declared.mesh is not None
+    mesh = replace(declared.mesh, levels=levels)
+    return replace(experiment, uncertainty=replace(declared, mesh=mesh))
+
+
+def _levels(p: MeasuredBody, unknowns: float) -> tuple[Change, ...]:
+    """The meshes of u_num: similar grids, or halvings of a mesh file that fit."""
+    if p.body.file is None:
+        return _SHARES
+    return affordable(_HALVINGS, [8 * unknowns, 64 * unknowns], budget=p.body.budget)
+
+
+def _finer_settings(
+    p: MeasuredBody, folder: Path, *, methods: Mapping[str, Method]
+) -> Mapping[str, str]:
+    """What --refine sets: no time limit, 30 load steps, quadratic cells of a mesh file as far as
+    they fit into the memory."""
+    found = {"body.budget": "false"}
+    if p.motion.how == "static":
+        found["seen.states"] = str(max(p.seen.states, SeenOf().states))
+    if p.body.file is None or body_of(p.body, folder=folder, places=_places(p)).bricks:
+        return found
+    N = unknowns_of(p, 2, folder)
+    if fits(N, SeenOf().states * newton_seconds(N), _REFINED):
+        found |= {f"methods.{name}.order": "2" for name, m in methods.items() if m.scene.order == 1}
+    return found
+
+
+def _linear_of(experiment: Experiment) -> dict[str, str]:
+    """Of each accepted method at large strain, the linear one of the same element."""
+    models = {name: m.scene for name, m in experiment.methods.items()}
+    return {
+        name: linear
+        for name in experiment.accepted if models[name].law != "linear"
+        for linear, model in models.items()
+        if (model.law, model.order) == ("linear", models[name].order)
+    }  # fmt: skip
+
+
+def unknowns_of(p: MeasuredBody, order: int, folder: Path) -> float:
+    """Return the unknowns of a mesh file in elements of this order; of a grid, quadratic ones."""
+    if p.body.file is None:
+        return _unknowns(gridded(p).body.divisions, round_=bool(p.body.cylinder))
+    mesh = body_of(p.body, folder=folder, places=_places(p))
+    return float((quadratic(mesh) if order == 2 and not mesh.bricks else mesh).nodes.size)
 
 
 def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:

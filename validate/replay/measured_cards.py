@@ -29,6 +29,9 @@ class Solid:
     )
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
     halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+    budget: bool = quantity(
+        True, "1", "keep a first answer to about 30 s by fewer meshes; false: as --refine"
+    )
 
     def __post_init__(self) -> None:
         given = [bool(self.file), bool(self.block), bool(self.cylinder)]

@@ -44,7 +44,7 @@ class Refined:
         self._sizes = {part: self._size_of(part, road, name) for part in self._runs}
 
     def of(self, residual: Residual, limit: float) -> dict[str, GridConvergence | None]:
-        """By part; None where fewer than three meshes or steps compare the same points."""
+        """By part; None where fewer than two meshes or steps compare the same points."""
         immaterial = _IMMATERIAL * limit if isfinite(limit) else 0.0
         rounding = max(_ROUNDING * _scale(residual), immaterial)
         return {part: self._converged(part, residual, rounding) for part in self._runs}
@@ -68,9 +68,9 @@ class Refined:
         else:
             run = self._nominal(part).run
             sizes = [float(run.t[-1]) / (len(run.t) * v.split) for v in self._splits(name)]
-        if len(set(sizes)) < 3:
+        if len(set(sizes)) < min(2, len(sizes)):
             raise ComparisonError(
-                f"{name}, {part}: sizes {', '.join(f'{s:.3g}' for s in sizes)}; u_num needs three "
+                f"{name}, {part}: sizes {', '.join(f'{s:.3g}' for s in sizes)}; u_num needs two "
                 "different sizes; declare more mesh or step sizes"
             )
         return sizes
@@ -95,7 +95,7 @@ class Refined:
             if nodes not in meshes:
                 answers.setdefault(size, mine.values)
             meshes.add(nodes)
-        if len(answers) < 3 or self._sizes[part][0] not in answers:
+        if len(answers) < 2 or self._sizes[part][0] not in answers:
             return None
         return convergence(list(answers), list(answers.values()), 0, self._formal(part), rounding)
 
@@ -106,7 +106,9 @@ class Refined:
 
     def _words(self, part: str, found: GridConvergence | None) -> str:
         if found is None:
-            return "fewer than three different sizes compare the same points"
+            if len(self._runs[part]) == 1:
+                return "no second mesh fits into the time of a first answer; add --refine"
+            return "fewer than two different sizes compare the same points"
         by = f" by {self._stands_in} in its place" if part == "mesh" and self._stands_in else ""
         return found.words + by
 

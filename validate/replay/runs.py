@@ -66,7 +66,7 @@ class Road:
         """Says what will be asked for on the experiment's own recordings, for the time left."""
         for v in variants:
             key = self._key(MAIN, v, self.parameters)
-            finer = self._finer(v)
+            finer = self.finer(v)
             self._pace.expect(key, v.method, finer**3, v.split)
             self._finest[v.method] = max(finer, self._finest.get(v.method, 1.0))
 
@@ -84,7 +84,7 @@ class Road:
             if not isinstance(method.settings, Limited):
                 require_solvable(unknowns, d, name)
 
-    def _finer(self, variant: Variant) -> float:
+    def finer(self, variant: Variant) -> float:
         """How many times as fine as the experiment's own mesh, as its ladder of meshes has it."""
         uncertainty = self.experiment.uncertainty
         if uncertainty is None or uncertainty.mesh is None:

@@ -11,9 +11,6 @@ from math import gcd, log, prod
 
 import numpy as np
 
-from validate.fem.fill import solvable_bytes
-from validate.memory import free_memory
-
 Cells = tuple[int, ...]
 
 _MULTIPLES = (4, 3, 2)  # of its base that a nominal grid may be, the preferred one first
@@ -54,17 +51,12 @@ def member(cells: Sequence[int], share: float, even: Sequence[bool] = ()) -> Cel
 
 
 def fitting(
-    cells: Sequence[int], unknowns: Callable[[Cells], int], even: Sequence[bool] = ()
+    cells: Sequence[int], fits: Callable[[Cells], bool], even: Sequence[bool] = ()
 ) -> Cells:
-    """Return `cells`, or the finest grid of their family whose system fits into the memory.
-
-    `unknowns` counts those of a grid, in space.
-    """
-    free = free_memory()
+    """Return `cells`, or the finest grid of their family that `fits`; else the coarsest one."""
     k = _multiple(cells, even)
     grids = [tuple(n // k * j for n in cells) for j in range(k, 0, -1)]
-    fit = (g for g in grids if free is None or solvable_bytes(unknowns(g), 3) < free)
-    return next(fit, grids[-1])
+    return next(filter(fits, grids), grids[-1])
 
 
 def similarity(cells: Sequence[int], others: Sequence[int]) -> float:

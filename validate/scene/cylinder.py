@@ -1,10 +1,10 @@
-"""An upright cylinder, or a quarter of it, for compression between plates."""
+"""An upright cylinder: of hexahedra, or of tetrahedra that a quarter's mirror images make."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import (
     Mesh,
@@ -68,7 +68,7 @@ def quarter_cylinder(
     return mesh
 
 
-def _outside(radial: int) -> float:
+def _outside(radial: float) -> float:
     """Corner radius over circle radius where polygon and circle have one area.
 
     A polygon of n corners on a circle has n sin(2 pi / n) / (2 pi) of its area.
@@ -79,6 +79,61 @@ def _outside(radial: int) -> float:
 
 def _ratio(part: Floats, whole: Floats) -> Floats:
     return np.asarray(np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0))
+
+
+def hexahedral_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:
+    """Linear hexahedra of the whole cylinder about z, `radial` of them from axis to rim.
+
+    A square core of `radial` cells a side lies inside rings of 4 `radial` cells; the rim has the
+    circle's area, as that of `quarter_cylinder`. Sets "lower_plate", "upper_plate" and "rim".
+    Raises `SceneError` for sizes or counts that are not positive.
+    """
+    if min(diameter, height) <= 0 or min(radial, axial) < 1:
+        raise SceneError(
+            f"cylinder {1e3 * diameter:g} x {1e3 * height:g} mm with {radial} x {axial} "
+            "hexahedra: all must be positive"
+        )
+    disc, squares = _disc(radial)
+    radius = diameter / 2 * _outside(radial / 2)
+    per, levels = len(disc), np.linspace(0.0, height, axial + 1)
+    require_nodes((per, axial + 1))
+    nodes = np.hstack([np.tile(radius * disc, (axial + 1, 1)), np.repeat(levels, per)[:, None]])
+    layers = (squares + per * np.arange(axial)[:, None, None]).reshape(-1, 4)
+    cells = np.hstack([layers, layers + per])
+    outside = boundary_facets(cells, 3)
+    middles = nodes[outside].mean(axis=1)
+    low, high = (np.isclose(middles[:, 2], z, atol=1e-9 * height) for z in (0.0, height))
+    sets = {"lower_plate": low, "upper_plate": high, "rim": ~(low | high)}
+    mesh = Mesh(nodes, cells, "hex8", {name: outside[on] for name, on in sets.items()})
+    require_positive_cells(mesh)
+    return mesh
+
+
+def _disc(n: int) -> tuple[Floats, Ints]:
+    """Nodes (k, 2) and quadrilaterals (q, 4) of a unit disc: n x n core cells in n / 2 rings.
+
+    Corners run counter-clockwise. The size of the core makes its cells as long as rings are wide.
+    """
+    count = (n + 1) // 2
+    half = 1 / (2 * count / n + 1.1)
+    line = np.linspace(-1.0, 1.0, n + 1)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    core = half * np.stack([x, y], axis=-1).reshape(-1, 2)
+    around = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
+    angle = 5 * np.pi / 4 + np.arange(4 * n) * np.pi / (2 * n)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    shares = np.arange(1, count + 1)[:, None, None] / count
+    rings = (1 - shares) * core[around] + shares * rim
+    loops = np.vstack([around, len(core) + np.arange(rings.size // 2).reshape(-1, 4 * n)])
+    nodes = np.vstack([core, rings.reshape(-1, 2)])
+    inner, outer = loops[:-1], loops[1:]
+    ahead = [np.roll(loop, -1, axis=1) for loop in (inner, outer)]
+    faces = [
+        np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1),
+        np.stack([inner, outer, ahead[1], ahead[0]], axis=-1),
+    ]
+    return nodes, np.vstack([f.reshape(-1, 4) for f in faces])
 
 
 def whole_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:

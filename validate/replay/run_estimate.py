@@ -1,0 +1,62 @@
+"""Estimate of a run before it is started: time, memory and unknowns of all its variants."""
+
+from dataclasses import dataclass
+
+from validate.errors import ValidateError
+from validate.fem.fill import solvable_bytes
+from validate.parameters import describe, with_values
+from validate.replay.checks import variants_of
+from validate.replay.cost import linear_seconds, newton_seconds
+from validate.replay.experiment import Experiment
+from validate.replay.origins import opened
+from validate.replay.runs import Road
+from validate.scene.scene import Scene
+
+_PROGRAM, _PROGRAM_SECONDS = 0.5e9, 8.0  # bytes and s of the program itself and its report
+_SOLVE = 4e-8  # s of a solution with a factor, per N^(4/3)
+_ASSUMED_E = "10 kPa"  # of a modulus that is identified: it changes no size
+
+
+@dataclass(frozen=True)
+class RunEstimate:
+    """About how long all runs take (s), memory at the peak (bytes), unknowns of the finest mesh."""
+
+    seconds: float
+    memory: float
+    unknowns: float
+
+
+def estimated(experiment: Experiment) -> RunEstimate | None:
+    """Return the estimate for the declared parameters; None for scenes that have no mesh or cannot
+    be built yet."""
+    try:
+        return _estimated(experiment)
+    except ValidateError:
+        return None
+
+
+def _estimated(experiment: Experiment) -> RunEstimate | None:
+    found = opened(experiment, experiment.parameters)
+    modulus = [p.path for p in describe(found.parameters) if p.path == "material.E"]
+    unset = [p for p in modulus if found.parameters.material.E is None]
+    parameters = with_values(found.parameters, dict.fromkeys(unset, _ASSUMED_E.replace(" ", "")))
+    experiment = experiment.follows(experiment, found.recordings, parameters)
+    road = Road(experiment, experiment.methods, parameters, None, quick=False)
+    variants, scenes = variants_of(road), {}
+    for name in {v.method for v in variants}:
+        model = experiment.methods[name].scene
+        scene = experiment.build(found.recordings[0], parameters, model)
+        if not isinstance(scene, Scene):
+            return None
+        scenes[name] = scene
+    seen = experiment.place(found.recordings[0], parameters, next(iter(scenes.values())))
+    seconds, largest, memory = _PROGRAM_SECONDS, 0.0, 0.0
+    for variant in variants:
+        scene, steps = scenes[variant.method], len(seen.t) * variant.split
+        N = scene.mesh.nodes.size * road.finer(variant) ** scene.mesh.dimension
+        linear = scene.material.law == "linear" and not scene.contacts
+        alone = linear_seconds(N) + steps * _SOLVE * N ** (4 / 3)
+        seconds += alone if linear else steps * newton_seconds(N)
+        largest = max(largest, N)
+        memory = max(memory, solvable_bytes(N, scene.mesh.dimension) * (1 if linear else 3))
+    return RunEstimate(seconds, _PROGRAM + memory, largest)
