@@ -11,9 +11,9 @@ from validate.arrays import Floats
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source
 from validate.replay import compare
+from validate.replay.body_mesh import gridded
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.measured_body import gridded
 from validate.replay.options import folder_of
 from validate.replay.solved import solve
 

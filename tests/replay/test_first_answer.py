@@ -9,10 +9,10 @@ from commands import called
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import cost
+from validate.replay.body_mesh import unknowns_of
 from validate.replay.cost import affordable, linear_seconds, newton_seconds, states_within
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.measured_body import unknowns_of
 from validate.replay.options import folder_of
 from validate.replay.run_estimate import estimated
 from validate.scene.box import box, grid
@@ -78,7 +78,7 @@ def test_a_mesh_file_is_refined_as_far_as_a_first_answer_allows(
     assert 8 <= p.seen.states <= 30
     assert p.seen.states * newton_seconds(N) <= cost.RUNS or p.seen.states == 8
     assert (made.uncertainty.draws == 0) == (16 * linear_seconds(N) > cost.INPUTS)
-    expected = estimated(made)
+    expected = estimated(tmp_path / "experiments" / "mine.py")
     assert expected is not None
     assert expected.unknowns == pytest.approx(8**levels * N, rel=0.01)
     assert f"{expected.unknowns:.0f} unknowns at most" in said

@@ -23,6 +23,7 @@ from validate.parameters import with_values
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
 from validate.register.fitting import MarkerFit
 from validate.replay import (
+    body_mesh,
     compare,
     ladder_default,
     measured_drive,
@@ -30,9 +31,9 @@ from validate.replay import (
     measured_outline,
     measured_seen,
 )
-from validate.replay import measured_body as measured_body_module
+from validate.replay.body_mesh import body_of, gridded
 from validate.replay.experiment import Experiment
-from validate.replay.measured_body import body_of, gridded, solid
+from validate.replay.measured_body import solid
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,
@@ -418,10 +419,10 @@ def test_settings_of_a_body_that_cannot_be(change: dict[str, str], says: str) ->
 
 def test_a_plane_mesh_is_no_body(monkeypatch: pytest.MonkeyPatch) -> None:
     flat = SimpleNamespace(dimension=2, kind="tri3")
-    monkeypatch.setattr(measured_body_module, "_meshed", lambda *_: flat)
+    monkeypatch.setattr(body_mesh, "_meshed", lambda *_: flat)
     card = SimpleNamespace(file="sheet.msh")
     with pytest.raises(SceneError, match=r"sheet.msh: cells of tri3; expected 3-D cells"):
-        measured_body_module.body_of(card, folder=Path())  # type: ignore[arg-type]
+        body_mesh.body_of(card, folder=Path())  # type: ignore[arg-type]
 
 
 def test_layouts_and_markers_that_are_not_given_are_requested(

@@ -14,10 +14,10 @@ from validate.fem.system import build
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.replay import compare
+from validate.replay.body_mesh import gridded
 from validate.replay.contact_cards import Indenter, Machine
 from validate.replay.experiment import Experiment
 from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_body import gridded
 from validate.replay.measured_cards import (
     BodyRanges,
     HeldAt,

@@ -2,19 +2,30 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from validate.arrays import Floats
 from validate.errors import UsageError
+from validate.fem.system import build
 from validate.parameters import describe, with_values
+from validate.recording.types import Recording, Source
 from validate.replay import cost, load
+from validate.replay.body_mesh import body_of, gridded, unknowns_of
 from validate.replay.cost import fits
-from validate.replay.measured_body import body_of, gridded, measured_body, solid, unknowns_of
-from validate.replay.measured_cards import HeldAt, MeasuredBody, Solid
+from validate.replay.measured_body import measured_body, solid, static_scene
+from validate.replay.measured_cards import (
+    HeldAt,
+    MeasuredBody,
+    MovedBy,
+    Solid,
+    SolidModel,
+    Tissue,
+)
 from validate.replay.similar_grids import divided, fitting, member, similarity
+from validate.solve.quasi_static import QuasiStatic
 
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
 _COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
@@ -182,3 +193,22 @@ def test_a_level_that_scales_one_direction_alone_is_found(project_root: Path) ->
     once = replace(p, mesh=replace(p.mesh, along=4))
     ratio = counts(once) / counts(p)
     assert ratio.max() / ratio.min() > 1.10
+
+
+def test_a_bonded_pad_that_keeps_its_volume_does_not_lock() -> None:
+    """Its force on the nominal grid is that of one twice as fine within 4 %; without the mixed
+    dilatation it is far stiffer."""
+
+    def force(divisions: tuple[int, ...], order: Literal[1, 2]) -> float:
+        p = MeasuredBody(
+            body=Solid(block=PAD, divisions=divisions), material=Tissue(E=1e4, nu=0.4999),
+            held=HeldAt(all="zmin"), moved=MovedBy("noted", "zmax", noted=(0.0, 1e-3)),
+        )  # fmt: skip
+        nothing = Recording("log", Source("x", "", 0, "x"), 0)
+        scene = static_scene(nothing, p, SolidModel("linear", order), Path())
+        stepper = QuasiStatic().prepare(build(scene))
+        return stepper.step(stepper.rest(), np.array([1e-3])).numbers["moved.force"]
+
+    converged = force((12, 12, 4), 2)
+    assert force((6, 6, 2), 2) == pytest.approx(converged, rel=0.04)
+    assert force((6, 6, 2), 1) < 1.5 * converged

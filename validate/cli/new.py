@@ -27,7 +27,6 @@ from validate.errors import UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
-from validate.replay.find import load_file
 from validate.replay.remade import kind_of_recordings
 from validate.replay.run_estimate import RunEstimate, estimated
 
@@ -72,7 +71,7 @@ def new(
     for topic in _unused(recording, kind.used(recording, found)):
         complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
-    if expected := estimated(load_file(path)):
+    if expected := estimated(path):
         say(f"first answer: {_about(expected)}", indent="  ")
 
 

@@ -49,13 +49,13 @@ from validate.errors import UsageError
 from validate.parameters import describe, with_values
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
+from validate.replay.body_mesh import body_of, unknowns_of
 from validate.replay.cost import (
     FEWEST_STATES,
     RUNS,
     newton_seconds,
     states_within,
 )
-from validate.replay.measured_body import body_of, unknowns_of
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import NOTED, RELEASE
 from validate.replay.measured_markers import AS_SEEN

@@ -15,8 +15,9 @@ from validate.fem.system import build
 from validate.identify.recorded_motion import FRACTION, motion_of
 from validate.parameters import with_values
 from validate.recording.types import Recording
+from validate.replay.body_mesh import unknowns_of
 from validate.replay.first_modes import first_frequencies
-from validate.replay.measured_body import static_scene, unknowns_of
+from validate.replay.measured_body import static_scene
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.measured_drive import RELEASE, drive_kind
 from validate.replay.moving_body import against_mode

@@ -8,8 +8,7 @@ modulus is identified up to a share of the load, and only what lies beyond is a 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
-from math import ceil, prod
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,17 @@ from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.parameters import known
 from validate.recording.types import Recording
+from validate.replay.body_mesh import (
+    AXES,
+    body_of,
+    even_axes,
+    grid_unknowns,
+    gridded,
+    mesh_of,
+    named_places,
+    slides_across,
+    unknowns_of,
+)
 from validate.replay.body_modulus import identify_body, model_name
 from validate.replay.cards import beside, moved
 from validate.replay.cost import INPUTS, MESHES, affordable, fits, linear_seconds, newton_seconds
@@ -38,36 +48,26 @@ from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid, SolidMod
 from validate.replay.measured_contact import (
     contact_of,
     is_quarter,
-    pressed_mesh,
     require_touching,
-    spans_of,
     symmetry,
 )
 from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.moving_body import doubting, following, in_motion
-from validate.replay.similar_grids import divided, fitting, member
-from validate.scene.box import box, grid
-from validate.scene.cylinder import hexahedral_cylinder, whole_cylinder
+from validate.replay.similar_grids import fitting, member
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of, place_of
-from validate.scene.refine import linear, of_element, refined
+from validate.scene.refine import of_element
 from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
-from validate.scene.select import facets_of, nodes_of
+from validate.scene.select import nodes_of
 from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
-_ACROSS = 2  # cells across a slender body
-_ASPECT = 2.0  # length of its cells over their thickness
-_UNKNOWNS = 10_000  # of a nominal mesh that has more cells than `body.cells` says
 _REFINED = 600.0  # s, of the runs that --refine makes of quadratic cells
-_FLAT = 5e-3  # of a sliding place's width
 _NU = 0.4999  # the largest Poisson ratio of these elements
-_AXES = {"all": (0, 1, 2), "x": (0,), "y": (1,), "z": (2,)}
 
 
 def solid(label: str, law: LawName = "neo_hooke", order: Any = 1) -> Method:
@@ -166,7 +166,7 @@ def static_scene(
     recording: Recording, p: MeasuredBody, model: SolidModel, folder: Path, body: Any = None
 ) -> Scene:
     """The body as it is held and loaded; a mesh file is found from the `folder`."""
-    mesh = _mesh(p, body or partial(body_of, folder=folder))
+    mesh = mesh_of(p, body or partial(body_of, folder=folder))
     E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
     scene = Scene(
         mesh,
@@ -184,10 +184,10 @@ def static_scene(
 
 
 def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
-    said = [(getattr(p.held, name), axes) for name, axes in _AXES.items()]
+    said = [(getattr(p.held, name), axes) for name, axes in AXES.items()]
     held = [Support(place_of(text, mesh), axes) for text, axes in said if text]
     if p.held.slides:
-        held.append(Support(place_of(p.held.slides, mesh), (_across(p.held.slides, mesh),)))
+        held.append(Support(place_of(p.held.slides, mesh), (slides_across(p.held.slides, mesh),)))
     held += symmetry(p)
     if drive_kind(recording, p) == "moves" and p.moved.sideways and not p.indenter.there:
         along = int(np.abs(axis_of(p.moved.along)).argmax())
@@ -199,23 +199,11 @@ def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Suppor
 def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
     if not p.held.slides:
         return ()
-    across = _across(p.held.slides, mesh)
+    across = slides_across(p.held.slides, mesh)
     one, other = (c for c in range(3) if c != across)
     x = mesh.nodes[nodes_of(mesh, place_of(p.held.slides, mesh))]
     place = f"held.slides = {p.held.slides}"
     return resting_pins(x, one, other, place, "--set body.halvings=1")
-
-
-def _across(text: str, mesh: Mesh) -> int:
-    """The axis that a flat place lies across; raises `SceneError` for one that is not flat."""
-    x = mesh.nodes[nodes_of(mesh, place_of(text, mesh))]
-    spread = np.ptp(x, axis=0)
-    if spread.min() > _FLAT * spread.max():
-        raise SceneError(
-            f"held.slides = {text}: {1e3 * spread.min():.3g} mm out of flat; a sliding place must "
-            "be a plane normal to x, y or z"
-        )
-    return int(spread.argmin())
 
 
 def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[str, Any]:
@@ -247,13 +235,6 @@ def _without_weight(
     return {"drives": (Drive("moved", where, along),)}
 
 
-def _mesh(p: MeasuredBody, body: Any) -> Mesh:
-    if p.indenter.there and p.body.file is None:
-        return pressed_mesh(gridded(p))
-    mesh: Mesh = body(gridded(p).body, places=_places(p), bricks=p.seen.outline is None)
-    return mesh
-
-
 def known_place(p: MeasuredBody) -> str:
     """Raises `UsageError` where the place that is moved is not said."""
     if not p.moved.place:
@@ -261,105 +242,6 @@ def known_place(p: MeasuredBody) -> str:
             "moved.place is not set; name where the load acts, as --set moved.place=zmax"
         )
     return p.moved.place
-
-
-def _places(p: MeasuredBody) -> tuple[str, ...]:
-    said = (*(getattr(p.held, name) for name in (*_AXES, "slides")), p.moved.place)
-    return tuple(text for text in said if text)
-
-
-def body_of(
-    card: Solid, *, folder: Path, places: tuple[str, ...] = (), bricks: bool = True
-) -> Mesh:
-    """The body with the facet set "surface" of all of it; of 3-D cells.
-
-    A block or cylinder is of hexahedra, or of tetrahedra, whose facets outlines need.
-
-    The `places` of a mesh file are facet sets by their words, chosen on the mesh as it is and
-    halved with it: smaller facets beside a box would enter it, and the nearest one of a point is
-    a quarter as large.
-
-    Raises `UsageError` for a card that says none, `SceneError` for a mesh of 2-D cells.
-    """
-    mesh = _meshed(card, folder, places, bricks)
-    if mesh.dimension != 3:
-        raise SceneError(f"{card.file}: cells of {mesh.kind}; expected 3-D cells")
-    return replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
-
-
-@lru_cache(maxsize=8)
-def _meshed(card: Solid, folder: Path, places: tuple[str, ...], bricks: bool) -> Mesh:
-    if card.file is not None:
-        whole = linear(read_mesh(folder / card.file, card.unit))
-        scene = Scene(_with_places(whole, places), Material(1.0, 0.3))
-        for _ in range(card.halvings):
-            scene = refined(scene)
-        return scene.mesh
-    if card.block:
-        make = grid if bricks else box
-        return make(card.block, card.divisions or divided(_ideal(card)))
-    if card.cylinder:
-        diameter, height = card.cylinder
-        radial, axial = card.divisions or divided(_ideal(card))
-        round_ = hexahedral_cylinder if bricks else whole_cylinder
-        return round_(diameter, height, radial, axial)
-    raise UsageError("no body is given; set body.file, body.block or body.cylinder")
-
-
-def gridded(p: MeasuredBody) -> MeasuredBody:
-    """With `body.divisions`: a grid near `body.cells` whose family of similar grids is rich, and
-    which has a node in the middle of a plate that the body slides on."""
-    if p.body.file is not None or p.body.divisions or not (p.body.block or p.body.cylinder):
-        return p
-    if p.indenter.there:
-        spans = spans_of(p)
-        ideal = tuple(p.body.cells * s / max(spans) for s in spans)
-    else:
-        ideal = _ideal(p.body)
-    cells = divided(ideal, _even(p))
-    return replace(p, body=replace(p.body, divisions=cells))
-
-
-def _ideal(card: Solid) -> tuple[float, ...]:
-    """Cells per axis (of a cylinder along radius and height): cubes where the body is compact.
-
-    A slender or thin body has `_ACROSS` cells across it, at most `_ASPECT` times as long as they
-    are thick, as far as `_UNKNOWNS` allow.
-    """
-    lengths = card.block or (card.cylinder[0] / 2, card.cylinder[1])
-    thick = min(lengths) / _ACROSS
-
-    def cells(edge: float) -> tuple[float, ...]:
-        return tuple(max(length / edge, _ACROSS) for length in lengths)
-
-    cubes = max(card.block or card.cylinder) / card.cells
-    edge = min(cubes, _ASPECT * thick)
-    while edge < cubes and _unknowns(cells(edge), round_=bool(card.cylinder)) > _UNKNOWNS:
-        edge = min(1.1 * edge, cubes)
-    return cells(edge)
-
-
-def _unknowns(cells: Sequence[float], *, round_: bool) -> float:
-    """Those of quadratic hexahedra: of a disc in squares, a core and rings about it."""
-    if round_:
-        n = cells[0]
-        return 3 * (4 * n**2 + 4 * n + 1 + 16 * n * ceil(n / 2)) * (2 * cells[1] + 1)
-    return 3 * prod(2 * n + 1 for n in cells)
-
-
-def _even(p: MeasuredBody) -> tuple[bool, ...]:
-    """Axes of a block along which every grid has a middle: in the plane of a place that slides,
-    whose middle is pinned. A cylinder has an axis."""
-    if not (p.held.slides and p.body.block):
-        return ()
-    across = _across(p.held.slides, body_of(p.body, folder=Path()))
-    return tuple(c != across for c in range(3))
-
-
-def _with_places(mesh: Mesh, places: tuple[str, ...]) -> Mesh:
-    whole = replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
-    chosen = {text: facets_of(whole, place_of(text, whole)) for text in places}
-    return replace(whole, facets={**whole.facets, **chosen})
 
 
 # --- what is uncertain ----------------------------------------------------------------------------
@@ -374,7 +256,7 @@ def _level(share: float | None, halvings: int | None) -> Change:
         body = p.body
         if body.file is not None:
             return replace(p, body=replace(body, halvings=body.halvings + (halvings or 0)))
-        even = _even(p)
+        even = even_axes(p)
         by = body.finer if share is None else share
         cells = member(gridded(p).body.divisions, by, even)
         return replace(p, body=replace(body, divisions=fitting(cells, partial(_fits, body), even)))
@@ -384,7 +266,7 @@ def _level(share: float | None, halvings: int | None) -> Change:
 
 def _fits(body: Solid, cells: tuple[int, ...]) -> bool:
     """Whether the quadratic system of a grid fits into memory and the time of a first answer."""
-    N = _unknowns(cells, round_=bool(body.cylinder))
+    N = grid_unknowns(cells, round_=bool(body.cylinder))
     return fits(N, linear_seconds(N), MESHES if body.budget else None)
 
 
@@ -435,7 +317,7 @@ def _finer_settings(
     found = {"body.budget": "false"}
     if p.motion.how == "static":
         found["seen.states"] = str(max(p.seen.states, SeenOf().states))
-    if p.body.file is None or body_of(p.body, folder=folder, places=_places(p)).bricks:
+    if p.body.file is None or body_of(p.body, folder=folder, places=named_places(p)).bricks:
         return found
     N = unknowns_of(p, 2, folder)
     if fits(N, SeenOf().states * newton_seconds(N), _REFINED):
@@ -454,14 +336,6 @@ def _linear_of(experiment: Experiment) -> dict[str, str]:
     }  # fmt: skip
 
 
-def unknowns_of(p: MeasuredBody, order: int, folder: Path) -> float:
-    """Return the unknowns of a mesh file in elements of this order; of a grid, quadratic ones."""
-    if p.body.file is None:
-        return _unknowns(gridded(p).body.divisions, round_=bool(p.body.cylinder))
-    mesh = body_of(p.body, folder=folder, places=_places(p))
-    return float((quadratic(mesh) if order == 2 and not mesh.bricks else mesh).nodes.size)
-
-
 def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
     """The formal order: of a static force or displacement that of the corners of a held place; of
     a motion in time that of its cells, since frequencies rule it, of which corners are a small
@@ -473,7 +347,7 @@ def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
     """The edge m of a cube as large as a mean cell."""
-    return float(np.cbrt(cell_volumes(_mesh(p, body)).mean()))
+    return float(np.cbrt(cell_volumes(mesh_of(p, body)).mean()))
 
 
 def _stiffer(p: MeasuredBody, z: float) -> float | None:

@@ -1,6 +1,7 @@
 """Estimate of a run before it is started: time, memory and unknowns of all its variants."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from validate.errors import ValidateError
 from validate.fem.fill import solvable_bytes
@@ -8,6 +9,7 @@ from validate.parameters import describe, with_values
 from validate.replay.checks import variants_of
 from validate.replay.cost import linear_seconds, newton_seconds
 from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
 from validate.replay.origins import opened
 from validate.replay.runs import Road
 from validate.scene.scene import Scene
@@ -26,11 +28,11 @@ class RunEstimate:
     unknowns: float
 
 
-def estimated(experiment: Experiment) -> RunEstimate | None:
-    """Return the estimate for the declared parameters; None for scenes that have no mesh or cannot
-    be built yet."""
+def estimated(file: Path) -> RunEstimate | None:
+    """Return the estimate for the parameters that a file declares; None for a scene without a mesh,
+    or one that cannot be built yet."""
     try:
-        return _estimated(experiment)
+        return _estimated(load_file(file))
     except ValidateError:
         return None
 
