@@ -1,6 +1,7 @@
 """`validate new` from a log with outlines: what they show and where they lie is asked."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -12,6 +13,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.replay.compression_cards import Compression
 from validate.replay.find import load_file
+from validate.replay.options import folder_of
 from validate.scene.box import box
 from validate.scene.mesh_file import write_mesh
 
@@ -94,12 +96,20 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
     assert [type(m.settings).__name__ for m in mine.methods.values()] == ["ExactPressure"] * 2
     assert [m.scene.order for m in mine.methods.values()] == [2, 2]
     (seen / "experiments" / "mine.py").unlink()
-    write_mesh(box((0.02, 0.02, 0.03), (10, 10, 10)), seen / "cyst.npz")
+    block = box((0.02, 0.02, 0.03), (10, 10, 10))
+    names = {"lower_plate": "z0", "upper_plate": "z1", "wall": "x0"}
+    sets = {name: block.facets[side] for name, side in names.items()}
+    write_mesh(replace(block, facets=sets), seen / "cyst.npz")
     said, text = written(seen, inside)
     assert "cyst.npz has 6000 cells: linear ones are proposed (order=1)" in said
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
     assert [m.scene.order for m in mine.methods.values()] == [1, 1]
+    recordings = mine.load(mine.parameters, folder_of(mine))
+    used = mine.follows(mine, recordings, mine.parameters).uncertainty
+    assert used is not None
+    assert used.mesh is not None
+    assert len(used.mesh.levels) == 1  # halved twice it takes too long for a first answer
 
 
 def test_a_specimen_of_an_unusual_size_is_a_question(seen: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from commands import called
 
+from validate.cli.running import _refined
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import cost
@@ -13,7 +14,7 @@ from validate.replay.body_mesh import unknowns_of
 from validate.replay.cost import affordable, linear_seconds, newton_seconds, states_within
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.options import folder_of
+from validate.replay.options import Options, folder_of
 from validate.replay.run_estimate import estimated
 from validate.scene.box import box, grid
 from validate.scene.mesh import Mesh
@@ -86,6 +87,8 @@ def test_a_mesh_file_is_refined_as_far_as_a_first_answer_allows(
     finer = made.refine(p, folder_of(made))
     assert (finer["body.budget"], finer["seen.states"]) == ("false", "30")
     assert ("methods.solid.order" in finer) == (order == 1 and not mesh.bricks)
+    used = _refined(made, Options({"seen.states": "9"}))
+    assert used.values == {**finer, "seen.states": "9"}  # what the user sets stays
 
 
 def test_the_linear_method_of_the_same_element_stands_in_on_the_meshes(tmp_path: Path) -> None:
