@@ -18,7 +18,7 @@ from validate.papers.async_regions.touched_block import (
     sets,
     tell,
 )
-from validate.replay.cards import changed, shipped
+from validate.replay.cards import shipped
 from validate.replay.experiment import Experiment, Twin
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "async_block.mcap"
@@ -41,7 +41,7 @@ EXPERIMENT = Experiment(
     exhibits=tell,
     published=BLOCK_FIGURES,
     frames=40,
-    quick=changed("probe", seconds=2.0),
+    quick={"probe.seconds": 2.0},
     twin=Twin(
         record,
         remake=("twin.", "probe.", "body.", "dt"),

@@ -13,7 +13,7 @@ from validate.papers.async_regions.figures import FIGURES
 from validate.papers.async_regions.line import TouchedLine, build, place, record, sets
 from validate.papers.async_regions.line_exhibits import tell
 from validate.papers.async_regions.methods import LINE
-from validate.replay.cards import changed, shipped
+from validate.replay.cards import shipped
 from validate.replay.experiment import Experiment, MeshLadder, StepLadder, Twin, Uncertainty
 
 RECORDING = Path(__file__).parents[1] / "recordings" / "async_line.mcap"
@@ -34,15 +34,13 @@ EXPERIMENT = Experiment(
     axis="x",
     reference="whole",
     uncertainty=Uncertainty(
-        MeshLadder(
-            (changed("body", cells=10), changed("body", cells=20)), lambda p: LENGTH / p.body.cells
-        ),
+        MeshLadder(({"body.cells": 10}, {"body.cells": 20}), lambda p: LENGTH / p.body.cells),
         steps=StepLadder(1.0),
     ),
     exhibits=tell,
     published=FIGURES,
     frames=40,
-    quick=changed("probe", seconds=10.0),
+    quick={"probe.seconds": 10.0},
     twin=Twin(
         record,
         remake=("twin.", "probe.", "body.", "dt"),

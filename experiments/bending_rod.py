@@ -24,7 +24,7 @@ from validate.papers.accuracy.ladders import ROD_LADDER
 from validate.papers.accuracy.needle import STEP
 from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
 from validate.papers.accuracy.rod_exhibits import tell
-from validate.replay.cards import TimeSteps, changed, shipped
+from validate.replay.cards import TimeSteps, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.material import Material
@@ -65,9 +65,9 @@ METHODS = {
 }
 CASES = (
     Case("finer_mesh", "the truth has twice as many cells along every edge",
-         changed("twin", refined=2), methods=tuple(FIVE)),
+         {"twin.refined": 2}, methods=tuple(FIVE)),
     Case("small_steps", "the truth takes 20 steps in one of the models'",
-         changed("twin", finer=20), methods=tuple(FIVE)),
+         {"twin.finer": 20}, methods=tuple(FIVE)),
 )  # fmt: skip
 
 EXPERIMENT = Experiment(

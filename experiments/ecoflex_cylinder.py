@@ -7,7 +7,6 @@ the material's, bonded ones divide it by the stiffening that the same mesh shows
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from validate.compare.expected import Expected
 from validate.compare.published import Figure
@@ -17,9 +16,10 @@ from validate.papers.ecoflex.cylinder import CylinderModel as Model
 from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.papers.ecoflex.specimens import specimen_of
-from validate.replay.cards import moved, quarter_meshes
+from validate.parameters import describe
+from validate.replay.cards import quarter_meshes
 from validate.replay.compression_cards import stated_sizes
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.fluid import NoFluid
 from validate.solve.guests.guest import Guest
@@ -74,19 +74,14 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-def _scaled(p: LoggedCylinder, z: float) -> LoggedCylinder:
-    by = 1 + z * p.ranges.modulus
-    moduli = {k: (v or 0.0) * by for k, v in vars(p.material).items() if k.startswith("E_")}
-    return replace(p, material=replace(p.material, **moduli))
-
-
+MODULI = tuple(p.path for p in describe(LoggedCylinder()) if p.path.startswith("material.E_"))
 UNCERTAINTY = Uncertainty(
     quarter_meshes(lambda p: float(p.specimen.height or 0.03)),
     (
-        Input("modulus", _scaled, "E within the uncertainty of the calibrating specimens",
+        vary(MODULI, "relative ranges.modulus", "modulus",
+             "E within the uncertainty of the calibrating specimens",
               "identified: scatter of their mean; the scatter between specimens is in u_D"),
-        Input("Poisson ratio",
-              moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu),
+        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
               "nu within its declared uncertainty", "assumed; the data set gives none"),
     ),
     surrogate="slip",

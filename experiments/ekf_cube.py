@@ -16,7 +16,7 @@ from validate.papers.ekf_nfem.cube import CubeMesh, PushedCube, build, place, re
 from validate.papers.ekf_nfem.cube_exhibits import tell_cube
 from validate.papers.ekf_nfem.figures import CUBE_FIGURES
 from validate.papers.ekf_nfem.ladder import CUBE_LADDER
-from validate.replay.cards import changed, shipped
+from validate.replay.cards import shipped
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.method import WALK_UNRECORDED, Method
 from validate.solve.central import CentralDifference
@@ -72,16 +72,16 @@ CASES = (
     Case(
         "stiff_model",
         "the models are 25 % stiffer than the truth",
-        changed("twin", stiffness=0.8),
+        {"twin.stiffness": 0.8},
         methods=SOUND,
     ),
     Case(
         "stiff_model_200Hz",
         "the models are 25 % stiffer than the truth, and A is measured at 200 Hz only",
-        changed("twin", stiffness=0.8, every=25),
+        {"twin.stiffness": 0.8, "twin.every": 25},
         methods=SOUND,
     ),
-    Case("nu", "the truth has a Poisson ratio of 0.40", changed("twin", nu=0.40), methods=SOUND),
+    Case("nu", "the truth has a Poisson ratio of 0.40", {"twin.nu": 0.40}, methods=SOUND),
 )
 
 

@@ -25,7 +25,6 @@ from validate.papers.ekf_nfem.liver import (
 from validate.papers.ekf_nfem.liver_body import LiverBody
 from validate.papers.ekf_nfem.liver_exhibits import tell_liver
 from validate.papers.ekf_nfem.liver_figures import LIVER_FIGURES, follows
-from validate.replay.cards import changed
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.method import Method
 from validate.solve.central import CentralDifference
@@ -67,19 +66,19 @@ CASES = (
     Case(
         "stiff_model",
         "the models are 25 % stiffer than the truth",
-        changed("twin", stiffness=0.8),
+        {"twin.stiffness": 0.8},
         methods=SOUND,
     ),
     Case(
         "stiff_model_200Hz",
         "the models are 25 % stiffer than the truth, and A is measured at 200 Hz only",
-        changed("twin", stiffness=0.8, every=50),
+        {"twin.stiffness": 0.8, "twin.every": 50},
         methods=SOUND,
     ),
     Case(
         "finer",
         "the truth has eight times as many cells and six times as many steps",
-        changed("twin", halved=1, finer=6),
+        {"twin.halved": 1, "twin.finer": 6},
         methods=SOUND,
     ),
 )

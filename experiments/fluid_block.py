@@ -19,8 +19,7 @@ from validate.papers.fluid_block.block import (
 )
 from validate.papers.fluid_block.block import SlabModel as Model
 from validate.papers.fluid_block.told import FIGURES, tell
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Input, MeshLadder, Twin, Uncertainty
+from validate.replay.experiment import Experiment, MeshLadder, Twin, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.pressure_loop import PressureLoop
@@ -39,10 +38,9 @@ METHODS = {
     "p1_dry": Method("P1 without fluid", NoFluid(), Model()),
 }
 INPUTS = (
-    Input("modulus", moved("material", E=lambda p, z: p.material.E * (1 + z * p.ranges.E)),
-          "E within its declared relative uncertainty", "assumed"),
-    Input("Poisson ratio", moved("material", nu=lambda p, z: p.material.nu - z * p.ranges.nu),
-          "nu within its declared uncertainty", "assumed"),
+    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+         "nu within its declared uncertainty"),
 )  # fmt: skip
 
 EXPERIMENT = Experiment(

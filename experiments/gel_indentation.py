@@ -11,14 +11,13 @@ from pathlib import Path
 
 from validate.compare.expected import Expected
 from validate.compare.verdict import Accept
-from validate.papers.gel.between import of_other_boxes, smoothed
+from validate.papers.gel.between import OTHER_BOXES, smoothed
 from validate.papers.gel.box import GelIndentation, build, load, place, stated
 from validate.papers.gel.box import GelModel as Model
 from validate.papers.gel.exhibits import tell
 from validate.papers.gel.lower import fitted_box
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.cards import changed, moved
-from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.harmonic import Harmonic
 from validate.solve.newton import StaticNewton
@@ -32,24 +31,24 @@ METHODS = {
     "laplace": Method("Laplace's equation: no mechanics", Harmonic(), Model()),
 }
 AXES = tuple(f"inside.{axis}" for axis in "xyz")
-IN_LOWER = changed("box", which="lower")
+IN_LOWER = {"box.which": "lower"}
 DRAWS = tuple(
-    Input(f"faces, {name} draw", moved("faces", **{name: lambda p, z: z / math.sqrt(3)}),
+    vary(f"faces.{name}", f"absolute {1 / math.sqrt(3)}", f"faces, {name} draw",
           "noise of the particles that move the faces; three draws, their mean square counts",
           "their residuals about local fits")
     for name in ("first", "second", "third")
 )  # fmt: skip
 UNCERTAINTY = Uncertainty(
     MeshLadder(
-        (changed("mesh", along=4, up=2), changed("mesh", along=6, up=3)),
+        ({"mesh.along": 4, "mesh.up": 2}, {"mesh.along": 6, "mesh.up": 3}),
         lambda p: (p.box.side or 1e-4) / p.mesh.along,
         order=3.0,
     ),
     (
         *DRAWS,
-        Input("smoothing", moved("faces", smoothing=smoothed),
+        Input("smoothing", smoothed,
               "neighbours of the fits at the faces, half to twice", "assumed"),
-        Input("box", moved("material", nu=of_other_boxes),
+        vary("material.nu", OTHER_BOXES, "box",
               "Poisson ratio of another lower box, or of other faces",
               "scatter of ratios fitted in several boxes"),
     ),

@@ -10,7 +10,6 @@ from validate.papers.hanging_bar.bar import BarModel as Model
 from validate.papers.hanging_bar.bar import HangingBar, build, load, place
 from validate.papers.hanging_bar.converged import PUBLISHED, tell
 from validate.papers.hanging_bar.ladder import trial
-from validate.replay.cards import changed
 from validate.replay.experiment import Experiment, MeshLadder, Uncertainty
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
@@ -50,7 +49,7 @@ EXPERIMENT = Experiment(
     place=place,
     uncertainty=Uncertainty(
         MeshLadder(
-            (changed("mesh", across=3), changed("mesh", across=2)),
+            ({"mesh.across": 3}, {"mesh.across": 2}),
             size=lambda p: p.width / 2 / p.mesh.across,
             order=3.0,
         ),

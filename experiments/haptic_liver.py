@@ -21,7 +21,6 @@ from validate.papers.ekf_nfem.haptic import (
 )
 from validate.papers.ekf_nfem.haptic_exhibits import FIGURES, tell
 from validate.papers.ekf_nfem.liver_body import LiverBody
-from validate.replay.cards import changed
 from validate.replay.experiment import Experiment, Twin
 from validate.replay.method import Method
 from validate.solve.haptic_loop import HapticLoop
@@ -58,7 +57,7 @@ EXPERIMENT = Experiment(
     published=FIGURES,
     frames=40,
     follows=follows,
-    quick=changed("path", seconds=0.8),
+    quick={"path.seconds": 0.8},
     twin=Twin(
         record,
         remake=("twin.", "path.", "body.", "material.", "hand."),

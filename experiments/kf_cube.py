@@ -20,7 +20,7 @@ from validate.papers.kf_fem.block import BlockModel, PulledBlock, build, place, 
 from validate.papers.kf_fem.figures import FIGURES
 from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.papers.kf_fem.seeds import tell
-from validate.replay.cards import changed, shipped
+from validate.replay.cards import shipped
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.method import WALK_UNRECORDED, Method
 from validate.solve.modal import Modal
@@ -124,7 +124,7 @@ CAREFUL = (*RIVALS, "kf_gated", "kf_unclocked", "kf_smoothed")
 
 
 def _case(name: str, doc: str, methods: tuple[str, ...] = RIVALS, **changes: Any) -> Case:
-    return Case(name, doc, changed("twin", **changes), methods=methods)
+    return Case(name, doc, {f"twin.{k}": v for k, v in changes.items()}, methods=methods)
 
 
 CASES = (

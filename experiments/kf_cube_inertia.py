@@ -14,7 +14,6 @@ from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
 from validate.papers.kf_fem.block import BlockModel
 from validate.papers.kf_fem.ladders import SWINGING_LADDER
-from validate.replay.cards import changed
 from validate.replay.experiment import Case, StepLadder, Uncertainty
 from validate.replay.find import load_file
 from validate.replay.method import WALK_UNRECORDED, Method
@@ -63,7 +62,7 @@ RIVALS = ("average", "kf_printed", "kf_load", "kf_reduced")
 SOFT_BASE = Case(
     "soft_base",
     "the truth has supporting springs of 450 kN/m3, the model of the joint filter 300",
-    changed("twin", springs=4.5e5),
+    {"twin.springs": 4.5e5},
     methods=(*RIVALS, "roukf_support"),
 )
 

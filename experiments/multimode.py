@@ -10,8 +10,7 @@ from validate.compare.expected import Expected
 from validate.papers.multimode.calibrating import accepted, calibrations, follows
 from validate.papers.multimode.curves import Multimode, build, load, material_of, place
 from validate.papers.multimode.exhibits import exhibits
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.stretch_test import StretchTest
 
@@ -23,12 +22,8 @@ METHODS = {
     "ogden": Method("Ogden, one term", StretchTest(), "ogden"),
     "ogden_two": Method("Ogden, two terms", StretchTest(), "ogden_two"),
 }
-LESS = Input(
-    "Poisson ratio",
-    moved(nu=lambda p, z: p.nu - abs(z) * p.ranges.nu),
-    "nu",
-    "assumed; the curves contain no volume",
-)
+LESS = vary("nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu",
+            "assumed; the curves contain no volume")  # fmt: skip
 
 EXPERIMENT = Experiment(
     name="multimode",

@@ -24,7 +24,7 @@ from validate.papers.accuracy.figures import NEEDLE_FIGURES
 from validate.papers.accuracy.ladders import NEEDLE_LADDER
 from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
 from validate.papers.accuracy.needle_exhibits import tell
-from validate.replay.cards import TimeSteps, changed, shipped
+from validate.replay.cards import TimeSteps, shipped
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
 from validate.scene.material import Material
@@ -60,13 +60,13 @@ METHODS = {
 }
 CASES = (
     Case("prostate", "the truth is MP2, the models are MP1",
-         changed(material=card(MP2)), methods=tuple(FIVE)),
+         {"material": card(MP2)}, methods=tuple(FIVE)),
     Case("finer_mesh", "the truth has twice as many cells a side",
-         changed("twin", refined=2), methods=tuple(FIVE)),
+         {"twin.refined": 2}, methods=tuple(FIVE)),
     Case("small_steps", "the truth takes 20 steps in one of the models'",
-         changed("twin", finer=20), methods=tuple(FIVE)),
+         {"twin.finer": 20}, methods=tuple(FIVE)),
     Case("plane_stress", "the truth is in plane stress, the models in plane strain",
-         changed("body", plane="stress"), methods=tuple(FIVE)),
+         {"body.plane": "stress"}, methods=tuple(FIVE)),
 )  # fmt: skip
 
 EXPERIMENT = Experiment(

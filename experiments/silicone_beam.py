@@ -8,7 +8,6 @@ silicone relaxes is identified on the ring-down under gravity alone, and with
 `--set recording=NEW.c3d --set load.mass=52g`.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from validate.compare.expected import Expected
@@ -23,8 +22,7 @@ from validate.papers.released_beam.figures import follows
 from validate.papers.released_beam.recorded import load
 from validate.papers.released_beam.swing import DAMPING, FREQUENCY, LABEL, quantity_of
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.cards import moved
-from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
 from validate.replay.similar_grids import member
 from validate.solve.guests.guest import Guest
@@ -116,25 +114,14 @@ def _edge(p: ReleasedBeam) -> float:
     return float((volume / p.mesh.along / p.mesh.across**2) ** (1 / 3))
 
 
-def _by(part: str, name: str, share: str) -> Callable[[ReleasedBeam, float], ReleasedBeam]:
-    """A value off by z of its relative standard uncertainty."""
-    return moved(part, **{
-        name: lambda p, z: getattr(getattr(p, part), name) * (1 + z * getattr(p.ranges, share))
-    })  # fmt: skip
-
-
-def _hung(p: ReleasedBeam, z: float) -> float:
+def _hung(p: ReleasedBeam, z: float) -> ReleasedBeam:
     """No mass is none, whatever its uncertainty."""
-    return p.load.mass and p.load.mass + z * p.ranges.mass
+    mass = p.load.mass and p.load.mass + z * p.ranges.mass
+    return replace(p, load=replace(p.load, mass=mass))
 
 
 def _with(p: ReleasedBeam, relaxation: Relaxation) -> ReleasedBeam:
     return replace(p, material=replace(p.material, relaxation=relaxation))
-
-
-def _creeping(p: ReleasedBeam, z: float) -> ReleasedBeam:
-    card = p.material.relaxation
-    return _with(p, replace(card, slow=max((card.slow or 0.0) + z * p.ranges.creep, 0.0)))
 
 
 def _sooner(p: ReleasedBeam, z: float) -> ReleasedBeam:
@@ -149,14 +136,13 @@ UNCERTAINTY = Uncertainty(
     # 5 x 2 x 2 cells have no coarser similar ones: 8 x 3 x 3 within 7 %, and 10 x 4 x 4.
     MeshLadder((_finer(1.5), _finer(2.0)), _edge),
     (
-        Input("modulus", _by("material", "E", "modulus"), "E", NONE),
-        Input("density", _by("material", "rho", "rho"), "rho", NONE),
-        Input("Poisson ratio",
-              moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu), "nu", NONE),
-        Input("height", moved("size", height=lambda p, z: p.size.height + z * p.ranges.size),
-              "height of the section", NONE),
-        Input("mass", moved("load", mass=_hung), "mass at the end", NONE),
-        Input("creep", _creeping, "modulus of the slow branch", NONE),
+        vary("material.E", "relative ranges.modulus", "modulus", "E", NONE),
+        vary("material.rho", "relative ranges.rho", "density", "rho", NONE),
+        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu", NONE),
+        vary("size.height", "absolute ranges.size", "height", "height of the section", NONE),
+        Input("mass", _hung, "mass at the end", NONE),
+        vary("material.relaxation.slow", "absolute ranges.creep, at least 0", "creep",
+             "modulus of the slow branch", NONE),
         Input("relaxation time", _sooner, "relaxation time of the fast branch, at the same "
                                           "loss", NONE),
     ),

@@ -13,8 +13,7 @@ from validate.papers.skin_pads.placed import place
 from validate.papers.skin_pads.sheet import PulledSkin, build, load, stated
 from validate.papers.skin_pads.sheet import SheetModel as Model
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.cards import changed, moved
-from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.experiment import Experiment, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.newton import StaticNewton
 from validate.solve.proportional import Proportional
@@ -44,19 +43,17 @@ UNCERTAINTY = Uncertainty(
     # Order: the corners of the pads are singular.
     MeshLadder(
         (
-            changed("mesh", cells=lambda p: p.mesh.cells - 1 or 3),
-            changed("mesh", cells=lambda p: p.mesh.cells + 1),
+            {"mesh.cells": "- 1"},
+            {"mesh.cells": "+ 1"},
         ),
         lambda p: p.pads.width / p.mesh.cells,
         order=1.2,
     ),
     (
-        Input("Poisson ratio",
-              moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu), "nu", NONE),
-        Input("pads", moved("pads", length=lambda p, z: p.pads.length + z * p.ranges.pads,
-                            width=lambda p, z: p.pads.width + z * p.ranges.pads),
+        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu", NONE),
+        vary(("pads.length", "pads.width"), "absolute ranges.pads", "pads",
               "length and width of the pads", "assumed; drawn 8 mm, the window is 24 mm"),
-        Input("distance", moved("pads", gap=lambda p, z: p.pads.gap + z * p.ranges.gap),
+        vary("pads.gap", "absolute ranges.gap", "distance",
               "between the pads at rest", "assumed; unknown in the authors' scripts"),
     ),
     surrogate="neo_hooke",

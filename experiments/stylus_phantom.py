@@ -9,18 +9,14 @@ from validate.compare.published import Figure
 from validate.compare.verdict import Accept
 from validate.papers.stylus.phantom import StylusPhantom, build, load, place, stated
 from validate.papers.stylus.shown import exhibits, follows, identified
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.experiment import Experiment, Input, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.rigid_motion import RigidMotion
 
 
 def _tip(axis: str) -> Input:
-    def off(p: StylusPhantom, z: float) -> float:
-        return float(getattr(p.tip, f"off_{axis}")) + z * float(p.tip.sd or 0.0)
-
-    return Input(
-        f"tip {axis}", moved("tip", **{f"off_{axis}": off}), f"{axis} of the tip's offset",
+    return vary(
+        f"tip.off_{axis}", "absolute tip.sd", f"tip {axis}", f"{axis} of the tip's offset",
         "Error of the device set's StylusTip to Stylus, over root 3",
     )  # fmt: skip
 

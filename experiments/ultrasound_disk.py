@@ -7,17 +7,15 @@ place. Other images of the kind: `--set recording=FILE --set disk.diameter=15mm`
 from validate.compare.verdict import Accept
 from validate.papers.disk.disk import ImagedDisk, build, load, place
 from validate.papers.disk.shown import exhibits, follows, identified
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.rigid_motion import RigidMotion
 
 UNCERTAINTY = Uncertainty(
     inputs=(
-        Input("scale", moved("image", scale=lambda p, z: p.image.scale * (1 + z * p.ranges.scale)),
+        vary("image.scale", "relative ranges.scale", "scale",
               "lengths of the images", "assumed: the speed of sound within 1.7 % of the scanner's"),
-        Input("nominal diameter",
-              moved("disk", diameter=lambda p, z: p.disk.diameter + z * p.ranges.diameter),
+        vary("disk.diameter", "absolute ranges.diameter", "nominal diameter",
               "diameter", "assumed; the data set gives none"),
     ),
     surrogate="rigid",

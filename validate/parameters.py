@@ -124,6 +124,34 @@ def with_values(settings: Any, values: Mapping[str, str]) -> Any:
     return _set(settings, [(_names(settings, path), path, text) for path, text in values.items()])
 
 
+def with_given(settings: Any, values: Mapping[str, Any]) -> Any:
+    """As `with_values`, of values that need not be texts: those in SI, and whole parts."""
+    texts = {path: value for path, value in values.items() if not is_dataclass(value)}
+    changed = _set(settings, [(_names(settings, path), path, v) for path, v in texts.items()])
+    for path, part in values.items():
+        if is_dataclass(part):
+            changed = _with_part(changed, path.split("."), part)
+    return changed
+
+
+def _with_part(settings: Any, names: list[str], part: Any) -> Any:
+    head, *rest = names
+    inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
+    new = {head: _with_part(inner, rest, part) if rest else part}
+    if isinstance(settings, Mapping):
+        return types.MappingProxyType({**settings, **new})
+    return replace(settings, **new)
+
+
+def value_at(settings: Any, path: str) -> tuple[Any, str]:
+    """The value at a path, and its unit; raises `UsageError` as `with_values` does."""
+    names = _names(settings, path)
+    unit, _ = _leaf(settings, names)
+    for name in names:
+        settings = settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
+    return settings, unit
+
+
 def doubts(settings: Any, values: Mapping[str, str]) -> tuple[str, ...]:
     """A line for each path with a bare number so far off that its unit may have been forgotten.
 
@@ -237,9 +265,9 @@ def _hints(kind: type) -> Mapping[str, Any]:
     return get_type_hints(kind)
 
 
-def _set(settings: Any, asked: Sequence[tuple[list[str], str, str]]) -> Any:
+def _set(settings: Any, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
     """A copy with every text parsed into the field at the end of its way."""
-    below: dict[str, list[tuple[list[str], str, str]]] = {}
+    below: dict[str, list[tuple[list[str], str, Any]]] = {}
     for names, path, text in asked:
         below.setdefault(names[0], []).append((names[1:], path, text))
     new = {head: _member(settings, head, inner) for head, inner in below.items()}
@@ -248,19 +276,22 @@ def _set(settings: Any, asked: Sequence[tuple[list[str], str, str]]) -> Any:
     return replace(settings, **new) if new else settings
 
 
-def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, str]]) -> Any:
+def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
     names, path, text = asked[-1]
     if names:
         inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
         return _set(inner, asked)
+    if not isinstance(text, str):
+        return text
     unit, _ = _leaf(settings, [head])
-    return _parse(_hints(settings.__class__)[head], path, text, unit)
+    return parsed(_hints(settings.__class__)[head], path, text, unit)
 
 
-def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
+def parsed(hint: Any, path: str, text: str, unit: str) -> Any:
+    """A text as the value of a field of this type and unit. Raises as `with_values` does."""
     if get_origin(hint) in (Union, types.UnionType):
         options = [a for a in get_args(hint) if a is not type(None)]
-        return None if text.lower() in ("none", "null") else _parse(options[0], path, text, unit)
+        return None if text.lower() in ("none", "null") else parsed(options[0], path, text, unit)
     if get_origin(hint) is Literal:
         choices = {str(choice): choice for choice in get_args(hint)}
         if text not in choices:
@@ -272,7 +303,7 @@ def _parse(hint: Any, path: str, text: str, unit: str) -> Any:
             raise UsageError(
                 f"{path}={text}: expected all in {unit} without unit, or each with its unit"
             )
-        return tuple(_parse(get_args(hint)[0], path, part.strip(), unit) for part in parts)
+        return tuple(parsed(get_args(hint)[0], path, part.strip(), unit) for part in parts)
     if hint is bool:
         if text.lower() not in ("true", "false"):
             raise UsageError(f"{path}={text}: expected true or false")

@@ -19,12 +19,13 @@ from validate.parameters import describe, with_values
 from validate.recording.types import Recording
 from validate.replay.calibrated_budget import budgets
 from validate.replay.calibrated_words import headlines, lines, not_identified, scores, unit_of
-from validate.replay.calibration import Calibrates, Calibration, Change, Free
+from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
 from validate.replay.method import Method
 from validate.replay.origins import opened
 from validate.replay.problem import Calibrated, Part, Problem, with_free
 from validate.replay.remade import made_by
+from validate.replay.variation import Change
 from validate.report.numbers import with_unit
 
 #: From the number of a calibration among those of its experiment, and its problem.

@@ -5,17 +5,10 @@ taken as it is. What calibrated is shown as fitted and is never evidence.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from validate.errors import UsageError
-
-Change = Callable[[Any], Any]
-
-
-def unchanged(parameters: Any) -> Any:
-    return parameters
+from validate.replay.variation import Change, change_of, unchanged
 
 
 @dataclass(frozen=True)
@@ -57,6 +50,9 @@ class Calibrates:
     quantities: tuple[str, ...]
     change: Change = unchanged
     name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "change", change_of(self.change))
 
     @property
     def judged(self) -> bool:

@@ -76,26 +76,6 @@ def beside(parameters: Any, folder: Path) -> tuple[Recording, ...]:
     return (read_recording(folder / parameters.recording),)
 
 
-def changed(part: str = "", **values: Any) -> Change:
-    """A change of one part of the parameters ("": of themselves); a value that is a function is one
-    of all parameters."""
-
-    def change(p: Any) -> Any:
-        new = {k: v(p) if callable(v) else v for k, v in values.items()}
-        return replace(p, **{part: replace(getattr(p, part), **new)} if part else new)
-
-    return change
-
-
-def moved(part: str = "", **values: Callable[[Any, float], Any]) -> Callable[[Any, float], Any]:
-    """As `changed`, of an uncertain input: every value is a function of all parameters and z."""
-
-    def move(p: Any, z: float) -> Any:
-        return changed(part, **{k: v(p, z) for k, v in values.items()})(p)
-
-    return move
-
-
 def rubbed(p: Any, z: float) -> Any:
     """A block whose plates rub by z `ranges.friction` more; what lies beyond slipping or bonded is
     mirrored back."""

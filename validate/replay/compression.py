@@ -6,7 +6,7 @@ fitted line reaches zero force), force from the cell's own offset; the first win
 the modulus where none is given, the second predicts.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from validate.parameters import quantity
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.cards import beside, moved, scaled
+from validate.replay.cards import beside, scaled
 from validate.replay.compression_cards import Compression, stated_sizes
 from validate.replay.cost import affordable
 from validate.replay.experiment import (
@@ -32,6 +32,7 @@ from validate.replay.experiment import (
     Input,
     MeshLadder,
     Uncertainty,
+    vary,
 )
 from validate.replay.fitted_moduli import modulus_in, toe_in
 from validate.replay.method import Method
@@ -101,8 +102,8 @@ def compression(
     `parameters` name at images of their own."""
     shown = parameters.outline.topic is not None
     inputs = (
-        Input("modulus", moved("material", E=_stiffer("E"), E_bonded=_stiffer("E_bonded")),
-              "E within its declared uncertainty", "assumed"),
+        vary(("material.E", "material.E_bonded"), "relative ranges.E", "modulus",
+             "E within its declared uncertainty"),
         Input("diameter", _wider_body if shown else _stiffer_by_area,
               "diameter within its declared range", "assumed"),
         *(OUTLINE_INPUTS if shown else ()),
@@ -253,10 +254,6 @@ def _cell(p: Compression) -> float:
 _MESHES = MeshLadder((_level(0.5, 0), _level(0.75, 1), _level(None, 2)), _cell, CORNER_ORDER)
 
 
-def _stiffer(name: str) -> Callable[[Compression, float], float | None]:
-    return _times(name, lambda p, z: 1 + z * p.ranges.E)
-
-
 def _wider_body(p: Compression, z: float) -> Compression:
     """Of a mesh file, whose shape is its own, only the force is changed."""
     size = p.specimen.diameter
@@ -265,23 +262,9 @@ def _wider_body(p: Compression, z: float) -> Compression:
     return replace(p, specimen=replace(p.specimen, diameter=size * (1 + z * p.ranges.diameter)))
 
 
-def _wider(name: str) -> Callable[[Compression, float], float | None]:
-    """A wider specimen is as much stiffer as its area is larger."""
-    return _times(name, lambda p, z: (1 + z * p.ranges.diameter) ** 2)
-
-
-def _times(
-    name: str, factor: Callable[[Compression, float], float]
-) -> Callable[[Compression, float], float | None]:
-    """A modulus, where there is one, times a factor."""
-
-    def scaled(p: Compression, z: float) -> float | None:
-        E: float | None = getattr(p.material, name)
-        return None if E is None else E * factor(p, z)
-
-    return scaled
-
-
 def _stiffer_by_area(p: Compression, z: float) -> Compression:
-    changed: Compression = moved("material", E=_wider("E"), E_bonded=_wider("E_bonded"))(p, z)
-    return changed
+    """A wider specimen is as much stiffer as its area is larger."""
+    by = (1 + z * p.ranges.diameter) ** 2
+    moduli = {k: getattr(p.material, k) for k in ("E", "E_bonded")}
+    stiffer: dict[str, Any] = {k: None if E is None else E * by for k, E in moduli.items()}
+    return replace(p, material=replace(p.material, **stiffer))

@@ -21,11 +21,12 @@ from validate.identify.budget import IdentifiedValue
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.calibration import Calibration
-from validate.replay.calibration import Change as Change
-from validate.replay.calibration import unchanged as unchanged
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
+from validate.replay.variation import Change as Change
+from validate.replay.variation import Shift, change_of
+from validate.replay.variation import unchanged as unchanged
 from validate.scene.meshless import AnyScene
 
 Progress = Callable[[str], None]
@@ -40,6 +41,9 @@ class Variant:
     change: Change = unchanged
     split: int = 1
     off: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "change", change_of(self.change))
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,18 @@ class Input:
         return Variant(method, self.by(z), off=tuple(z * x for x in self.off))
 
 
+def vary(
+    path: str | tuple[str, ...], rule: str, name: str = "", doc: str = "", source: str = "assumed"
+) -> Input:
+    """An uncertain input by path and rule (`replay.variation`); several paths move together.
+
+    Raises `UsageError` for a rule that is none.
+    """
+    paths = (path,) if isinstance(path, str) else tuple(path)
+    words = doc or f"{paths[0]} within its standard uncertainty"
+    return Input(name or paths[0], Shift(paths, rule), words, source)
+
+
 @dataclass(frozen=True)
 class EffectSpec:
     """A row of the error budget: from one variant to another.
@@ -109,6 +125,9 @@ class MeshLadder:
     levels: tuple[Change, ...]
     size: Callable[[Any], float]
     order: float = 2.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "levels", tuple(map(change_of, self.levels)))
 
 
 @dataclass(frozen=True)
@@ -179,6 +198,9 @@ class Case:
     change: Change
     shipped: bool = False
     methods: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "change", change_of(self.change))
 
 
 def _as_read(recording: Recording, parameters: Any) -> Recording:
@@ -294,6 +316,7 @@ class Experiment:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "methods", MappingProxyType(dict(self.methods)))
+        object.__setattr__(self, "quick", change_of(self.quick))
 
     @property
     def declared_kind(self) -> Kind:

@@ -24,8 +24,8 @@ from validate.register.outlines import Corner, observe_outlines
 from validate.register.plane import SurfaceSampler, cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
-from validate.replay.cards import beside, moved, rubbed
-from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty
+from validate.replay.cards import beside, rubbed
+from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
 from validate.replay.similar_grids import member
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
@@ -128,10 +128,9 @@ def filled(label: str, *, order: Literal[1, 2] = 2, fluid: bool = True) -> Metho
 
 #: The inputs that every such experiment has, with the fields of `InclusionRanges`.
 INPUTS = (
-    Input("modulus", moved("material", E=lambda p, z: p.material.E * (1 + z * p.ranges.E)),
-          "E within its declared relative uncertainty", "assumed"),
-    Input("Poisson ratio", moved("material", nu=lambda p, z: p.material.nu - z * p.ranges.nu),
-          "nu within its declared uncertainty", "assumed"),
+    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+         "nu within its declared uncertainty"),
     Input("plate friction", rubbed, "share of the way from slipping to bonded plates", "assumed"),
 )  # fmt: skip
 

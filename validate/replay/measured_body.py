@@ -31,7 +31,7 @@ from validate.replay.body_mesh import (
     unknowns_of,
 )
 from validate.replay.body_modulus import identify_body, model_name
-from validate.replay.cards import beside, moved
+from validate.replay.cards import beside
 from validate.replay.cost import INPUTS, MESHES, affordable, fits, linear_seconds, newton_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
@@ -41,6 +41,7 @@ from validate.replay.experiment import (
     Input,
     MeshLadder,
     Uncertainty,
+    vary,
 )
 from validate.replay.fitted_moduli import modulus_in
 from validate.replay.machine_compliance import doubt, yielding
@@ -67,7 +68,6 @@ from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
 _REFINED = 600.0  # s, of the runs that --refine makes of quadratic cells
-_NU = 0.4999  # the largest Poisson ratio of these elements
 
 
 def solid(label: str, law: LawName = "neo_hooke", order: Any = 1) -> Method:
@@ -350,34 +350,16 @@ def _cell(p: MeasuredBody, *, body: Any) -> float:
     return float(np.cbrt(cell_volumes(mesh_of(p, body)).mean()))
 
 
-def _stiffer(p: MeasuredBody, z: float) -> float | None:
-    return p.material.E and p.material.E * (1 + z * p.ranges.E)
-
-
-def _of_poisson(p: MeasuredBody, z: float) -> float:
-    """Upwards, or downwards where one standard uncertainty upwards ends at .5."""
-    by = z * p.ranges.nu
-    return min(p.material.nu + (by if p.material.nu + p.ranges.nu < _NU else -by), _NU)
-
-
-def _more(p: MeasuredBody, z: float) -> float:
-    return p.moved.scale * (1 + z * p.ranges.load)
-
-
-def _deeper(p: MeasuredBody, z: float) -> float:
-    return p.indenter.gap - z * p.ranges.contact
-
-
-def _yields(p: MeasuredBody, z: float) -> float | None:
-    C = p.machine.compliance
-    return C if C is None else max(0.0, C + z * p.machine.sd)
-
-
-_CONTACT = Input(
-    "contact point", moved("indenter", gap=_deeper), "where the indenter touches", "assumed"
-)
-_MACHINE = Input(
-    "machine compliance", moved("machine", compliance=_yields),
+_INPUTS = (
+    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+         "nu within its declared uncertainty"),
+    vary("moved.scale", "relative ranges.load", "load", "what moves the body, within its range"),
+)  # fmt: skip
+_CONTACT = vary("indenter.gap", "absolute ranges.contact", "contact point",
+                "where the indenter touches")  # fmt: skip
+_MACHINE = vary(
+    "machine.compliance", "absolute machine.sd, at least 0", "machine compliance",
     "compliance of the machine within its standard uncertainty", "declared",
 )  # fmt: skip
 
@@ -387,12 +369,3 @@ def _inputs_of(p: MeasuredBody) -> tuple[Input, ...]:
     own = (_CONTACT,) if p.indenter.there else ()
     known_machine = p.machine.compliance is not None or p.machine.measured is not None
     return (*_INPUTS, *own, *((_MACHINE,) if known_machine else ()))
-
-
-_INPUTS = (
-    Input("modulus", moved("material", E=_stiffer), "E within its declared uncertainty", "assumed"),
-    Input("Poisson ratio",
-          moved("material", nu=_of_poisson),
-          "nu within its declared uncertainty", "assumed"),
-    Input("load", moved("moved", scale=_more), "what moves the body, within its range", "assumed"),
-)  # fmt: skip

@@ -21,8 +21,7 @@ from validate.estimate.roukf import Roukf
 from validate.identify.recorded_motion import RecordedMotion, motion_of
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Identified, Input, StepLadder
+from validate.replay.experiment import Experiment, Identified, StepLadder, vary
 from validate.replay.first_modes import assumed_density, first_frequencies
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.method import Method
@@ -265,20 +264,10 @@ def _ring_down(
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
-def _denser(p: MeasuredBody, z: float) -> float:
-    return p.material.rho * (1 + z * p.ranges.rho)
-
-
-def _beta(p: MeasuredBody, z: float) -> float | None:
-    beta = p.motion.stiffness_damping
-    return beta and beta * max(1 + z * p.ranges.damping, 0.0)
-
-
 _INPUTS = (
-    Input("density", moved("material", rho=_denser), "rho within its declared uncertainty",
-          "assumed"),
-    Input("damping", moved("motion", stiffness_damping=_beta),
-          "damping within its declared uncertainty", "assumed"),
+    vary("material.rho", "relative ranges.rho", "density", "rho within its declared uncertainty"),
+    vary("motion.stiffness_damping", "relative ranges.damping, at least 0", "damping",
+         "damping within its declared uncertainty"),
 )  # fmt: skip
 
 

@@ -22,8 +22,7 @@ from validate.register.outlines import OutlineObservation, observe_outlines
 from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.cards import changed, moved
-from validate.replay.experiment import Input
+from validate.replay.experiment import Input, vary
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import pose_of
 
@@ -144,12 +143,14 @@ def _require_alike(found: OutlineObservation, mesh: Mesh, card: PressedOutline) 
 
 
 def _shifted(axis: int) -> Callable[[Any, float], Any]:
-    def along(p: Any, z: float) -> tuple[float, float]:
+    def along(p: Any, z: float) -> Any:
         x, y = p.outline.shift
         by = z * (p.outline.sd or 0.0)
-        return (x + by, y) if axis == 0 else (x, y + by)
+        return replace(
+            p, outline=replace(p.outline, shift=(x + by, y) if axis == 0 else (x, y + by))
+        )
 
-    return moved("outline", shift=along)
+    return along
 
 
 def _higher(p: Any, z: float) -> Any:
@@ -157,17 +158,19 @@ def _higher(p: Any, z: float) -> Any:
     by = 1 + z * p.ranges.height
     if p.specimen.height is None:
         return p
-    p = changed("specimen", height=p.specimen.height * by)(p)
-    p = changed(**{k: getattr(p, k) / by for k in ("fit_from", "fit_to", "limit")})(p)
-    E, bonded = (None if e is None else e * by for e in (p.material.E, p.material.E_bonded))
-    return changed("material", E=E, E_bonded=bonded)(p)
+    moduli = {k: getattr(p.material, k) for k in ("E", "E_bonded")}
+    stiffer: dict[str, Any] = {k: None if E is None else E * by for k, E in moduli.items()}
+    return replace(
+        p, specimen=replace(p.specimen, height=p.specimen.height * by),
+        material=replace(p.material, **stiffer),
+        **{k: getattr(p, k) / by for k in ("fit_from", "fit_to", "limit")},
+    )  # fmt: skip
 
 
 OUTLINE_INPUTS = (
     Input("images along x", _shifted(0), "their place along their x, as declared", "assumed"),
     Input("images along y", _shifted(1), "their place along their y, as declared", "assumed"),
     Input("height", _higher, "height within its declared range", "assumed"),
-    Input("Poisson ratio",
-          moved("material", nu=lambda p, z: min(p.material.nu - z * p.ranges.nu, 0.4999)),
-          "nu within its declared uncertainty", "assumed"),
+    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+         "nu within its declared uncertainty"),
 )  # fmt: skip

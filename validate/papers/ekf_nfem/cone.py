@@ -24,8 +24,8 @@ from validate.register.fitting import MarkerFit
 from validate.register.markers import MarkerObservation, placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.replay.cards import QuarterGrid, moved, quarter_meshes
-from validate.replay.experiment import Input, Progress, Uncertainty
+from validate.replay.cards import QuarterGrid, quarter_meshes
+from validate.replay.experiment import Progress, Uncertainty, vary
 from validate.replay.followed import Truth
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
@@ -197,10 +197,9 @@ def sets(parameters: PressedCone, seen: Registered) -> Mapping[str, Any]:
 UNCERTAINTY = Uncertainty(
     mesh=quarter_meshes(lambda p: float(p.twin.height)),
     inputs=(
-        Input("modulus",
-              moved("material", scale=lambda p, z: p.material.scale * (1 + z * p.ranges.modulus)),
+        vary("material.scale", "relative ranges.modulus", "modulus",
               "shear modulus", "assumed; the paper prints none"),
-        Input("nu", moved("material", nu=lambda p, z: p.material.nu - abs(z) * p.ranges.nu),
+        vary("material.nu", "absolute ranges.nu, below 0.5", "nu",
               "Poisson ratio, below the incompressible limit", "assumed; the paper prints .5"),
     ),
     surrogate="plate_p2",

@@ -143,14 +143,10 @@ def best_ratio(errors: Floats, sd: Floats) -> tuple[float, float | None, float]:
     return nu, math.sqrt(2 * least / errors[0].size / bend), left
 
 
-def of_other_boxes(p: GelIndentation, z: float) -> float | None:
-    """The Poisson ratio z standard deviations of its scatter off; none while it is sought."""
-    nu = p.material.nu
-    return (
-        None if nu is None else float(np.clip(nu + z * p.material.between, RATIOS[0], RATIOS[-1]))
-    )
+OTHER_BOXES = f"absolute material.between, at least {RATIOS[0]:g}, at most {RATIOS[-1]:g}"
 
 
-def smoothed(p: GelIndentation, z: float) -> float:
+def smoothed(p: GelIndentation, z: float) -> GelIndentation:
     """Half as many neighbours at the faces at z = -sqrt(3), twice as many at sqrt(3)."""
-    return float(p.faces.smoothing * 2 ** (z / math.sqrt(3)))
+    by = 2 ** (z / math.sqrt(3))
+    return replace(p, faces=replace(p.faces, smoothing=p.faces.smoothing * by))

@@ -1,0 +1,83 @@
+"""Variations: one meaning of a path and a rule, over all experiments."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from validate.catalogue import experiment_files
+from validate.errors import UsageError
+from validate.parameters import describe, value_at
+from validate.replay.experiment import Case, vary
+from validate.replay.find import load_file
+from validate.replay.measured_cards import MeasuredBody, Tissue
+from validate.replay.variation import Shift, change_of
+
+BODY = MeasuredBody(material=Tissue(E=10e3, nu=0.45))
+ROOT3 = 3**0.5
+SHIPPED = sorted(experiment_files(Path(__file__).parents[2]).items())
+
+
+@given(z=st.floats(-ROOT3, ROOT3), share=st.floats(0.0, 0.5))
+def test_a_relative_uncertainty_is_a_share_of_the_value(z: float, share: float) -> None:
+    moved = Shift(("material.E",), f"relative {100 * share} %")(BODY, z)
+    assert pytest.approx(10e3 * (1 + z * share), rel=1e-12) == moved.material.E
+
+
+@given(z=st.floats(-ROOT3, ROOT3), sd=st.floats(1e-5, 0.1), nu=st.floats(0.0, 0.4999))
+def test_no_input_passes_its_bound_and_one_uncertainty_stays_one(
+    z: float, sd: float, nu: float
+) -> None:
+    body = MeasuredBody(material=Tissue(E=1.0, nu=nu))
+    rule = Shift(("material.nu",), f"absolute {sd!r}, below 0.5")
+    assert rule(body, z).material.nu <= 0.4999
+    assert abs(rule(body, 1.0).material.nu - nu) == pytest.approx(sd, abs=1e-12)
+
+
+def test_an_amount_has_a_unit_or_is_another_parameter() -> None:
+    by_path = Shift(("material.E",), "relative ranges.E")
+    assert pytest.approx(10e3 * 1.05) == by_path(BODY, 1.0).material.E
+    assert Shift(("indenter.gap",), "absolute 1 mm")(BODY, 2.0).indenter.gap == pytest.approx(2e-3)
+    for wrong in ("absolute 1 kPa", "absolute 1 mm, under 3", "twice", "relative"):
+        with pytest.raises(UsageError, match=r"indenter\.gap"):
+            Shift(("indenter.gap",), wrong)(BODY, 1.0)
+
+
+def test_values_by_path_are_texts_with_units_numbers_factors_and_steps() -> None:
+    change = change_of({"material.E": "x 1.5", "body.cells": "+ 2", "body.block": "1cm,2cm,30mm",
+                        "material.nu": 0.3})  # fmt: skip
+    changed = change(BODY)
+    assert (changed.material.E, changed.body.cells) == (15e3, 8)
+    assert (changed.body.block, changed.material.nu) == ((0.01, 0.02, 0.03), 0.3)
+    assert Case("a", "b", {}).change(BODY) is BODY
+    with pytest.raises(UsageError, match=r"nearest: material\.nu"):
+        change_of({"material.mu": 1.0})(BODY)
+
+
+@pytest.mark.parametrize(("name", "file"), SHIPPED)
+def test_one_meaning_of_every_standard_uncertainty(name: str, file: Path) -> None:
+    """z moves the declared paths alone, in proportion; a Poisson ratio everywhere by its own
+    units, and below .5."""
+    experiment = load_file(file)
+    declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
+    for one in declared:
+        if not isinstance(one.move, Shift):
+            continue
+        p, moved = experiment.parameters, one.move(experiment.parameters, 1.0)
+        before, after = ({d.path: d.default for d in describe(x)} for x in (p, moved))
+        paths = {path for path in after if after[path] != before[path]}
+        assert paths <= set(one.move.paths)
+        for path in paths:
+            value, sd = value_at(p, path)[0], one.move.sd(value_at(p, path)[0], p, path)
+            assert abs(after[path] - value) == pytest.approx(sd, rel=1e-6)
+        if (
+            any(path.rpartition(".")[2] == "nu" for path in one.move.paths)
+            and name != "gel_indentation"
+        ):
+            assert one.move.rule == "absolute ranges.nu, below 0.5"
+
+
+def test_an_input_needs_a_rule() -> None:
+    with pytest.raises(UsageError, match='for example "relative 3 %"'):
+        vary("material.E", "3 %")

@@ -1,0 +1,134 @@
+"""Variations: a path of the parameters and a rule that says how its value changes.
+
+    {"twin.stiffness": 0.8, "membrane.thickness": "0.1 mm"}   values, of a case or an effect
+    {"material.E": "x 1.1", "mesh.cells": "+ 1"}              a factor, a step
+    vary("material.E", "relative 3 %")                        one standard uncertainty of an input
+    vary("material.nu", "absolute 0.005, below 0.5")          the same, with a bound
+    vary("material.E", "relative ranges.E")                   ... as large as another parameter says
+
+A standard uncertainty has one meaning: the value moves up by z of them. Where one of them upwards
+would reach the bound, it moves down instead, and it never lies beyond the bound.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from validate.errors import UsageError
+from validate.parameters import value_at, with_given
+from validate.units import in_si, split
+
+#: Relative distance to a bound that is not reached: of nu below .5 the largest value is .4999.
+_SHORT_OF = 2e-4
+_RULES = '"relative 3 %", "absolute 0.005, below 0.5", "absolute 1 mm, at least 0"'
+
+
+@dataclass(frozen=True)
+class Values:
+    """Values by path, or factors and steps; called with parameters, it returns them so changed."""
+
+    by_path: tuple[tuple[str, Any], ...] = ()
+
+    def __call__(self, parameters: Any) -> Any:
+        return with_given(parameters, {path: self._value(parameters, path, given)
+                                       for path, given in self.by_path})  # fmt: skip
+
+    @staticmethod
+    def _value(parameters: Any, path: str, given: Any) -> Any:
+        if not (isinstance(given, str) and given[:2] in ("x ", "+ ", "- ")):
+            return given
+        value, unit = value_at(parameters, path)
+        sign, amount = given[0], _number(given[2:], path, "1" if given[0] == "x" else unit)
+        new = value * amount if sign == "x" else value + (amount if sign == "+" else -amount)
+        return round(new) if isinstance(value, int) else new
+
+
+Change = Callable[[Any], Any]
+
+
+def unchanged(parameters: Any) -> Any:
+    return parameters
+
+
+def change_of(given: Mapping[str, Any] | Change) -> Change:
+    """What a declaration gives: values by path; or, where a value is computed, a function."""
+    if not isinstance(given, Mapping):
+        return given
+    return Values(tuple(given.items())) if given else unchanged
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How an uncertain input moves: `paths` by z standard uncertainties, as `rule` says."""
+
+    paths: tuple[str, ...]
+    rule: str
+
+    def __post_init__(self) -> None:
+        _parts(self.rule, self.paths[0])
+
+    def __call__(self, parameters: Any, z: float) -> Any:
+        new = {path: self._moved(parameters, path, z) for path in self.paths}
+        return with_given(parameters, {k: v for k, v in new.items() if v is not None})
+
+    def sd(self, value: float, parameters: Any, path: str) -> float:
+        """One standard uncertainty of this value of a path, in its SI unit."""
+        kind, amount, _ = _parts(self.rule, path)
+        unit = value_at(parameters, path)[1]
+        size = _amount(parameters, amount, path, "1" if kind == "relative" else unit)
+        return size * abs(value) if kind == "relative" else size
+
+    def _moved(self, parameters: Any, path: str, z: float) -> Any:
+        value, _ = value_at(parameters, path)
+        if value is None:  # identified later, with an uncertainty of its own
+            return None
+        if isinstance(value, tuple):
+            return tuple(self._number(parameters, path, v, z) for v in value)
+        return self._number(parameters, path, value, z)
+
+    def _number(self, parameters: Any, path: str, value: float, z: float) -> float:
+        low, high = _bounds(_parts(self.rule, path)[2], path, value_at(parameters, path)[1])
+        by = self.sd(value, parameters, path)
+        if value + by >= high:
+            by = -by
+        return max(min(low, value), min(value + z * by, max(high, value)))
+
+
+def _parts(rule: str, path: str) -> tuple[str, str, tuple[str, ...]]:
+    """Kind, amount and bounds of a rule; raises `UsageError` for anything else."""
+    head, *bounds = (part.strip() for part in rule.split(","))
+    kind, _, amount = head.partition(" ")
+    if kind not in ("relative", "absolute") or not amount:
+        raise UsageError(f"{path}: rule '{rule}': expected for example {_RULES}")
+    return kind, amount, tuple(bounds)
+
+
+def _amount(parameters: Any, text: str, path: str, unit: str) -> float:
+    """A number with its unit, or the value of the parameter that is named."""
+    if split(text) is not None:
+        return _number(text, path, unit)
+    return float(value_at(parameters, text)[0] or 0.0)
+
+
+def _number(text: str, path: str, unit: str) -> float:
+    given = split(text)
+    value = in_si(given[0], given[1] or unit, unit) if given else None
+    if value is None or not isfinite(value):
+        raise UsageError(f"{path}: '{text}': expected a number in {unit}")
+    return value
+
+
+def _bounds(bounds: tuple[str, ...], path: str, unit: str) -> tuple[float, float]:
+    low, high = -float("inf"), float("inf")
+    for bound in bounds:
+        words, _, number = bound.rpartition(" ")
+        if words == "below":
+            high = _number(number, path, unit) * (1 - _SHORT_OF)
+        elif words == "at most":
+            high = _number(number, path, unit)
+        elif words == "at least":
+            low = _number(number, path, unit)
+        else:
+            raise UsageError(f"{path}: bound '{bound}': expected below, at most or at least")
+    return low, high
