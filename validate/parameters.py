@@ -1,8 +1,9 @@
 """Parameters of an experiment: nested frozen dataclasses whose fields carry a unit and a sentence.
 
-One grammar of paths reaches them all: `material.E`, `methods.p2_fluid.tolerance`. Values given as
-text are checked against the field's type and unit (`15kPa`; a bare number is in SI); an unknown
-path is an error naming the nearest ones.
+One grammar of paths reaches them all: `material.E`, `methods.p2_fluid.tolerance`; of several parts
+of one kind each goes by its name, `contacts.plate.friction`, or by its number. Values given as text
+are checked against the field's type and unit (`15kPa`; a bare number is in SI); an unknown path is
+an error naming the nearest ones.
 """
 
 import difflib
@@ -91,9 +92,11 @@ def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Para
     for name, value, hint, meta in _members(settings):
         path, default = f"{prefix}{name}", _default(settings, name, library)
         if meta.get("part"):
-            found += describe(value, prefix, default) if is_dataclass(value) else ()
-        elif is_dataclass(value) or isinstance(value, Mapping):
+            found += describe(value, prefix, default) if _branches(value) else ()
+        elif _branches(value):
             found += describe(value, f"{path}.", default)
+        elif value is not None and not isinstance(value, _LEAVES):
+            continue  # arrays and the like, which are no settings
         else:
             unit, doc = meta.get("unit", "1"), meta.get("doc", "")
             origin: Origin = "default" if value == default else "entered"
@@ -108,11 +111,41 @@ def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Para
 
 def _default(settings: Any, name: str, library: Any) -> Any:
     """What a member is unless somebody gives it."""
-    if isinstance(settings, Mapping):
+    if not is_dataclass(settings):
         return None
     if type(library) is type(settings):
         return getattr(library, name)
     return next(f.default for f in fields(settings) if f.name == name)
+
+
+_LEAVES = (str, int, float, tuple)
+
+
+def _branches(value: Any) -> bool:
+    """Whether a value has parts of its own: a dataclass, named ones, or several of one kind."""
+    several = isinstance(value, tuple) and len(value) > 0 and all(map(is_dataclass, value))
+    return several or is_dataclass(value) or isinstance(value, Mapping)
+
+
+def _key(part: Any, number: int) -> str:
+    """What one of several parts is called in a path: its name, where it has one."""
+    name = getattr(part, "name", "")
+    return name if isinstance(name, str) and name else str(number)
+
+
+def _inner(settings: Any, name: str) -> Any:
+    if isinstance(settings, tuple):
+        return next(part for i, part in enumerate(settings) if _key(part, i) == name)
+    return settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
+
+
+def _with(settings: Any, new: Mapping[str, Any]) -> Any:
+    """A copy with other parts under these names."""
+    if isinstance(settings, tuple):
+        return tuple(new.get(_key(part, i), part) for i, part in enumerate(settings))
+    if isinstance(settings, Mapping):
+        return types.MappingProxyType({**settings, **new})
+    return replace(settings, **new) if new else settings
 
 
 def with_values(settings: Any, values: Mapping[str, str]) -> Any:
@@ -126,21 +159,8 @@ def with_values(settings: Any, values: Mapping[str, str]) -> Any:
 
 def with_given(settings: Any, values: Mapping[str, Any]) -> Any:
     """As `with_values`, of values that need not be texts: those in SI, and whole parts."""
-    texts = {path: value for path, value in values.items() if not is_dataclass(value)}
-    changed = _set(settings, [(_names(settings, path), path, v) for path, v in texts.items()])
-    for path, part in values.items():
-        if is_dataclass(part):
-            changed = _with_part(changed, path.split("."), part)
-    return changed
-
-
-def _with_part(settings: Any, names: list[str], part: Any) -> Any:
-    head, *rest = names
-    inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
-    new = {head: _with_part(inner, rest, part) if rest else part}
-    if isinstance(settings, Mapping):
-        return types.MappingProxyType({**settings, **new})
-    return replace(settings, **new)
+    return _set(settings, [(_names(settings, k, whole=not isinstance(v, str)), k, v)
+                           for k, v in values.items()])  # fmt: skip
 
 
 def value_at(settings: Any, path: str) -> tuple[Any, str]:
@@ -148,8 +168,12 @@ def value_at(settings: Any, path: str) -> tuple[Any, str]:
     names = _names(settings, path)
     unit, _ = _leaf(settings, names)
     for name in names:
-        settings = settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
+        settings = _inner(settings, name)
     return settings, unit
+
+
+def has_path(settings: Any, path: str) -> bool:
+    return _resolved(settings, path.split("."), whole=True) is not None
 
 
 def doubts(settings: Any, values: Mapping[str, str]) -> tuple[str, ...]:
@@ -190,37 +214,58 @@ def _bare(text: str) -> float:
 def _leaf(settings: Any, names: list[str]) -> tuple[str, Any]:
     """Unit and value at the end of a resolved way."""
     for name in names[:-1]:
-        settings = settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
+        settings = _inner(settings, name)
     found = {name: (meta.get("unit", "1"), value) for name, value, _, meta in _members(settings)}
     return found[names[-1]]
 
 
-def _names(settings: Any, path: str) -> list[str]:
-    names = _resolved(settings, path.split("."))
+def _names(settings: Any, path: str, *, whole: bool = False) -> list[str]:
+    names = _resolved(settings, path.split("."), whole)
     if names is None:
         known = {p.path for p in describe(settings)}
         raise UsageError(f"unknown parameter '{path}'; {_nearest(path, known)}")
     return names
 
 
-def _resolved(settings: Any, names: list[str]) -> list[str] | None:
-    """The way to a value through the parts that paths leave out; None where there is no value."""
-    if not (is_dataclass(settings) or isinstance(settings, Mapping)):
+def _resolved(settings: Any, names: list[str], whole: bool = False) -> list[str] | None:
+    """The way to a value, or to a `whole` part, through the parts that paths leave out; None where
+    there is none."""
+    if not _branches(settings):
         return None
     members = {name: (value, meta) for name, value, _, meta in _members(settings)}
     head, rest = names[0], names[1:]
     if head in members:
         value = members[head][0]
-        if not rest and not (is_dataclass(value) or isinstance(value, Mapping)):
+        if not rest and (whole or not _branches(value)):
             return [head]
-        inner = _resolved(value, rest) if rest else None
+        inner = _resolved(value, rest, whole) if rest else None
         if inner:
             return [head, *inner]
     for name, (value, meta) in members.items():
-        inner = _resolved(value, names) if meta.get("part") else None
+        inner = _resolved(value, names, whole) if meta.get("part") else None
         if inner:
             return [name, *inner]
     return None
+
+
+def take_units(settings: Any) -> None:
+    """Texts with units in a new frozen dataclass become SI numbers: `Box(("4 mm", "4 mm"), ...)`.
+
+    Of the fields that have a unit. Raises as `with_values` does.
+    """
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        texts = value if isinstance(value, tuple) else (value,)
+        if "unit" in f.metadata and any(isinstance(text, str) for text in texts):
+            hint = _hints(settings.__class__)[f.name]
+            object.__setattr__(settings, f.name, _in_si(hint, f.name, value, f.metadata["unit"]))
+
+
+def _in_si(hint: Any, name: str, value: Any, unit: str) -> Any:
+    if isinstance(value, tuple):
+        inner = get_args(hint)[0] if get_origin(hint) is tuple else hint
+        return tuple(_in_si(inner, name, v, unit) for v in value)
+    return parsed(hint, name, value, unit) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
@@ -253,6 +298,8 @@ def _nearest(name: str, known: set[str]) -> str:
 def _members(settings: Any) -> list[tuple[str, Any, Any, Mapping[str, Any]]]:
     if isinstance(settings, Mapping):
         return [(str(k), v, type(v), {}) for k, v in settings.items()]
+    if isinstance(settings, tuple):
+        return [(_key(part, i), part, type(part), {}) for i, part in enumerate(settings)]
     hints = _hints(settings.__class__)
     return [
         (f.name, getattr(settings, f.name), hints[f.name], f.metadata) for f in fields(settings)
@@ -270,17 +317,13 @@ def _set(settings: Any, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
     below: dict[str, list[tuple[list[str], str, Any]]] = {}
     for names, path, text in asked:
         below.setdefault(names[0], []).append((names[1:], path, text))
-    new = {head: _member(settings, head, inner) for head, inner in below.items()}
-    if isinstance(settings, Mapping):
-        return types.MappingProxyType({**settings, **new})
-    return replace(settings, **new) if new else settings
+    return _with(settings, {head: _member(settings, head, inner) for head, inner in below.items()})
 
 
 def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
     names, path, text = asked[-1]
     if names:
-        inner = settings[head] if isinstance(settings, Mapping) else getattr(settings, head)
-        return _set(inner, asked)
+        return _set(_inner(settings, head), asked)
     if not isinstance(text, str):
         return text
     unit, _ = _leaf(settings, [head])
