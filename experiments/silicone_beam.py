@@ -24,7 +24,7 @@ from validate.papers.released_beam.swing import DAMPING, FREQUENCY, LABEL, quant
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
-from validate.replay.similar_grids import member
+from validate.scene.similar_grids import member
 from validate.solve.guests.guest import Guest
 from validate.solve.guests.let_go import GuestLetGo
 from validate.solve.let_go import LetGo

@@ -5,16 +5,18 @@ evidence; each landmark predicted from the seven others is. Another recording of
 recording=FILE.mha --set landmarks=DEVICES.xml`, with any count and order of landmarks.
 """
 
+from typing import Any
+
 from validate.compare.published import Figure
 from validate.compare.verdict import Accept
 from validate.papers.stylus.phantom import StylusPhantom, build, load, place, stated
 from validate.papers.stylus.shown import exhibits, follows, identified
-from validate.replay.experiment import Experiment, Input, Uncertainty, vary
+from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.rigid_motion import RigidMotion
 
 
-def _tip(axis: str) -> Input:
+def _tip(axis: str) -> Any:
     return vary(
         f"tip.off_{axis}", "absolute tip.sd", f"tip {axis}", f"{axis} of the tip's offset",
         "Error of the device set's StylusTip to Stylus, over root 3",

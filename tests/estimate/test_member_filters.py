@@ -368,7 +368,7 @@ def on_springs(springs: float, rho: float, cell: float, damping: float) -> Syste
     material = replace(scene.material, rho=rho, stiffness_damping=damping)
     foundations = (Foundation("z0", (0, 1, 2), springs),)
     return build(
-        replace(scene, mesh=mesh, probes=probes, material=material, supports=(),
+        replace(scene, body=mesh, probes=probes, material=material, supports=(),
                 foundations=foundations)
     )  # fmt: skip
 

@@ -159,7 +159,7 @@ def test_a_turned_body_feels_nothing(law: str) -> None:
 @pytest.mark.parametrize("law", COMPILED)
 def test_small_strains_keep_their_digits(law: str) -> None:
     """At a strain of 1e-8 forces are K u and energies u.K u/2 to the strain squared, not to eps."""
-    body = replace(scene(law), mesh=box((0.1, 0.08, 0.12), (3, 4, 5)))
+    body = replace(scene(law), body=box((0.1, 0.08, 0.12), (3, 4, 5)))
     u = deformed(body.mesh, 1e-8)
     K = build(body).K
     fast = ExplicitBody(body)
@@ -253,7 +253,7 @@ def test_what_has_no_explicit_form_is_refused() -> None:
     with pytest.raises(SceneError, match="0 threads: use 1"):
         ExplicitBody(body, threads=0)
     with pytest.raises(SceneError, match="tet10 have no explicit form"):
-        ExplicitBody(replace(body, mesh=quadratic(body.mesh)))
+        ExplicitBody(replace(body, body=quadratic(body.mesh)))
     with pytest.raises(SceneError, match="law 'linear' has no large-strain form"):
         ExplicitBody(replace(body, material=Material(30e3, 0.3)))
     with pytest.raises(SceneError, match="use 'pointwise'"):

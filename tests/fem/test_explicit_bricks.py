@@ -119,6 +119,6 @@ def test_what_has_no_explicit_form_is_refused() -> None:
     with pytest.raises(SceneError, match=r"support the laws neo_hooke, .*not 'svk' \(split\)"):
         ExplicitBody(replace(scene, material=sample("svk"), regions=()))
     with pytest.raises(SceneError, match="hex27 have no explicit form"):
-        ExplicitBody(replace(scene, mesh=quadratic(grid((1.0,) * 3, (3, 2, 2))), regions=()))
+        ExplicitBody(replace(scene, body=quadratic(grid((1.0,) * 3, (3, 2, 2))), regions=()))
     with pytest.raises(SceneError, match="node filters support tetrahedra"):
         ExplicitBody(scene).force_and_blocks(np.zeros(scene.mesh.nodes.size))

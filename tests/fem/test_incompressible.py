@@ -244,7 +244,7 @@ def test_taylor_hood_elements_agree_within_the_mesh() -> None:
         base = Scene(mesh, Material(E, 0.5), (Support("z0", (0, 1, 2)),), dilatation="mixed",
                      loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),))  # fmt: skip
         theirs.append(mixed_static(base).compliances[0])
-        system = build(replace(base, mesh=quadratic(mesh)))
+        system = build(replace(base, body=quadratic(mesh)))
         stepper = QuasiStatic().prepare(system)
         u = stepper.field(stepper.step(stepper.rest(), np.array([1.0]))).ravel()
         ours.append(float(system.loads[:, 0] @ u))

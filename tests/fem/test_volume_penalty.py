@@ -152,6 +152,6 @@ def test_what_has_no_such_penalty_is_refused() -> None:
     with pytest.raises(SceneError, match="thickness is free"):
         volume_penalty(replace(scene, plane="stress"), 1.0)
     with pytest.raises(SceneError, match="linear cells, not tri6"):
-        volume_penalty(replace(scene, mesh=quadratic(scene.mesh)), 1.0)
+        volume_penalty(replace(scene, body=quadratic(scene.mesh)), 1.0)
     with pytest.raises(SceneError, match="quad4 have no constant strain"):
-        volume_penalty(replace(scene, mesh=grid((1.0, 1.0), (2, 2))), 1.0)
+        volume_penalty(replace(scene, body=grid((1.0, 1.0), (2, 2))), 1.0)

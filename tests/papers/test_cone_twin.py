@@ -67,7 +67,7 @@ def test_a_small_load_meets_another_element() -> None:
     ours = float(table(small).at(np.array([0.15]))[0][0])
     scene = cone_scene(small)
     mesh = quarter_cone(small.bottom, small.top, small.height, 6, 8, small.grading)
-    linear = replace(scene, mesh=mesh, material=replace(scene.material, law="linear"))
+    linear = replace(scene, body=mesh, material=replace(scene.material, law="linear"))
     softer = replace(linear, dilatation="nodal_mean")
     mean, pointwise = (0.15 / responses(build(s)).reactions[0, 0] for s in (softer, linear))
     assert ours == pytest.approx(mean, rel=0.025)

@@ -24,7 +24,7 @@ from validate.replay.measured_cards import (
     SolidModel,
     Tissue,
 )
-from validate.replay.similar_grids import divided, fitting, member, similarity
+from validate.scene.similar_grids import divided, fitting, member, similarity
 from validate.solve.quasi_static import QuasiStatic
 
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)

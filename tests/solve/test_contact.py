@@ -136,7 +136,7 @@ def ball(a: float, n: int, ratio: float, far: float, order: int = 1) -> tuple[fl
     """Forces of a ball pressed in by d = a^2/R over Hertz's: by depth, and by the radius of the
     pressures, whose mean r^2 is 2 a^2/5."""
     scene = half_space(RigidSphere((0.0, 0.0, 1.0), 1.0), a, n, ratio, far)
-    system = build(replace(scene, mesh=quadratic(scene.mesh)) if order == 2 else scene)
+    system = build(replace(scene, body=quadratic(scene.mesh)) if order == 2 else scene)
     stepper = ContactNewton().prepare(system)
     assert isinstance(stepper, ContactStepper)
     state = stepper.step(stepper.rest(), np.array([a**2]))

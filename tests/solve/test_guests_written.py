@@ -110,7 +110,7 @@ def skewed() -> Scene:
     nodes = plain.nodes + rng.uniform(-1e-3, 1e-3, plain.nodes.shape)
     mesh = Mesh(nodes, plain.cells, plain.kind, plain.facets)
     drives = Drive("push", "z1", (0.0, 0.0, -1.0)), Drive("lean", "z1", (0.0, 0.0, -1.0))
-    return replace(TET, mesh=mesh, supports=TET.supports[:1], drives=drives)
+    return replace(TET, body=mesh, supports=TET.supports[:1], drives=drives)
 
 
 LEANING = np.insert(INPUTS, 1, [4e-4, 5e-4, 6e-4], axis=1)

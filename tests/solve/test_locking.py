@@ -60,7 +60,7 @@ def test_the_law_the_spread_and_regions_of_the_same_stuff_change_nothing() -> No
 
 def test_what_it_cannot_judge_is_refused() -> None:
     scene = bonded(0.3)
-    for bad in (replace(scene, mesh=quadratic(MESH)), replace(scene, loads=()),
+    for bad in (replace(scene, body=quadratic(MESH)), replace(scene, loads=()),
                 replace(scene, probes=())):  # fmt: skip
         with pytest.raises(SceneError, match="locking at 'top': needs linear cells, one load"):
             locking_factor(bad, "top")

@@ -238,7 +238,7 @@ def test_where_the_body_lies_changes_nothing() -> None:
     for away in (0.0, 10.0):
         scene = cube("neo_hooke", 0.45, n=2)
         mesh = replace(scene.mesh, nodes=scene.mesh.nodes + np.array([away, 0.0, 0.0]))
-        state = (stepper := prepared(replace(scene, mesh=mesh))).rest()
+        state = (stepper := prepared(replace(scene, body=mesh))).rest()
         total = 0.0
         for d in np.linspace(0, 0.02, 21)[1:]:
             state = at(stepper, state, d)

@@ -57,7 +57,7 @@ def test_a_light_body_follows_the_material_point(law: str, dilatation: Dilatatio
     """Uniaxial compression in 25 steps: no inertia to speak of, the same recursion, one curve."""
     scene = pressed(law).scene
     mesh = quadratic(scene.mesh) if dilatation == "mixed" else scene.mesh
-    system = relaxing(build(replace(scene, mesh=mesh, dilatation=dilatation)), rho=1e-6)
+    system = relaxing(build(replace(scene, body=mesh, dilatation=dilatation)), rho=1e-6)
     dt, depths = 0.02, rise(25, 0.02)
     scheme = NewtonDynamics(dt, "backward_euler", "consistent")
     force = ran(scheme, system, depths, dt).traces["plate.force"].y
@@ -216,7 +216,7 @@ def test_what_explicit_branches_do_not_have_is_refused() -> None:
         CentralDifference(threads=2).prepare(system)
     bricks = grid((SIDE, SIDE, SIDE), (2, 2, 2))
     with pytest.raises(SceneError, match="explicit hexahedra do not support a Prony series"):
-        CentralDifference().prepare(build(replace(system.scene, mesh=bricks, dilatation="mixed")))
+        CentralDifference().prepare(build(replace(system.scene, body=bricks, dilatation="mixed")))
 
 
 def test_schemes_that_remember_nothing_refuse_a_series() -> None:

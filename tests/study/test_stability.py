@@ -249,7 +249,7 @@ def test_squeezed_cells_have_the_altitude_ratio_they_are_named_for() -> None:
     np.testing.assert_allclose(np.ptp(flat.nodes, axis=0), np.ptp(mesh.nodes, axis=0), rtol=1e-12)
     widths = np.diff(np.unique(flat.nodes[:, 0].round(9)))
     assert widths.min() / widths.max() == pytest.approx(0.05, rel=1e-3)
-    one = replace(scene, mesh=flat)
+    one = replace(scene, body=flat)
     assert cell_altitudes(one).min() < 1.1 * widths.min()
 
 

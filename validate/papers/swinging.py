@@ -35,7 +35,7 @@ def swinging_trial(
     size = tuple(float(x) for x in base.mesh.nodes.max(axis=0))
 
     def build(element: str, level: int, law: LawName) -> Scene:
-        return with_law(replace(base, mesh=_block_mesh(size, per, element, level)), law)
+        return with_law(replace(base, body=_block_mesh(size, per, element, level)), law)
 
     fine = (2, 4) if quick else (2, 4, 8)
     return Trial(

@@ -15,7 +15,6 @@ import numpy as np
 from validate.errors import SceneError, UsageError
 from validate.replay.measured_cards import MeasuredBody, Solid
 from validate.replay.measured_contact import pressed_mesh, spans_of
-from validate.replay.similar_grids import divided
 from validate.scene.box import box, grid
 from validate.scene.cylinder import hexahedral_cylinder, whole_cylinder
 from validate.scene.material import Material
@@ -25,6 +24,7 @@ from validate.scene.named_place import place_of
 from validate.scene.refine import linear, refined
 from validate.scene.scene import Scene
 from validate.scene.select import facets_of, nodes_of
+from validate.scene.similar_grids import divided
 
 _ACROSS = 2  # cells across a slender body
 _ASPECT = 2.0  # length of its cells over their thickness

@@ -11,10 +11,10 @@ from validate.parameters import quantity
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.replay.experiment import CORNER_ORDER, Change, MeshLadder
-from validate.replay.similar_grids import member
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.plates import plates_of_share, rubbing_share
+from validate.scene.similar_grids import member
 from validate.twin.tracked import Camera, require_noise
 
 

@@ -4,7 +4,7 @@ An experiment file is code: run only your own. A recording is data: nothing in i
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,18 +16,20 @@ from validate.compare.published import Figure
 from validate.compare.result import Kind
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.identify.budget import IdentifiedValue
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.calibration import Calibration
+from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
+from validate.replay.tree import Built, CellSize, ScaledBody, Tree, beside
 from validate.replay.variation import Change as Change
-from validate.replay.variation import Shift, change_of
+from validate.replay.variation import Shift, bound, change_of, shares
 from validate.replay.variation import unchanged as unchanged
 from validate.scene.meshless import AnyScene
+from validate.scene.scene import Scene
 
 Progress = Callable[[str], None]
 
@@ -78,18 +80,6 @@ class Input:
     def at(self, method: str, z: float) -> Variant:
         """The method with this input off by z standard uncertainties."""
         return Variant(method, self.by(z), off=tuple(z * x for x in self.off))
-
-
-def vary(
-    path: str | tuple[str, ...], rule: str, name: str = "", doc: str = "", source: str = "assumed"
-) -> Input:
-    """An uncertain input by path and rule (`replay.variation`); several paths move together.
-
-    Raises `UsageError` for a rule that is none.
-    """
-    paths = (path,) if isinstance(path, str) else tuple(path)
-    words = doc or f"{paths[0]} within its standard uncertainty"
-    return Input(name or paths[0], Shift(paths, rule), words, source)
 
 
 @dataclass(frozen=True)
@@ -153,6 +143,40 @@ class Uncertainty:
     stand_in: Mapping[str, str] = field(default_factory=dict)
     steps: StepLadder | None = None
     draws: int = 12
+
+
+Variation = Input | MeshLadder | StepLadder | Free
+
+
+def vary(
+    path: str | tuple[str, ...], rule: str, name: str = "", doc: str = "", source: str = "assumed"
+) -> Any:
+    """A variation by path and rule; several paths of an input move together.
+
+        vary("material.E", "relative 3 %")                        an uncertain input
+        vary("material.nu", "absolute 0.005, below 0.5")          (`replay.variation`)
+        vary("body.cells", "x 0.5 0.75 1.3, order 2")             similar meshes, for u_num
+        vary("dt", "x 0.5 0.25, order 2")                         time steps, for u_num
+
+    `order` is the formal one. Raises `UsageError` for a rule that is none.
+    """
+    paths = (path,) if isinstance(path, str) else tuple(path)
+    if not rule.startswith("x "):
+        words = doc or f"{paths[0]} within its standard uncertainty"
+        return Input(name or paths[0], Shift(paths, rule), words, source)
+    factors, order = shares(rule, paths[0])
+    if paths == ("dt",):
+        return StepLadder(order, tuple(round(1 / share) for share in factors))
+    if paths != ("body.cells",):
+        raise UsageError(f"{paths[0]}: '{rule}': factors refine body.cells, or dt")
+    return MeshLadder(tuple(map(ScaledBody, factors)), CellSize(), order)
+
+
+def free(
+    path: str, low: str | float, high: str | float, source: str = "assumed", helps: str = ""
+) -> Free:
+    """A parameter that is identified where it stands open, between bounds with their unit."""
+    return Free(path, bound(low, path), bound(high, path), source, helps)
 
 
 @dataclass(frozen=True)
@@ -243,6 +267,15 @@ def _as_declared(experiment: Any, recordings: Sequence[Recording], parameters: A
     return experiment
 
 
+_FROM_HERE = Built()
+
+
+def _unplaced(recording: Recording, parameters: Any, scene: Any) -> Registered:
+    raise ComparisonError(
+        "the experiment does not say what drives the scene and what is compared: give `place`"
+    )
+
+
 def _states_nothing(recording: Recording) -> Mapping[str, float]:
     return {}
 
@@ -254,6 +287,11 @@ def _sets_nothing(parameters: Any, seen: Registered) -> Mapping[str, Any]:
 @dataclass(frozen=True)
 class Experiment:
     """One experiment; see the fields of each part for units.
+
+    Declared, it has a `scene`, whose numbers are its parameters by path; `settings` is a dataclass
+    of what no scene holds, `recording` the file from the experiment's folder. A method's `scene` is
+    then its changes by path: {"body.cells": (9, 9, 24)}. Until all experiments are declared so, an
+    older form stands: `parameters` of any dataclass, and `build`.
 
     `methods` maps a name to a `Method`. `load` gets the parameters and the experiment's folder;
     `build` a recording, the parameters and a method's `scene` options; `place` registers a
@@ -280,13 +318,13 @@ class Experiment:
     name: str
     title: str
     source: str
-    parameters: Any
-    methods: Mapping[str, Method]
-    accepted: tuple[str, ...]
-    accept: tuple[Accept, ...]
-    load: Callable[[Any, Path], tuple[Recording, ...]]
-    build: Callable[[Recording, Any, Any], AnyScene]
-    place: Callable[[Recording, Any, Any], Registered]
+    parameters: Any = None
+    methods: Mapping[str, Method] = field(default_factory=dict)
+    accepted: tuple[str, ...] = ()
+    accept: tuple[Accept, ...] = ()
+    load: Callable[[Any, Path], tuple[Recording, ...]] = beside
+    build: Callable[[Recording, Any, Any], AnyScene] = _FROM_HERE
+    place: Callable[[Recording, Any, Any], Registered] = _unplaced
     sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
     stated: Callable[[Recording], Mapping[str, float]] = _states_nothing
     identify: Callable[[Sequence[Recording], Any, Mapping[str, Method]], Identified] | None = None
@@ -313,10 +351,65 @@ class Experiment:
     needs: str = ""
     expected: tuple[Expected, ...] = ()
     path: Path | None = field(default=None, compare=False)
+    scene: InitVar[Scene | None] = None
+    settings: InitVar[Any] = None
+    recording: InitVar[str] = ""
+    variations: InitVar[tuple[Variation, ...]] = ()
 
-    def __post_init__(self) -> None:
+    def __post_init__(
+        self, scene: Scene | None, settings: Any, recording: str, variations: tuple[Variation, ...]
+    ) -> None:
+        if scene is not None:
+            object.__setattr__(self, "parameters", Tree(recording, scene, settings))
+        self._vary(variations)
+        self._find_from(self.path.parent if self.path else Path())
         object.__setattr__(self, "methods", MappingProxyType(dict(self.methods)))
         object.__setattr__(self, "quick", change_of(self.quick))
+
+    def _vary(self, variations: tuple[Variation, ...]) -> None:
+        """Sorts variations into what they are: uncertain inputs, meshes, steps, calibrations."""
+        meshes = [v for v in variations if isinstance(v, MeshLadder)]
+        steps = [v for v in variations if isinstance(v, StepLadder)]
+        inputs = tuple(v for v in variations if isinstance(v, Input))
+        if max(len(meshes), len(steps)) > 1:
+            raise UsageError(
+                f"{self.name}: {len(meshes)} variations of body.cells and {len(steps)} of dt; give "
+                "at most one of each, with all its factors"
+            )
+        if meshes or steps or inputs:
+            declared = self.uncertainty or Uncertainty()
+            more = replace(
+                declared, mesh=(*meshes, declared.mesh)[0], steps=(*steps, declared.steps)[0],
+                inputs=(*declared.inputs, *inputs),
+            )  # fmt: skip
+            object.__setattr__(self, "uncertainty", more)
+        if opens := tuple(v for v in variations if isinstance(v, Free)):
+            judged = Calibrates(self._judged, name="all checked quantities")
+            by = Calibration(next(iter(self.accepted)), opens, (judged,))
+            object.__setattr__(self, "calibrations", (*self.calibrations, by))
+
+    @property
+    def _judged(self) -> tuple[str, ...]:
+        names = ([f"{a.quantity}@{load}" for load in a.loads] or [a.quantity] for a in self.accept)
+        return tuple(name for several in names for name in several)
+
+    def _find_from(self, folder: Path) -> None:
+        """Mesh files of a declared body are found from the experiment's folder."""
+        if isinstance(self.build, Built):
+            object.__setattr__(self, "build", Built(folder))
+        declared = self.uncertainty
+        if declared and declared.mesh and isinstance(declared.mesh.size, CellSize):
+            mesh = replace(declared.mesh, size=CellSize(folder))
+            object.__setattr__(self, "uncertainty", replace(declared, mesh=mesh))
+
+    @property
+    def complete(self) -> bool:
+        """Whether it says how its scene is built: what a kind of the library adds is there."""
+        return isinstance(self.parameters, Tree) or not isinstance(self.build, Built)
+
+    def at(self, path: Path) -> "Experiment":
+        """Declared in that file."""
+        return replace(self, path=path.resolve())
 
     @property
     def declared_kind(self) -> Kind:

@@ -27,12 +27,12 @@ from validate.register.signals import driving, holds_at, instant, require_rising
 from validate.replay.cards import beside, rubbed
 from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
-from validate.replay.similar_grids import member
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.plates import Contact, Plates, between_plates
 from validate.scene.scene import Cavity, Dilatation, Drive, Scene, Support
+from validate.scene.similar_grids import member
 from validate.solve.fluid import ExactPressure, NoFluid
 
 # The stage presses towards the fixed plate; the block stands on a table.

@@ -178,7 +178,7 @@ class StabilityBody:
                 f"{scene.mesh.nodes.size} unknowns at mesh {body.mesh}: a stability map has at "
                 f"most {LARGEST}; coarsen it"
             )
-        return replace(scene, mesh=squeezed(scene.mesh, body.quality))
+        return replace(scene, body=squeezed(scene.mesh, body.quality))
 
     def pulled(self, body: Turned) -> Scene:
         """The body under its one static load."""

@@ -329,7 +329,7 @@ def _solid(own: OwnBody, level: int, material: Material) -> Scene:
         replace(r, material=replace(material, E=share * r.material.E)) for r in scene.regions
     )
     return replace(
-        scene, mesh=linear(scene.mesh), material=material, regions=regions, cavities=(),
+        scene, body=linear(scene.mesh), material=material, regions=regions, cavities=(),
         probes=(), dilatation="pointwise",
     )  # fmt: skip
 

@@ -56,13 +56,13 @@ from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.moving_body import doubting, following, in_motion
-from validate.replay.similar_grids import fitting, member
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import of_element
 from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
 from validate.scene.select import nodes_of
+from validate.scene.similar_grids import fitting, member
 from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
@@ -179,7 +179,7 @@ def static_scene(
     )  # fmt: skip
     if mesh.bricks:
         bricks = quadratic(mesh) if model.order == 2 and p.body.file is None else mesh
-        return replace(scene, mesh=bricks, dilatation="mixed")
+        return replace(scene, body=bricks, dilatation="mixed")
     return of_element(scene, "P2" if model.order == 2 else "MD")
 
 

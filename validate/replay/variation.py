@@ -17,7 +17,7 @@ from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import value_at, with_given
-from validate.units import in_si, split
+from validate.units import in_si, si_of, split
 
 #: Relative distance to a bound that is not reached: of nu below .5 the largest value is .4999.
 _SHORT_OF = 2e-4
@@ -132,3 +132,26 @@ def _bounds(bounds: tuple[str, ...], path: str, unit: str) -> tuple[float, float
         else:
             raise UsageError(f"{path}: bound '{bound}': expected below, at most or at least")
     return low, high
+
+
+def shares(rule: str, path: str) -> tuple[tuple[float, ...], float]:
+    """Factors and formal order of "x 0.5 0.75, order 2"; raises `UsageError` for anything else."""
+    head, _, order = (part.strip() for part in rule.partition(","))
+    try:
+        factors = tuple(float(word) for word in head.removeprefix("x").split())
+        formal = float(order.removeprefix("order")) if order else 2.0
+    except ValueError:
+        factors, formal = (), 0.0
+    if len(factors) < 1 or not formal > 0 or not all(x > 0 and x != 1 for x in factors):
+        raise UsageError(f"{path}: rule '{rule}': expected for example x 0.5 0.75 1.3, order 2")
+    return factors, formal
+
+
+def bound(given: str | float, path: str) -> float:
+    """A bound in SI, from a number or a text with its unit."""
+    if not isinstance(given, str):
+        return given
+    parts = split(given)
+    if parts is None:
+        raise UsageError(f"{path}: bound '{given}': expected a number with its unit, as 10 kPa")
+    return parts[0] * (si_of(parts[1])[0] if parts[1] else 1.0)

@@ -1,13 +1,13 @@
 """What a body is made of: isotropic elasticity, damping, density, and the law at large strain."""
 
-from dataclasses import MISSING, dataclass, replace
+from dataclasses import MISSING, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import SceneError
-from validate.parameters import part, quantity
+from validate.parameters import part, quantity, take_units
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.prony import Prony
 from validate.scene.stability import require_stable
@@ -43,6 +43,7 @@ class Material:
     prony: Prony = quantity(Prony(), "1", "relaxation of the isochoric stress")
 
     def __post_init__(self) -> None:
+        take_units(self)
         if not (np.isfinite(self.E) and self.E > 0):
             raise SceneError(f"modulus E = {self.E:g} Pa: expected a positive number")
         if not -1 < self.nu <= 0.5:
@@ -104,8 +105,14 @@ class Material:
 
 @dataclass(frozen=True)
 class Region:
-    """Cells (k,) of another material than the scene's: both linear, or both at large strain."""
+    """Cells (k,) of another material than the scene's: both linear, or both at large strain.
+
+    Declared it is `where` in words, the cells whose middle lies there, of the body's own material
+    but for its modulus, which is `contrast` times the body's; a resolved one has both.
+    """
 
     name: str
-    cells: Ints
-    material: Material
+    cells: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    material: Material = None  # type: ignore[assignment]
+    where: str = quantity("", "1", "box A to B: cells whose middle lies in it")
+    contrast: float = quantity(1.0, "1", "its modulus over the body's, where declared")

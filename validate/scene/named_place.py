@@ -77,6 +77,14 @@ def point_of(text: str) -> tuple[float, ...]:
     return tuple(_metres(part) for part in text.split(","))
 
 
+def box_of(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The corners m of "box A to B"; raises `SceneError` for anything else."""
+    if not (text.startswith("box ") and " to " in text):
+        raise SceneError(f"place '{text[:60]}': expected a box, as box 0,0,1mm to 4mm,4mm,2mm")
+    low, high = map(point_of, text[4:].split(" to ", 1))
+    return low, high
+
+
 def _site(text: str, mesh: Mesh) -> Site:
     if text in mesh.facets:
         return Labelled(text)
@@ -85,7 +93,7 @@ def _site(text: str, mesh: Mesh) -> Site:
         _require_at(text, point, point, mesh)
         return Nearest(point)
     if text.startswith("box ") and " to " in text:
-        low, high = map(point_of, text[4:].split(" to ", 1))
+        low, high = box_of(text)
         _require_at(text, low, high, mesh)
         return InBox(low, high)
     if text[:1] in tuple(_AXES) and text[1:] in ("min", "max"):

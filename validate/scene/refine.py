@@ -50,7 +50,7 @@ def refined(scene: Scene) -> Scene:
     regions = tuple(
         replace(r, cells=(2**d * r.cells[:, None] + each).ravel()) for r in scene.regions
     )
-    return replace(scene, mesh=mesh, regions=regions)
+    return replace(scene, body=mesh, regions=regions)
 
 
 def _bricks(d: int) -> tuple[tuple[int, ...], ...]:
@@ -70,9 +70,9 @@ def of_element(scene: Scene, element: str) -> Scene:
     mesh = linear(scene.mesh)
     if element in ("H8", "Q4"):
         shaped = any(drive.shape is not None for drive in scene.drives)  # node by node
-        return scene if shaped else replace(scene, mesh=mesh)
+        return scene if shaped else replace(scene, body=mesh)
     return replace(
         scene,
-        mesh=quadratic(mesh) if element == "P2" else mesh,
+        body=quadratic(mesh) if element == "P2" else mesh,
         dilatation="nodal_mean" if element == "MD" else "pointwise",
     )

@@ -1,17 +1,23 @@
-"""The scene: a mesh, what it is made of, how it is held and driven, and the fluid in it."""
+"""The scene: a body, what it is made of, how it is held and driven, and the fluid in it.
+
+Declared, it is the parameter tree of an experiment: its body is a geometry (`scene.geometry`), its
+places are words (`scene.named_place`). What is simulated is `resolved` on a mesh of the body.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, replace
 from hashlib import sha256
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
+from validate.parameters import quantity, take_units
 from validate.scene.contact import RigidContact, require_clear
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of, box_of, place_of
 from validate.scene.select import Place, kind_of, nodes_of
 from validate.scene.tool import Needle, require_usable
 from validate.scene.tracked import Prescribed
@@ -25,16 +31,19 @@ PlaneState = Literal["strain", "stress"]
 class Support:
     """Displacement components held at zero on a facet set, or on faces, edges or points."""
 
-    facets: Place
-    components: tuple[int, ...]
+    facets: Place = quantity(MISSING, "1", "where the body is held")
+    components: tuple[int, ...] = quantity((0, 1, 2), "1", "0, 1, 2: held along x, y, z")
 
 
 @dataclass(frozen=True)
 class Pin:
     """One node, the nearest to `point` m, held in some components."""
 
-    point: tuple[float, ...]
-    components: tuple[int, ...]
+    point: tuple[float, ...] = quantity(MISSING, "m", "near the pinned node")
+    components: tuple[int, ...] = quantity((0, 1, 2), "1", "0, 1, 2: held along x, y, z")
+
+    def __post_init__(self) -> None:
+        take_units(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +73,18 @@ class Drive:
     """
 
     name: str
-    facets: Place
-    direction: tuple[float, ...]
-    point: tuple[float, ...] | None = None
+    facets: Place = quantity(MISSING, "1", "where it moves the body")
+    direction: tuple[float, ...] = quantity(MISSING, "1", "unit vector of the motion")
+    point: tuple[float, ...] | None = quantity(None, "m", "only the node nearest to it moves")
     speeds: tuple[tuple[float, float], ...] = ()
     #: The set of tracked points that makes this drive, and which of its inputs it is.
     follows: tuple[Prescribed, int] | None = None
     shape: DriveShape | None = None
+    value: float | None = quantity(None, "m", "its input, where no recording gives it")
 
     def __post_init__(self) -> None:
+        _take_direction(self)
+        take_units(self)
         starts = [t for t, _ in self.speeds]
         if not all(np.isfinite(v) for _, v in self.speeds) or starts != sorted(starts):
             raise SceneError(f"drive '{self.name}': expected finite speeds and increasing times")
@@ -89,11 +101,16 @@ class Load:
     """
 
     name: str
-    facets: Place
-    direction: tuple[float, ...]
-    spread: Literal["consistent", "nodal", "per_node"] = "consistent"
+    facets: Place = quantity(MISSING, "1", "where it acts")
+    direction: tuple[float, ...] = quantity(MISSING, "1", "unit vector of the force")
+    spread: Literal["consistent", "nodal", "per_node"] = quantity(
+        "consistent", "1", "how the input is spread over the place"
+    )
+    value: float | None = quantity(None, "N", "its input, where no recording gives it")
 
     def __post_init__(self) -> None:
+        _take_direction(self)
+        take_units(self)
         length = float(np.linalg.norm(self.direction))
         if abs(length - 1) > 1e-9:
             raise SceneError(f"load '{self.name}': direction of length {length:g}, needs 1")
@@ -108,9 +125,12 @@ class Weight:
     """
 
     name: str
-    direction: tuple[float, ...]
+    direction: tuple[float, ...] = quantity(MISSING, "1", "unit vector of gravity")
+    value: float | None = quantity(None, "m/s^2", "its input, where no recording gives it")
 
     def __post_init__(self) -> None:
+        _take_direction(self)
+        take_units(self)
         length = float(np.linalg.norm(self.direction))
         if abs(length - 1) > 1e-9:
             raise SceneError(f"weight '{self.name}': direction of length {length:g}, needs 1")
@@ -125,7 +145,11 @@ class Pressure:
     """
 
     name: str
-    facets: Place
+    facets: Place = quantity(MISSING, "1", "where it presses")
+    value: float | None = quantity(None, "Pa", "its input, where no recording gives it")
+
+    def __post_init__(self) -> None:
+        take_units(self)
 
 
 @dataclass(frozen=True)
@@ -137,10 +161,11 @@ class Mass:
     """
 
     name: str
-    facets: Place
-    mass: float
+    facets: Place = quantity(MISSING, "1", "where it hangs")
+    mass: float = quantity(MISSING, "kg", "mass")
 
     def __post_init__(self) -> None:
+        take_units(self)
         if not (np.isfinite(self.mass) and self.mass > 0):
             raise SceneError(
                 f"mass '{self.name}': {self.mass:g} kg; expected a mass above 0; otherwise "
@@ -156,8 +181,11 @@ class Probe:
     """
 
     name: str
-    point: tuple[float, ...]
-    stands: bool = False
+    point: tuple[float, ...] = quantity(MISSING, "m", "place at rest")
+    stands: bool = quantity(False, "1", "whether it stands off the surface")
+
+    def __post_init__(self) -> None:
+        take_units(self)
 
 
 @dataclass(frozen=True)
@@ -167,11 +195,12 @@ class Foundation:
     Zero lets the facets slip, infinity would bond them; what lies between is partial friction.
     """
 
-    facets: Place
-    components: tuple[int, ...]
-    stiffness: float
+    facets: Place = quantity(MISSING, "1", "where the springs are")
+    components: tuple[int, ...] = quantity(MISSING, "1", "0, 1, 2: springs along x, y, z")
+    stiffness: float = quantity(MISSING, "N/m^3", "of the springs")
 
     def __post_init__(self) -> None:
+        take_units(self)
         if not (np.isfinite(self.stiffness) and self.stiffness >= 0):
             raise SceneError(
                 f"foundation stiffness {self.stiffness:g} N/m3: expected a number >= 0"
@@ -182,11 +211,12 @@ class Foundation:
 class Membrane:
     """A taut elastic sheet glued to a facet set: thickness m."""
 
-    facets: Place
-    thickness: float
-    material: Material
+    facets: Place = quantity(MISSING, "1", "where it is glued to the body")
+    thickness: float = quantity(MISSING, "m", "thickness")
+    material: Material = quantity(MISSING, "1", "of the sheet")
 
     def __post_init__(self) -> None:
+        take_units(self)
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise SceneError(f"membrane thickness {self.thickness:g} m: expected a number above 0")
 
@@ -203,6 +233,8 @@ class Cavity:
 class Scene:
     """What is simulated. Parts that are absent cost nothing.
 
+    The `body` is a mesh, or a geometry from which `resolved` makes it; a function of the recording
+    and the parameters where the mesh follows from them.
     `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
     of a drive is that on the whole body. `dilatation`: the volume change is that of every point, in
     the mean of the cells around each node (tet4), or "mixed", projected in every cell
@@ -211,30 +243,64 @@ class Scene:
     whose unit nobody stated; moduli are then in it per m^2, and no force is in N.
     """
 
-    mesh: Mesh
+    body: Any
     material: Material
     supports: tuple[Support, ...] = ()
     pins: tuple[Pin, ...] = ()
     drives: tuple[Drive, ...] = ()
     cavities: tuple[Cavity, ...] = ()
-    dilatation: Dilatation = "pointwise"
-    copies: int = 1
+    dilatation: Dilatation = quantity("pointwise", "1", "whose volume change counts")
+    copies: int = quantity(1, "1", "equal parts that planes of symmetry leave")
     foundations: tuple[Foundation, ...] = ()
     membranes: tuple[Membrane, ...] = ()
     regions: tuple[Region, ...] = ()
     loads: tuple[Load | Weight | Pressure, ...] = ()
     probes: tuple[Probe, ...] = ()
-    plane: PlaneState = "strain"
-    thickness: float = 1.0
+    plane: PlaneState = quantity("strain", "1", "of a 2-D body")
+    thickness: float = quantity(1.0, "m", "of a 2-D body; 1 m: forces are per metre")
     masses: tuple[Mass, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
     tracked: tuple[Prescribed, ...] = ()
-    force_unit: str = "N"
+    force_unit: str = quantity("N", "1", "N, or that of a recording whose unit is unknown")
     tools: tuple[Needle, ...] = ()
 
     def __post_init__(self) -> None:
-        own = tuple(d for d in self.drives if d.follows is None)
-        object.__setattr__(self, "drives", (*own, *(d for p in self.tracked for d in _drives(p))))
+        take_units(self)
+        if isinstance(self.body, Mesh):
+            own = tuple(d for d in self.drives if d.follows is None)
+            drives = (*own, *(d for p in self.tracked for d in _drives(p)))
+            object.__setattr__(self, "drives", drives)
+            self._check()
+
+    @property
+    def mesh(self) -> Mesh:
+        """Raises `SceneError` for a scene that is declared and not yet resolved."""
+        if not isinstance(self.body, Mesh):
+            raise SceneError(f"the body {self.body} has no mesh yet; resolve the scene first")
+        return self.body
+
+    def resolved(self, mesh: Mesh) -> "Scene":
+        """The scene on this mesh of its body: words become places, symmetry holds its planes."""
+        held = tuple(getattr(self.body, "held", ()))
+
+        def placed(parts: tuple[P, ...]) -> tuple[P, ...]:
+            return tuple(_placed(part, mesh) for part in parts)
+
+        return replace(
+            self,
+            body=mesh,
+            supports=placed((*self.supports, *held)),
+            drives=placed(self.drives),
+            foundations=placed(self.foundations),
+            membranes=placed(self.membranes),
+            loads=placed(self.loads),
+            masses=placed(self.masses),
+            contacts=placed(self.contacts),
+            regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
+            copies=self.copies * getattr(self.body, "copies", 1),
+        )
+
+    def _check(self) -> None:
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation needs linear elements; use order 1")
         if self.mesh.dimension == 2 and (
@@ -352,6 +418,34 @@ class Scene:
         for region in self.regions:
             numbers[region.cells] = value(region.material)
         return numbers
+
+
+P = TypeVar("P")
+
+
+def _placed(part: P, mesh: Mesh) -> P:
+    """A part whose place is words, on the facets that they choose."""
+    facets = getattr(part, "facets", None)
+    if not isinstance(facets, str) or facets in mesh.facets:
+        return part
+    return replace(part, facets=place_of(facets, mesh))  # type: ignore[type-var]
+
+
+def _chosen(region: Region, mesh: Mesh, own: Material) -> Region:
+    """A declared region with its cells and material."""
+    if not region.where:
+        return region
+    low, high = map(np.array, box_of(region.where))
+    middles = mesh.nodes[mesh.corners].mean(axis=1)
+    inside = ((middles >= low) & (middles <= high)).all(axis=1)
+    stiff = region.material or replace(own, E=region.contrast * own.E)
+    return replace(region, cells=np.flatnonzero(inside), material=stiff, where="")
+
+
+def _take_direction(part: Any) -> None:
+    """A direction in words ("-z") as its unit vector."""
+    if isinstance(part.direction, str):
+        object.__setattr__(part, "direction", axis_of(part.direction))
 
 
 def _drives(part: Prescribed) -> tuple[Drive, ...]:

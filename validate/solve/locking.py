@@ -41,7 +41,7 @@ def locking_factor(scene: Scene, probe: str) -> float:
     )
     # Quadratic hexahedra lock near nu = .5, too; those of linear pressure do not.
     finer = replace(
-        small, mesh=quadratic(scene.mesh), dilatation="mixed" if scene.mesh.bricks else "pointwise"
+        small, body=quadratic(scene.mesh), dilatation="mixed" if scene.mesh.bricks else "pointwise"
     )
     ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
     length = float(reference @ reference)

@@ -96,7 +96,7 @@ def errors_on(case: Mapping[str, Followed], names: Sequence[str], methods: Seque
     truth, mesh = first.truth.u, first.truth.mesh
     assert truth is not None
     assert mesh is not None
-    on = Common(mesh, replace(first.body, mesh=mesh))
+    on = Common(mesh, replace(first.body, body=mesh))
     return {
         name: errors_of(
             case[name].run, case[name].scene.mesh, truth, on, names, frames, case[name].label

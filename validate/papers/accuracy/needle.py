@@ -69,4 +69,4 @@ def pressed_block(n: int, material: Material = MP1, cells: Mesher = grid) -> Sce
     middle = side[np.abs(mesh.nodes[side].mean(axis=1)[:, 1] - 0.5) < 0.1]
     pressed = Mesh(mesh.nodes, mesh.cells, mesh.kind, {**mesh.facets, "middle": middle})
     load = Load("press", "middle", (-1.0, 0.0))
-    return replace(block, mesh=pressed, drives=(), loads=(load,), probes=())
+    return replace(block, body=pressed, drives=(), loads=(load,), probes=())

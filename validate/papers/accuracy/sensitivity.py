@@ -91,7 +91,7 @@ def mesh_turn(name: str, scene: Scene, first: tuple[int, ...], last: tuple[int, 
 
 
 def _gridded(scene: Scene, cells: tuple[int, ...]) -> Scene:
-    return replace(scene, mesh=grid(tuple(np.ptp(scene.mesh.nodes, axis=0).tolist()), cells))
+    return replace(scene, body=grid(tuple(np.ptp(scene.mesh.nodes, axis=0).tolist()), cells))
 
 
 def moved_nodes(scene: Scene, share: float = SHIFT) -> Scene:
@@ -101,7 +101,7 @@ def moved_nodes(scene: Scene, share: float = SHIFT) -> Scene:
     inner = ((mesh.nodes > low + 1e-9) & (mesh.nodes < high - 1e-9)).all(axis=1)
     cell = np.abs(mesh.nodes[mesh.cells[0, -1]] - mesh.nodes[mesh.cells[0, 0]])
     by = np.random.default_rng(2).uniform(-share, share, mesh.nodes.shape) * cell
-    return replace(scene, mesh=Mesh(mesh.nodes + by * inner[:, None], mesh.cells, mesh.kind,
+    return replace(scene, body=Mesh(mesh.nodes + by * inner[:, None], mesh.cells, mesh.kind,
                                     mesh.facets))  # fmt: skip
 
 

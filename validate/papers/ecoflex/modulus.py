@@ -42,7 +42,7 @@ from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import CORNER_ORDER, Identified
 from validate.replay.method import Method
-from validate.replay.similar_grids import member
+from validate.scene.similar_grids import member
 
 T = TypeVar("T")
 

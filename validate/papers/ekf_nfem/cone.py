@@ -117,7 +117,7 @@ def _quarter(p: PressedCone, model: ConeModel) -> Scene:
     inside = {n: at for n, at in marker_places(s).items() if (at >= 0).all()}
     return replace(
         scene,
-        mesh=quadratic(mesh) if model.element in ("p2", "p2_mixed") else mesh,
+        body=quadratic(mesh) if model.element in ("p2", "p2_mixed") else mesh,
         material=_material(p, model, p.material.nu, 0.0),
         dilatation=_DILATATION[model.element],
         drives=(Drive("plate", "top", (0.0, 0.0, -1.0)),),

@@ -1,0 +1,41 @@
+"""What the library adds to a declaration: an experiment of one of its kinds is complete by its
+parameters alone."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from validate.replay.compression import Compression, compression
+from validate.replay.experiment import Experiment
+from validate.replay.inclusion import InclusionTest, inclusion_test
+from validate.replay.measured_body import measured_body
+from validate.replay.measured_cards import MeasuredBody
+
+#: What a declaration of such a kind holds.
+DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "accept", "kind")
+
+
+def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment]:
+    return lambda *, folder, **given: make(**given)
+
+
+KINDS: Mapping[type, Callable[..., Experiment]] = MappingProxyType({
+    MeasuredBody: measured_body,
+    Compression: _without_folder(compression),
+    InclusionTest: _without_folder(inclusion_test),
+})  # fmt: skip
+
+
+def of_a_kind(experiment: Experiment) -> bool:
+    """Whether its parameters say all that is declared of it."""
+    return type(experiment.parameters) in KINDS
+
+
+def completed(experiment: Experiment, path: Path) -> Experiment:
+    """The experiment declared in that file, with what its kind adds."""
+    if of_a_kind(experiment) and not experiment.complete:
+        given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
+        make = KINDS[type(experiment.parameters)]
+        experiment = make(**given, folder=path.resolve().parent)
+    return experiment.at(path)

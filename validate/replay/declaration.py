@@ -1,0 +1,194 @@
+"""A declaration as JSON: exact, and data.
+
+An object is {"type": name of its class, ...} with the fields that are not their defaults; numbers
+are in SI. What is code stays in the experiment's file: {"code": "twin.record"} says where in its
+`EXPERIMENT` a function is, {"like": "parameters.settings", ...} whose class an object of its own has.
+A declaration without code is run from its JSON alone, and nothing of it is executed: its classes are
+the library's (`classes`).
+"""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from validate.errors import UsageError
+from validate.replay.completed import DECLARED, completed, of_a_kind
+from validate.replay.experiment import Experiment
+
+FORMAT = 1
+_LEAVES = (str, bool, int, float, type(None))
+#: Modules whose dataclasses a declaration is made of, by the names of the classes.
+_MODULES = (
+    "compare.effects", "compare.expected", "compare.published", "compare.verdict",
+    "estimate.filters", "register.fitting", "register.sensing", "replay.calibration",
+    "replay.cards", "replay.compression_cards", "replay.contact_cards", "replay.experiment",
+    "replay.inclusion", "replay.measured_cards", "replay.method", "replay.tree",
+    "replay.variation", "scene.contact", "scene.geometry", "scene.laws", "scene.material",
+    "scene.prony", "scene.scene", "scene.select", "scene.tool", "scene.tracked",
+    "solve.schemes",
+)  # fmt: skip
+_RUNS_PROGRAMS = ("Guest", "GuestLetGo")  # settings whose command would be a stranger's
+
+
+# --- to JSON --------------------------------------------------------------------------------------
+
+
+def to_json(experiment: Experiment) -> str:
+    """The declaration; what is code is named by its place in the experiment's file."""
+    document = {"format": FORMAT, "experiment": _encoded(experiment, "")}
+    return json.dumps(document, indent=1, allow_nan=False)
+
+
+def _encoded(value: Any, at: str) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(value)}
+    if isinstance(value, _LEAVES):
+        return value
+    if isinstance(value, tuple | list):
+        return [_encoded(v, f"{at}.{i}") for i, v in enumerate(value)]
+    if isinstance(value, Mapping):
+        if all(isinstance(k, str) for k in value):
+            return {"items": {k: _encoded(v, f"{at}.{k}") for k, v in value.items()}}
+        return {"code": at.lstrip(".")}
+    if isinstance(value, np.ndarray):
+        return {"array": value.tolist(), "dtype": str(value.dtype)}
+    if is_dataclass(value) and not isinstance(value, type):
+        return _object(value, at)
+    return {"code": at.lstrip(".")}
+
+
+def _object(value: Any, at: str) -> dict[str, Any]:
+    """The fields that differ from their defaults, and what makes the object of them."""
+    found: dict[str, Any] = (
+        {"type": type(value).__name__} if _is_ours(type(value)) else {"like": at.lstrip(".")}
+    )
+    declared = DECLARED if isinstance(value, Experiment) and of_a_kind(value) else None
+    for f in fields(value):
+        own = getattr(value, f.name)
+        if declared is not None and f.name not in declared:
+            continue  # what the library adds
+        if f.init and f.compare and not _is_default(f, own):
+            found[f.name] = _encoded(own, f"{at}.{f.name}")
+    return found
+
+
+def _is_default(f: Any, value: Any) -> bool:
+    default = f.default_factory() if f.default_factory is not MISSING else f.default
+    if default is MISSING or type(default) is not type(value):
+        return False
+    if isinstance(value, np.ndarray):
+        return bool(value.shape == default.shape and (value == default).all())
+    return bool(value == default)
+
+
+def _is_ours(kind: type) -> bool:
+    return classes().get(kind.__name__) is kind
+
+
+@cache
+def classes() -> Mapping[str, type]:
+    """The classes that a declaration may name."""
+    found: dict[str, type] = {}
+    for name in _MODULES:
+        module = import_module(f"validate.{name}")
+        own = (v for v in vars(module).values() if isinstance(v, type) and is_dataclass(v))
+        found |= {kind.__name__: kind for kind in own}
+    return MappingProxyType(found)
+
+
+# --- from JSON ------------------------------------------------------------------------------------
+
+
+def from_json(text: str, path: Path, declared: Experiment | None = None) -> Experiment:
+    """The experiment of a declaration; code is that of `declared`, where it is given.
+
+    Recordings and meshes are found from the folder of `path`. Raises `UsageError` that names the
+    path in the declaration for what is no declaration, and for code where there is no `declared`.
+    """
+    try:
+        document = json.loads(text)
+    except ValueError as error:
+        raise UsageError(f"{path.name}: no JSON ({error})"[:200]) from None
+    whole = document.get("experiment") if isinstance(document, dict) else None
+    if not isinstance(whole, dict) or document.get("format") != FORMAT:
+        raise UsageError(
+            f"{path.name}: no declaration of format {FORMAT}; `validate list NAME --json` writes one"
+        )
+    reader = _Reader(path.name, declared)
+    experiment = reader.read(whole, "")
+    if not isinstance(experiment, Experiment):
+        raise UsageError(f"{path.name}: type '{whole.get('type')}': expected Experiment")
+    return completed(experiment, path)
+
+
+class _Reader:
+    def __init__(self, file: str, declared: Experiment | None) -> None:
+        self._file, self._declared = file, declared
+
+    def read(self, value: Any, at: str) -> Any:
+        if isinstance(value, list):
+            return tuple(self.read(v, f"{at}.{i}") for i, v in enumerate(value))
+        if not isinstance(value, dict):
+            return value
+        kinds: dict[str, Callable[[dict[str, Any], str], Any]] = {
+            "type": self._object, "like": self._own, "items": self._items, "code": self._code,
+            "array": lambda v, _: np.array(v["array"], dtype=v["dtype"]),
+            "number": lambda v, _: float(v["number"]),
+        }  # fmt: skip
+        key = next((k for k in kinds if k in value), None)
+        if key is None:
+            raise self._wrong(at, f"{sorted(value)[:4]}: expected one of {', '.join(kinds)}")
+        return kinds[key](value, at)
+
+    def _items(self, value: dict[str, Any], at: str) -> Mapping[str, Any]:
+        items = value["items"]
+        return MappingProxyType({k: self.read(v, f"{at}.{k}") for k, v in items.items()})
+
+    def _object(self, value: dict[str, Any], at: str) -> Any:
+        kind = classes().get(str(value["type"]))
+        if kind is None:
+            raise self._wrong(at, f"type '{value['type']}' is no part of a declaration")
+        if self._declared is None and kind.__name__ in _RUNS_PROGRAMS:
+            raise self._wrong(at, f"'{kind.__name__}' runs a program; a JSON file may not")
+        return self._of(kind, {k: v for k, v in value.items() if k != "type"}, at)
+
+    def _own(self, value: dict[str, Any], at: str) -> Any:
+        """An object of a class of the experiment's own."""
+        kind = type(self._code({"code": value["like"]}, at))
+        return self._of(kind, {k: v for k, v in value.items() if k != "like"}, at)
+
+    def _of(self, kind: type, given: dict[str, Any], at: str) -> Any:
+        known = {f.name for f in fields(kind) if f.init}
+        if odd := sorted(set(given) - known):
+            raise self._wrong(at, f"'{odd[0]}' is no field of {kind.__name__}")
+        read = {k: self.read(v, f"{at}.{k}") for k, v in given.items()}
+        try:
+            return kind(**read)
+        except TypeError as error:
+            raise self._wrong(at, str(error)) from None
+
+    def _code(self, value: dict[str, Any], at: str) -> Any:
+        if self._declared is None:
+            raise self._wrong(
+                at, "is code, which a JSON file does not hold; run the experiment's own file"
+            )
+        found: Any = self._declared
+        for name in str(value["code"]).split("."):
+            if isinstance(found, Mapping):
+                found = found[name]
+            elif isinstance(found, tuple):
+                found = found[int(name)]
+            else:
+                found = getattr(found, name)
+        return found
+
+    def _wrong(self, at: str, why: str) -> UsageError:
+        return UsageError(f"{self._file}: {at.lstrip('.') or 'experiment'}: {why}")

@@ -1,0 +1,90 @@
+"""The parameters of a declared experiment: its recording, its scene, and settings of its own.
+
+The scene's paths have no prefix (`material.E`, `body.cells`), nor have the settings' own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from validate.errors import ComparisonError
+from validate.parameters import part, quantity, with_given
+from validate.recording.readers import read_recording
+from validate.recording.types import Recording
+from validate.scene.geometry import Geometry, cell_size
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Tree:
+    """`settings` are a dataclass of what no scene holds: a twin, a registration, a data folder."""
+
+    recording: str = quantity("", "1", "recording, from the experiment's folder")
+    scene: Scene = part(None, "what is simulated")
+    settings: Any = part(None, "of this experiment alone")
+
+    def with_scene(self, **changes: Any) -> "Tree":
+        return replace(self, scene=replace(self.scene, **changes))
+
+
+def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    """The one recording that the tree names."""
+    return (read_recording(folder / tree.recording),)
+
+
+@dataclass(frozen=True)
+class Built:
+    """Makes the scene of a method, with its changes by path, on the mesh of its body.
+
+    Mesh files are found from the `folder`.
+    """
+
+    folder: Path = field(default=Path(), compare=False)
+
+    def __call__(
+        self, recording: Recording | None, tree: Tree, changes: Mapping[str, Any] | None = None
+    ) -> Scene:
+        changed = with_given(tree, changes) if changes else tree
+        return changed.scene.resolved(mesh_of(recording, changed, self.folder))
+
+
+@dataclass(frozen=True)
+class CellSize:
+    """The edge m of a cube as large as a mean cell of the declared body."""
+
+    folder: Path = field(default=Path(), compare=False)
+
+    def __call__(self, tree: Tree) -> float:
+        return cell_size(mesh_of(None, tree, self.folder))
+
+
+@dataclass(frozen=True)
+class ScaledBody:
+    """The declared body with about `share` of the cells along every edge, similar to it."""
+
+    share: float
+
+    def __call__(self, tree: Tree) -> Tree:
+        return tree.with_scene(body=tree.scene.body.scaled(self.share))
+
+
+def mesh_of(recording: Recording | None, tree: Tree, folder: Path) -> Mesh:
+    """The mesh of the declared body. Raises `ComparisonError` where it follows from a recording and
+    there is none."""
+    body = tree.scene.body
+    if isinstance(body, Mesh):
+        return body
+    if isinstance(body, Geometry):
+        return _meshed(body, folder)
+    if recording is None:
+        raise ComparisonError("the mesh of this body follows from a recording; give one")
+    mesh: Mesh = body(recording, tree)
+    return mesh
+
+
+@lru_cache(maxsize=8)
+def _meshed(body: Geometry, folder: Path) -> Mesh:
+    return body.resolved(folder)
