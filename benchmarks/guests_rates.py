@@ -25,7 +25,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.convergence import richardson
 from validate.fem.system import build
-from validate.papers.hanging_bar.bar import HangingBar, hung
+from validate.replay import load
 from validate.report.numbers import significant
 from validate.scene.box import box, grid
 from validate.scene.material import Material
@@ -42,7 +42,7 @@ SWING_LEVELS = (0.2, 0.1, 0.05, 0.02)
 REPEATS = 3
 G, SIZE = 9.80709, (0.1, 0.03, 0.03)
 SILICONE = Material(263_824.0, 0.499, "neo_hooke", 1070.0)
-BAR = HangingBar()
+BAR = load("hanging_bar").parameters.scene
 SPAN, FRAME = 0.25, 5e-3  # s of the swing, and between what is compared
 BEAMS = {
     "hex8": ((6, 2, 2), (10, 3, 3), (14, 4, 4), (20, 6, 6), (26, 8, 8)),
@@ -109,13 +109,14 @@ def beam(kind: str, cells: tuple[int, ...], power: float = 1.5) -> Scene:
 def bar(kind: str, across: int) -> Scene:
     """Cells shrink towards the held end and the sides, as the converged mesh's do, but less."""
     cells = (across, across, 2 * across)
-    size = np.array([BAR.width, BAR.width, BAR.length])
+    size = np.array(BAR.body.size)
     mesh: Mesh = (box if kind == "tet10" else grid)(tuple(size), cells)
     x = mesh.nodes / size
     x[:, :2] = _inwards(x[:, :2], 2.0)
     x[:, 2] = 1 - (1 - x[:, 2]) ** 2
     mesh = replace(mesh, nodes=x * size)
-    return hung(BAR, mesh if kind == "hex8" else quadratic(mesh))
+    whole = replace(BAR, body=replace(BAR.body, symmetry=()))
+    return whole.resolved(mesh if kind == "hex8" else quadratic(mesh))
 
 
 def end(scene: Scene, u: Floats) -> Floats:

@@ -20,7 +20,7 @@ ACCUMULATORS = {"streams.py:Collected", "foreign.py:Gathered", "threads.py:Team"
 
 
 def modules(root: Path) -> list[Path]:
-    return sorted((root / "validate").rglob("*.py")) + sorted((root / "experiments").glob("*.py"))
+    return sorted((root / "validate").rglob("*.py")) + sorted((root / "experiments").rglob("*.py"))
 
 
 def defined(path: Path) -> Iterator[ast.ClassDef]:

@@ -75,7 +75,7 @@ def test_a_row_is_called_as_its_experiment_calls_the_method(
 ) -> None:
     printed = cells(project_root, table)[2:]
     for one in table.judged():
-        own = load(str(project_root / "experiments" / f"{one.name}.py")).methods
+        own = load(one.name).methods
         named = [r[2] for r in printed if r[0] == f"`{one.name}` {one.called}".strip()]
         assert named
         for name in named:
@@ -94,14 +94,13 @@ def test_a_row_is_called_as_its_experiment_calls_the_method(
     ],
 )
 def test_a_label_names_the_nodes_that_are_solved(
-    shared_data: Path, project_root: Path, tmp_path: Path, name: str, method: str, cells: str
+    shared_data: Path, tmp_path: Path, name: str, method: str, cells: str
 ) -> None:
-    file = project_root / "experiments" / f"{name}.py"
-    code, _, error = here("guest", "job", str(file), "-o", str(tmp_path / "j"), "--method", method)
+    code, _, error = here("guest", "job", name, "-o", str(tmp_path / "j"), "--method", method)
     assert code == 0, error
     mesh = json.loads((tmp_path / "j" / "job.json").read_text("utf-8"))["mesh"]
     assert mesh["kind"] == cells
-    assert f" tetrahedra, {mesh['nodes']} nodes" in load(str(file)).methods[method].label
+    assert f" tetrahedra, {mesh['nodes']} nodes" in load(name).methods[method].label
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from script_modules import module_of
 
+from validate.catalogue import experiment_files
 from validate.cli.main import cli
 from validate.compare.result import Result
 
@@ -97,5 +98,4 @@ def test_every_shipped_experiment_has_a_row_with_its_exit_code(project_root: Pat
     """`benchmarks/exit_codes.py` runs them and holds each to its row."""
     table = (project_root / "docs" / "experiments.md").read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \|.*\| ([01]) \|$", table, re.M)
-    names = {path.stem for path in (project_root / "experiments").glob("*.py")}
-    assert sorted(name for name, _ in rows) == sorted(names)
+    assert sorted(name for name, _ in rows) == sorted(experiment_files(project_root))

@@ -12,6 +12,7 @@ from pathlib import Path
 from validate.errors import UsageError
 
 _PACKAGE = Path(__file__).resolve().parent
+FILE = "experiment.py"  # of an experiment in a folder of its own
 _PROJECT = (".git", "pyproject.toml")  # what the top folder of a project holds
 
 
@@ -40,7 +41,7 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
     for folder in named:
         if not _files(folder.resolve()):
             raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
-    found = {f.stem: f for folder in searched_folders(start, named) for f in _files(folder)}
+    found = {name_of(f): f for folder in searched_folders(start, named) for f in _files(folder)}
     if not found:
         raise UsageError(
             "no experiments/ folder here or in this project; give one with --experiments DIR"
@@ -65,8 +66,15 @@ def _project(start: Path) -> Path:
     return next(tops, start)
 
 
+def name_of(path: Path) -> str:
+    """The name of the experiment that is declared in a file: the file's own, or its folder's."""
+    return path.resolve().parent.name if path.name == FILE else path.stem
+
+
 def _files(folder: Path) -> list[Path]:
-    return [f for f in sorted(folder.glob("*.py")) if not f.stem.startswith("_")]
+    """NAME.py, and experiment.py in folders."""
+    found = [*folder.glob("*.py"), *folder.glob(f"*/{FILE}")]
+    return sorted((f for f in found if not name_of(f).startswith("_")), key=name_of)
 
 
 def card(path: Path) -> Card:
@@ -78,13 +86,13 @@ def card(path: Path) -> Card:
     try:
         module = ast.parse(path.read_text("utf-8"), path.name)
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        return Card(path.stem, "", "", f"cannot be read: {error}")
+        return Card(name_of(path), "", "", f"cannot be read: {error}")
     if not any(_names_experiment(node) for node in ast.walk(module)):
-        return Card(path.stem, "", "", "defines no EXPERIMENT")
+        return Card(name_of(path), "", "", "defines no EXPERIMENT")
     texts = _spelt(module)
     docstring = (ast.get_docstring(module) or "").partition("\n")[0]
     title, needs = texts.get("title", docstring), texts.get("needs", "")
-    return Card(path.stem, title, texts.get("source", ""), needs=needs)
+    return Card(name_of(path), title, texts.get("source", ""), needs=needs)
 
 
 def _names_experiment(node: ast.AST) -> bool:

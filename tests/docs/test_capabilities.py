@@ -6,6 +6,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
+from validate.catalogue import experiment_files
 from validate.cli.main import cli
 from validate.estimate.filters import FILTERS
 from validate.scene import contact
@@ -54,4 +55,4 @@ def test_a_row_is_true(row: list[str]) -> None:
         words = command.split()
         assert words[0] in cli.commands, command
         if words[0] == "run":
-            assert (ROOT / "experiments" / f"{words[1]}.py").is_file()
+            assert words[1] in experiment_files(ROOT)

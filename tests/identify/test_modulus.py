@@ -13,7 +13,7 @@ from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
 from validate.identify import modulus
 from validate.identify.modulus import (
-    Cylinder,
+    CylinderSize,
     ModulusFit,
     cylinder_of,
     fit_modulus,
@@ -26,7 +26,7 @@ from validate.identify.modulus import (
 from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording, Signal, Source
 
-DISC = Cylinder(0.05, 0.03)
+DISC = CylinderSize(0.05, 0.03)
 E = 60e3  # Pa
 SPEED = 10e-3 / 60  # m/s, sampled at 10 Hz as the real logs are
 
@@ -177,7 +177,7 @@ def test_unloading_is_not_fitted() -> None:
 def test_the_window_holds_its_ends() -> None:
     """Strains of 1/64 are exact in binary: 16 + 1 of them from 0 to a quarter."""
     d = np.arange(33) / 64 * DISC.height
-    cylinder = Cylinder(DISC.diameter, 1.0)
+    cylinder = CylinderSize(DISC.diameter, 1.0)
     fit = fit_modulus(log(np.arange(33) / 64, 10.0 * d), cylinder, window=(0.0, 0.25))
     assert fit.count == 17
 
@@ -199,7 +199,7 @@ def test_definition_is_the_mean_slope_with_free_intercept() -> None:
 def test_scale_invariance(stiff: float, size: float, offset: float) -> None:
     """Geometrically similar discs of one material have one modulus."""
     d, force = linear(modulus=stiff)
-    disc = Cylinder(DISC.diameter * size, DISC.height * size)
+    disc = CylinderSize(DISC.diameter * size, DISC.height * size)
     fit = fit_modulus(log(d * size, force * size**2 + offset), disc)
     assert fit.E_apparent == pytest.approx(stiff, rel=1e-8)
 
@@ -245,7 +245,7 @@ def test_refusals_hold_the_numbers() -> None:
     with pytest.raises(UsageError, match="expected 0 <= low < high"):
         fit_modulus(log(d, force), window=(0.05, 0.005))
     with pytest.raises(RecordingError, match="expected a size above 0"):
-        Cylinder(0.05, -0.03)
+        CylinderSize(0.05, -0.03)
     unknown = Recording("bare", Source("none", "", 0, ""), 0, metadata={"specimen": {}})
     with pytest.raises(RecordingError, match="no number 'diameter_m'"):
         cylinder_of(unknown)

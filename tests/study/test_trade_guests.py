@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.errors import UsageError
-from validate.papers.hanging_bar.bar import HangingBar
-from validate.papers.hanging_bar.ladder import trial
 from validate.recording.types import Recording, Source
 from validate.scene.box import grid
 from validate.scene.material import Material
@@ -43,7 +42,9 @@ def test_its_answer_is_read_where_all_are_compared(tmp_path: Path) -> None:
     script = tmp_path / "fake.py"
     script.write_text(FAKE, "utf-8")
     command = shlex.join([sys.executable, str(script)])
-    plain = trial(NOTHING, HangingBar(), quick=True)
+    plain = beside("hanging_bar", "study").trial(
+        NOTHING, experiment("hanging_bar").parameters, quick=True
+    )
     both = with_guests_beside(plain, (command,))
     linear, large = both.solvers[len(plain.solvers) :]
     assert (linear.name, large.name) == ("guest fake", "guest fake, large strain")
@@ -59,10 +60,10 @@ def test_its_answer_is_read_where_all_are_compared(tmp_path: Path) -> None:
 
 
 def test_what_is_no_guest_is_kept_whoever_stands_beside() -> None:
-    job, beside = Job("x.py", "0"), Job("x.py", "0", guests=("a guest",))
+    job, other = Job("x.py", "0"), Job("x.py", "0", guests=("a guest",))
     ours, theirs = (TradeCell("solver", "H8", 2, (1.0,), name) for name in ("ours", "guest x"))
-    assert keyed(job, ours).key == keyed(beside, ours).key
-    assert keyed(job, theirs).key != keyed(beside, theirs).key
+    assert keyed(job, ours).key == keyed(other, ours).key
+    assert keyed(job, theirs).key != keyed(other, theirs).key
 
 
 def test_linear_hexahedra_are_linear() -> None:

@@ -45,7 +45,11 @@ def sought(folder: str, name: str | None, beside: Path) -> Path | None:
 def searched(beside: Path) -> tuple[Path, ...]:
     """The folders that may hold data sets, first the one that the environment names."""
     shared = os.environ.get(SHARED)
-    return (Path(shared) if shared else beside.parent.parent / "shared" / "data", cache_folder())
+    experiments = beside.parent if beside.parent.name == "experiments" else beside
+    return (
+        Path(shared) if shared else experiments.parent.parent / "shared" / "data",
+        cache_folder(),
+    )
 
 
 def cache_folder() -> Path:

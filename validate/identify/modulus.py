@@ -32,7 +32,7 @@ BEYOND_NOISE = 5.0  # a force this many noise sd off the unloaded one is contact
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class CylinderSize:
     """An undeformed cylinder compressed along its axis; diameter and height in m."""
 
     diameter: float
@@ -85,7 +85,7 @@ class ModulusSummary:
     fits: tuple[ModulusFit, ...]
 
 
-def cylinder_of(recording: Recording) -> Cylinder:
+def cylinder_of(recording: Recording) -> CylinderSize:
     """The cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
 
     Raises `RecordingError` when one of them is absent or not a number.
@@ -100,12 +100,12 @@ def cylinder_of(recording: Recording) -> Cylinder:
                 f"{recording.name}: no number '{name}' in its specimen record {dict(record)}; "
                 "declare the size of the cylinder"
             ) from error
-    return Cylinder(*sizes)
+    return CylinderSize(*sizes)
 
 
 def fit_modulus(
     recording: Recording,
-    cylinder: Cylinder | None = None,
+    cylinder: CylinderSize | None = None,
     window: tuple[float, float] = WINDOW,
     test: TestKind = "compression",
 ) -> ModulusFit:
@@ -144,7 +144,7 @@ def summarise(fits: Sequence[ModulusFit]) -> ModulusSummary:
 
 def identify_modulus(
     recordings: Sequence[Recording],
-    cylinder: Cylinder | None = None,
+    cylinder: CylinderSize | None = None,
     window: tuple[float, float] = WINDOW,
     test: TestKind = "compression",
 ) -> ModulusSummary:
@@ -158,7 +158,7 @@ def gent_correction(diameter: float, height: float) -> float:
     Gent and Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111-122. Sizes in m; small strains, nu 0.5.
     For a squat cylinder (S below about 1) it is low: a finite-element factor is the better one.
     """
-    cylinder = Cylinder(diameter, height)
+    cylinder = CylinderSize(diameter, height)
     return 1 + 2 * (cylinder.diameter / (4 * cylinder.height)) ** 2
 
 

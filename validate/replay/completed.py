@@ -6,7 +6,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from validate.replay.compression import Compression, compression
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression
 from validate.replay.experiment import Experiment
 from validate.replay.inclusion import InclusionTest, inclusion_test
 from validate.replay.measured_body import measured_body

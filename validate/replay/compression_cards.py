@@ -4,7 +4,7 @@ declared uncertainties, windows of strain, and what images show of it."""
 import math
 from dataclasses import dataclass
 
-from validate.identify.modulus import Cylinder, TestKind, stated_test
+from validate.identify.modulus import CylinderSize, TestKind, stated_test
 from validate.parameters import Ranges, known, part, quantity
 from validate.recording.exports.geometry import loaded_area
 from validate.recording.types import Recording
@@ -12,9 +12,9 @@ from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
 
 
-def size_of(diameter: float | None, height: float | None) -> Cylinder:
+def size_of(diameter: float | None, height: float | None) -> CylinderSize:
     """The cylinder of a card; raises `UsageError` while a size is not set."""
-    return Cylinder(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
+    return CylinderSize(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
 
 
 def stated_sizes(recording: Recording) -> dict[str, float]:
@@ -54,7 +54,7 @@ class Specimen:
     fluid: str | None = quantity(None, "1", "facet set around a fluid inside; none: no fluid")
 
     @property
-    def size(self) -> Cylinder:
+    def size(self) -> CylinderSize:
         """Raises `UsageError` while a size is not set."""
         return size_of(self.diameter, self.height)
 

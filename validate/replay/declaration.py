@@ -2,9 +2,9 @@
 
 An object is {"type": name of its class, ...} with the fields that are not their defaults; numbers
 are in SI. What is code stays in the experiment's file: {"code": "twin.record"} says where in its
-`EXPERIMENT` a function is, {"like": "parameters.settings", ...} whose class an object of its own has.
-A declaration without code is run from its JSON alone, and nothing of it is executed: its classes are
-the library's (`classes`).
+`EXPERIMENT` a function is, {"like": "parameters.settings", ...} which class an object of its own
+has. A declaration without code is run from its JSON alone, and nothing of it is executed: its
+classes are the library's (`classes`).
 """
 
 import json
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from validate.errors import UsageError
+from validate.errors import UsageError, ValidateError
 from validate.replay.completed import DECLARED, completed, of_a_kind
 from validate.replay.experiment import Experiment
 
@@ -120,7 +120,8 @@ def from_json(text: str, path: Path, declared: Experiment | None = None) -> Expe
     whole = document.get("experiment") if isinstance(document, dict) else None
     if not isinstance(whole, dict) or document.get("format") != FORMAT:
         raise UsageError(
-            f"{path.name}: no declaration of format {FORMAT}; `validate list NAME --json` writes one"
+            f"{path.name}: no declaration of format {FORMAT}; `validate list NAME --declaration` "
+            "writes one"
         )
     reader = _Reader(path.name, declared)
     experiment = reader.read(whole, "")
@@ -172,7 +173,7 @@ class _Reader:
         read = {k: self.read(v, f"{at}.{k}") for k, v in given.items()}
         try:
             return kind(**read)
-        except TypeError as error:
+        except (ValidateError, TypeError) as error:
             raise self._wrong(at, str(error)) from None
 
     def _code(self, value: dict[str, Any], at: str) -> Any:

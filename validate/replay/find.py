@@ -4,24 +4,28 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from types import ModuleType
 
-from validate.catalogue import card, experiment_files, searched_folders
+from validate.catalogue import FILE, card, experiment_files, name_of, searched_folders
 from validate.errors import UsageError
+from validate.files import read_text
 from validate.parameters import nearest_names
+from validate.replay.completed import completed
+from validate.replay.declaration import from_json
 from validate.replay.experiment import Experiment
+
+_LARGEST = 16_000_000  # bytes of a declaration as JSON
 
 
 def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
-    """The experiment of that name, or of that file when it ends in .py.
+    """The experiment of that name, or of that file when it ends in .py or .json.
 
     Names are looked for as `experiment_files` says. Raises `UsageError` naming the nearest ones
     when there is none.
     """
-    if name.endswith(".py"):
+    if name.endswith((".py", ".json")):
         return load_file(Path(name))
     files = experiment_files(start, named)
     if name not in files:
@@ -38,34 +42,44 @@ def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
 def load_file(path: Path) -> Experiment:
     """Runs an experiment file (it is code) and returns its EXPERIMENT, which knows its path.
 
+    Of a declaration as JSON, which is data, nothing is executed.
     Raises `UsageError` with line and reason for a file that fails, and before anything of it is
     run for one that is no Python or defines none.
     """
     if not path.is_file():
         raise UsageError(f"no experiment file {path}")
+    if path.suffix == ".json":
+        return from_json(read_text(path, _LARGEST), path)
     if note := card(path).note:
         raise UsageError(f"{path}: {note}")
     experiment = getattr(_executed(path), "EXPERIMENT", None)
     if not isinstance(experiment, Experiment):
         raise UsageError(f"{path} defines no EXPERIMENT of type Experiment")
-    if experiment.name != path.stem:
-        raise UsageError(f"{path}: EXPERIMENT.name is '{experiment.name}', not the file's name")
-    return replace(experiment, path=path.resolve())
+    if experiment.name != name_of(path):
+        of = "folder" if path.name == FILE else "file"
+        raise UsageError(f"{path}: EXPERIMENT.name is '{experiment.name}', not the {of}'s name")
+    return completed(experiment, path)
 
 
 def module_name(path: Path) -> str:
     """The name of the module that an experiment's file is loaded as."""
-    return f"validate_experiment_{path.stem}"
+    return f"validate_experiment_{name_of(path)}"
 
 
 def _executed(path: Path) -> ModuleType:
     # Not by its bare name: a file called random.py would be everybody's module of that name.
     name = module_name(path)
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    # In a folder of its own it is a package: `from .twin import record` is the file beside it.
+    beside = [str(path.resolve().parent)] if path.name == FILE else None
+    spec = importlib.util.spec_from_file_location(
+        name, path.resolve(), submodule_search_locations=beside
+    )
     if spec is None or spec.loader is None:
         raise UsageError(f"{path} cannot be loaded as Python")
     module = importlib.util.module_from_spec(spec)
     # Dataclasses look their module up by name while they are made.
+    for own in [known for known in sys.modules if known.startswith(f"{name}.")]:
+        del sys.modules[own]
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
@@ -88,12 +102,16 @@ def _place(error: BaseException, path: Path) -> str:
 def sources_of(path: Path) -> tuple[Path, ...]:
     """An experiment's file and those beside it that it names."""
     text = path.read_text(encoding="utf-8")
-    beside = (f for f in sorted(path.parent.glob("*.py")) if f != path and f.stem in text)
+    whole = path.name == FILE  # whose folder is its own
+    beside = (
+        f for f in sorted(path.parent.glob("*.py")) if f != path and (whole or f.stem in text)
+    )
     return (path, *beside)
 
 
 def root_of(path: Path | None, start: Path) -> Path:
     """The project an experiment's file belongs to where `start` lies in it, else `start`: nothing
     is written where nobody looks."""
-    own = path is not None and path.parent.name == "experiments"
-    return path.parents[1] if path and own and start.is_relative_to(path.parents[1]) else start
+    tops = path.parents[:3] if path else ()
+    folder = next((top for top in tops if top.name == "experiments"), None)
+    return folder.parent if folder and start.is_relative_to(folder.parent) else start

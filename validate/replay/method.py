@@ -9,6 +9,7 @@ from validate.estimate.measurements import Measurements, measurements
 from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.register.registered import Registered
+from validate.replay.variation import ByPath
 from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.
@@ -25,7 +26,8 @@ class Limited(Protocol):
 
 @dataclass(frozen=True)
 class Method:
-    """`settings` of a scheme or filter; `scene` options that the experiment's `build` reads.
+    """`settings` of a scheme or filter; `scene`: what it changes of the scene, by path (in an older
+    form, options that the experiment's `build` reads).
 
     The fields of both are the method's own to `--set`: `methods.NAME.tolerance=1e-3`. `markers`
     are those that a filter is given. `steps`: run only so many, as a baseline that is timed and
@@ -43,6 +45,10 @@ class Method:
     stride: int = quantity(1, "1", "steps of the recording that one step of this method takes")
     chosen: str = quantity("", "1", "settings chosen on the twin that checks it; empty: none")
     split: int = quantity(1, "1", "steps of this method in one of these, inputs interpolated")
+
+    def __post_init__(self) -> None:
+        if isinstance(self.scene, Mapping):
+            object.__setattr__(self, "scene", ByPath(self.scene))
 
     def prepare(
         self,

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError, UsageError
-from validate.parameters import describe, doubts, nearest_names, with_values
+from validate.parameters import describe, doubts, has_path, nearest_names, with_given, with_values
 from validate.replay.experiment import Case, Experiment
 from validate.replay.guests import added_guests
 from validate.replay.law_solver import with_laws
 from validate.replay.method import Method
+from validate.replay.tree import Tree
 from validate.scene.abaqus_lines import files_named
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 
@@ -72,13 +73,35 @@ def require_case(experiment: Experiment, name: str) -> None:
 
 def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
     """Every method with the user's values, whether it is run or not: what identifies follows."""
-    return dict(with_values(*with_laws(experiment.methods, _split(options.values)[1])))
+    values = _split(options.values)[1]
+    ours, theirs = _of_scenes(experiment, values)
+    changed = dict(with_values(*with_laws(experiment.methods, ours)))
+    for path, text in theirs.items():
+        name, _, inner = path.partition(".")
+        scene = {**(changed[name].scene or {}), inner: text}
+        with_given(experiment.parameters, scene)
+        changed[name] = replace(changed[name], scene=scene)
+    return changed
+
+
+def _of_scenes(
+    experiment: Experiment, values: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Values of the methods' own fields, and those that are of a method's declared scene."""
+    theirs = {}
+    if isinstance(experiment.parameters, Tree):
+        for path, text in values.items():
+            name, _, inner = path.partition(".")
+            method = experiment.methods.get(name)
+            if method and not has_path(method, inner) and has_path(experiment.parameters, inner):
+                theirs[path] = text
+    return {k: v for k, v in values.items() if k not in theirs}, theirs
 
 
 def doubtful(experiment: Experiment, values: Mapping[str, str]) -> tuple[str, ...]:
     """A line for each value that looks like one whose unit was forgotten."""
     mine, theirs = _split(values)
-    methods, rest = with_laws(experiment.methods, theirs)
+    methods, rest = with_laws(experiment.methods, _of_scenes(experiment, theirs)[0])
     return (*doubts(experiment.parameters, mine), *doubts(methods, rest))
 
 

@@ -10,7 +10,7 @@ A standard uncertainty has one meaning: the value moves up by z of them. Where o
 would reach the bound, it moves down instead, and it never lies beyond the bound.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -42,6 +42,28 @@ class Values:
         sign, amount = given[0], _number(given[2:], path, "1" if given[0] == "x" else unit)
         new = value * amount if sign == "x" else value + (amount if sign == "+" else -amount)
         return round(new) if isinstance(value, int) else new
+
+
+class ByPath(Mapping[str, Any]):
+    """Values by path that can be a key: what a method changes of the scene."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values = dict(values)
+
+    def __getitem__(self, path: str) -> Any:
+        return self._values[path]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __hash__(self) -> int:
+        return hash(tuple(sorted(self._values.items(), key=lambda item: item[0])))
+
+    def __repr__(self) -> str:
+        return repr(self._values)
 
 
 Change = Callable[[Any], Any]

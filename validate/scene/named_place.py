@@ -18,7 +18,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError, UsageError
 from validate.parameters import nearest_names
 from validate.scene.mesh import Mesh
-from validate.scene.select import InBox, Labelled, Nearest, OnPlane, Place, Site
+from validate.scene.select import Facing, InBox, Labelled, Nearest, OnPlane, Place, Site
 from validate.units import in_si, split
 
 GRAMMAR = "a facet set, zmin, zmax, z=20mm, z=20mm~0.5mm, box A to B, near P (points as 1mm,2mm,0)"
@@ -123,7 +123,8 @@ def _side(mesh: Mesh, axis: int, end: str) -> Site:
     at = np.zeros(3)
     at[axis] = x.min() if end == "min" else x.max()
     slack = _FLAT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    return OnPlane(_tuple(at), _tuple(np.eye(3)[axis]), slack)
+    across = _tuple(np.eye(3)[axis])
+    return OnPlane(_tuple(at), across, slack) & Facing(across)  # no sides of a thin layer of cells
 
 
 def _plane(axis: int, text: str) -> Site:

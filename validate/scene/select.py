@@ -76,6 +76,22 @@ class OnPlane(Site):
 
 
 @dataclass(frozen=True)
+class Facing(Site):
+    """Faces that face along `normal`, whichever way, within 45 degrees; edges and points do."""
+
+    normal: tuple[float, ...]
+
+    def away(self, mesh: Mesh, entities: Ints) -> Floats:
+        if entities.shape[1] < 3 or mesh.dimension == 2:
+            return np.zeros(len(entities))
+        along = _vector(self.normal, mesh, "normal of a face")
+        corners = mesh.nodes[entities[:, :3]]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        share = np.abs(across @ along) / np.linalg.norm(across, axis=1) / np.linalg.norm(along)
+        return np.where(share**2 >= 0.5, 0.0, _size(mesh))
+
+
+@dataclass(frozen=True)
 class InBox(Site):
     """All that lies within the corners `low` and `high` m."""
 

@@ -9,7 +9,7 @@ from validate.datasets.home import found
 from validate.errors import RecordingError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
-from validate.identify.modulus import Cylinder, fit_modulus
+from validate.identify.modulus import CylinderSize, fit_modulus
 from validate.papers.ecoflex.specimens import specimen_of
 from validate.parameters import Ranges, quantity
 from validate.recording.exports.instron import read_instron
@@ -45,7 +45,7 @@ class LoggedSpecimen:
     height: float | None = quantity(None, "m", "height; none: the logs'", asked=True)
 
     @property
-    def size(self) -> Cylinder:
+    def size(self) -> CylinderSize:
         """Raises `UsageError` while a size is not set."""
         return size_of(self.diameter, self.height)
 

@@ -1,49 +1,51 @@
 """How the hanging bar enters `validate study tradeoff`: cells that a guest is given, too."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.papers.hanging_bar.bar import HangingBar, hung
 from validate.recording.types import Recording
 from validate.replay.ladder import Rival, Trial
 from validate.replay.ladder_solvers import ORDERS, still_best, still_pair
-from validate.scene.box import box, grid
+from validate.replay.tree import Built, Tree
+from validate.scene.geometry import Box
 from validate.scene.material import LawName
-from validate.scene.mesh import quadratic
+from validate.scene.mesh import Kind
 from validate.scene.scene import Scene
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
 _WHOLE = 1.0  # s: in one step from rest to the whole weight
 _REFERENCE = "H27"
+_KINDS: Mapping[str, Kind] = {"P1": "tet4", "P2": "tet10", "H8": "hex8", _REFERENCE: "hex27"}
 
 
-def trial(recording: Recording, p: HangingBar, quick: bool) -> Trial:
+def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
     """Levels are cells across the whole bar, twice as many along."""
     levels, finest = ((2, 4), 4) if quick else ((2, 4, 6, 8), 6)
+    size = tree.scene.body.size
     two, fewer = levels[:2], levels[: len(levels) // 2]
 
     def build(element: str, level: int, law: LawName) -> Scene:
         """Evenly meshed, of one law or the other."""
-        make = grid if element.startswith("H") else box
-        mesh = make((p.width, p.width, p.length), (level, level, 2 * level))
-        scene = hung(p, mesh if element in ("H8", "P1") else quadratic(mesh))
-        return replace(scene, material=p.material.linear) if law == "linear" else scene
+        even = Box(size, (level, level, 2 * level), _KINDS[element])
+        scene = Built()(None, tree.with_scene(body=even))
+        return replace(scene, material=scene.material.of_law(law))
 
     def weight(t: Floats) -> Floats:
-        return np.full((len(t), 1), p.gravity)
+        return np.full((len(t), 1), tree.scene.loads[0].value)
 
     return Trial(
         build=build,
-        size=lambda level: p.width / level,
+        size=lambda level: size[0] / level,
         meshes={"P1": levels, "P2": two, "H8": levels, _REFERENCE: fewer},
         orders={**ORDERS, _REFERENCE: 2.0},
         steps=(_WHOLE,),
         inputs=weight,
         frames=np.array([_WHOLE]),
-        points=_points(p),
+        points=_points(size),
         reference=(_REFERENCE, finest),
         best=still_best(cavities=False),
         solvers=(
@@ -57,8 +59,8 @@ def trial(recording: Recording, p: HangingBar, quick: bool) -> Trial:
     )  # fmt: skip
 
 
-def _points(p: HangingBar) -> Floats:
+def _points(size: tuple[float, ...]) -> Floats:
     """Along the axis and half way to an edge, where no mesh of the ladder ends."""
-    along = p.length * np.array([0.07, 0.31, 0.57, 0.83])
-    beside = p.width * np.array([[0.5, 0.5], [0.27, 0.27]])
+    along = size[2] * np.array([0.07, 0.31, 0.57, 0.83])
+    beside = size[0] * np.array([[0.5, 0.5], [0.27, 0.27]])
     return np.array([[*xy, z] for xy in beside for z in along])

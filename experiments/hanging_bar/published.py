@@ -8,38 +8,33 @@ from validate.compare.convergence import Richardson, richardson
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.published import Claim, Figure
 from validate.fem.system import build as build_system
-from validate.papers.hanging_bar.bar import (
-    SOURCE,
-    BarModel,
-    HangingBar,
-    build,
-    hexahedra,
-    hung,
-    sunk,
-)
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import MAIN, Cases
+from validate.replay.tree import Built, Tree
+from validate.scene.geometry import Box
 from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton
 
-QUARTER = BarModel()
+from .recorded import SOURCE, sunk
+
+BUILT = Built()
 _MESHES, _GRADINGS = (6, 4, 3), (3.0, 2.0)
 _HEXAHEDRA = (6, 12)  # of dolfinx's meshes, beside those that are methods
 _ORDER = 3.0  # of quadratic cells
 _MM = 1e3
 
 
-def tell(parameters: HangingBar, cases: Cases, progress: Progress) -> Told:
+def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
     """The converged drop with its interval on meshes graded in two ways, dolfinx's own meshes."""
-    p, main = parameters, cases[MAIN]
+    main = cases[MAIN]
     progress("the converged value")
-    found = {g: _converged(replace(p, mesh=replace(p.mesh, grading=g))) for g in _GRADINGS}
+    found = {g: _converged(tree, g) for g in _GRADINGS}
     limits = [float(at.extrapolated[0, 0]) for _, at in found.values()]
     value = sum(limits) / len(limits)
     half = max(at.index for _, at in found.values())
     numbers = {"drop.converged": value, "drop.converged.half_interval": half}
-    numbers |= {f"drop.hexahedra.{n}": _drop(p, hung(p, hexahedra(p, n))) for n in _HEXAHEDRA}
+    numbers |= {f"drop.hexahedra.{n}": _drop(hexahedra(tree, n)) for n in _HEXAHEDRA}
     own = (("tetrahedra", "drop.tetrahedra"), ("hexahedra", "drop.hexahedra.9"))
     numbers |= {name: sunk(main[m].run) for m, name in own if main[m].run.finished}
     rows = [(g, str(n), _MM * d) for g, (drops, _) in found.items() for n, d in drops.items()]
@@ -54,20 +49,24 @@ def tell(parameters: HangingBar, cases: Cases, progress: Progress) -> Told:
     return Told((Exhibit("converged", "The converged drop", (words,), tables=(table,)),), numbers)
 
 
-def _converged(p: HangingBar) -> tuple[dict[int, float], Richardson]:
+def _converged(tree: Tree, grading: float) -> tuple[dict[int, float], Richardson]:
     """Drops m by cells across, and where they tend to."""
-    drops = {n: _drop(p, _quarter(p, n)) for n in _MESHES}
+    body = replace(tree.scene.body, grading=grading)
+    graded = {n: replace(body, cells=(n, n, 3 * n)) for n in _MESHES}
+    drops = {n: _drop(BUILT(None, tree.with_scene(body=one))) for n, one in graded.items()}
     answers = [np.array([[d]]) for d in drops.values()]
     return drops, richardson([1 / n for n in drops], answers, _ORDER)
 
 
-def _quarter(p: HangingBar, across: int) -> Scene:
-    return build(None, replace(p, mesh=replace(p.mesh, across=across)), QUARTER)
+def hexahedra(tree: Tree, across: int) -> Scene:
+    """The whole bar in linear hexahedra, 8/3 as many along."""
+    cells = (across, across, round(8 * across / 3))
+    return BUILT(None, tree.with_scene(body=Box(tree.scene.body.size, cells, "hex8")))
 
 
-def _drop(p: HangingBar, scene: Scene) -> float:
+def _drop(scene: Scene) -> float:
     stepper = StaticNewton("none").prepare(build_system(scene))
-    pull = np.array([[p.gravity]])
+    pull = np.array([[scene.loads[0].value]])
     return sunk(march("bar", stepper, np.ones(1), pull, np.array([0]), 0.0))
 
 

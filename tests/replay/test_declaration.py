@@ -1,0 +1,94 @@
+"""Declarations as JSON: exact over all experiments, and data where they hold no code."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from beside import experiment
+from commands import refused
+
+from validate.catalogue import experiment_files, shipped
+from validate.compare.verdict import Accept
+from validate.errors import UsageError
+from validate.parameters import describe
+from validate.replay.declaration import from_json, to_json
+from validate.replay.experiment import Experiment
+from validate.replay.find import load_file
+from validate.replay.measured_body import solid
+from validate.replay.measured_cards import HeldAt, MeasuredBody, Solid, Tissue
+from validate.replay.tree import Tree
+
+NAMES = sorted(experiment_files(shipped().parent))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_json_is_exact(name: str) -> None:
+    declared = experiment(name)
+    assert declared.path is not None
+    text = to_json(declared)
+    again = from_json(text, declared.path, declared)
+    assert to_json(again) == text
+    assert describe(again.parameters) == describe(declared.parameters)
+    assert again.parameters == declared.parameters
+    assert dict(again.methods) == dict(declared.methods)
+    assert (again.accept, again.cases, again.expected) == (
+        declared.accept, declared.cases, declared.expected
+    )  # fmt: skip
+    if isinstance(declared.parameters, Tree):
+        assert str(shipped().parent) not in text
+
+
+def body(**changes: object) -> Experiment:
+    parameters = MeasuredBody(
+        "none.mcap", Solid(block=(0.1, 0.02, 0.02)), Tissue(E=1e5, nu=0.45), HeldAt(all="xmin")
+    )
+    methods = {"linear": solid("linear", "linear"), "large": solid("large strain")}
+    accept = (Accept("marker.x", 1e-3, "a millimetre"),)
+    return Experiment("body", "A beam", "made here", replace(parameters, **changes), methods,
+                      ("linear",), accept)  # fmt: skip
+
+
+def test_a_declaration_without_code_is_its_json_alone(tmp_path: Path) -> None:
+    text = to_json(body())
+    assert "code" not in text
+    (tmp_path / "body.json").write_text(text, "utf-8")
+    found = load_file(tmp_path / "body.json")
+    assert (found.parameters, dict(found.methods)) == (body().parameters, dict(body().methods))
+    assert found.complete
+    assert to_json(found) == text  # what the library adds is no part of it
+    line = refused("run", str(tmp_path / "body.json"), cwd=tmp_path)
+    assert "none.mcap" in line
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"type": "Popen", "args": "rm"}, "type 'Popen' is no part of a declaration"),
+        ({"type": "Guest", "command": "rm x"}, "parameters: 'Guest' runs a program"),
+        ({"code": "twin.record"}, "parameters: is code, which a JSON file does not hold"),
+        ({"type": "MeasuredBody", "bodies": 1}, "parameters: 'bodies' is no field of MeasuredBody"),
+        ({"like": "parameters"}, "is code"),
+        ({"what": 1}, "expected one of type, like, items, code, array, number"),
+        ({"type": "MeasuredBody", "material": {"type": "Material", "E": -1.0, "nu": 0.3}},
+         "parameters.material: modulus E = -1 Pa: expected a positive number"),
+    ],
+)  # fmt: skip
+def test_json_that_is_no_declaration_is_refused_by_its_path(
+    changed: dict[str, object], says: str, tmp_path: Path
+) -> None:
+    document = json.loads(to_json(body()))
+    document["experiment"]["parameters"] = changed
+    (tmp_path / "body.json").write_text(json.dumps(document), "utf-8")
+    with pytest.raises(UsageError) as refusal:
+        load_file(tmp_path / "body.json")
+    assert says in str(refusal.value)
+    assert str(refusal.value).startswith("body.json: ")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 99, "experiment": {}}', "{"])
+def test_other_json_is_no_declaration(text: str, tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text(text, "utf-8")
+    with pytest.raises(UsageError, match=r"x\.json: no "):
+        load_file(tmp_path / "x.json")

@@ -1,1 +1,0 @@
-"""A bar that hangs under its weight: simulators of others against its converged drop."""
