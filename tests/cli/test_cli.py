@@ -16,6 +16,7 @@ import pytest
 from commands import here, refused
 from study_samples import experiment_file
 
+from validate.catalogue import experiment_files
 from validate.cli import (
     bodies,
     calibrating,
@@ -181,7 +182,7 @@ def test_an_experiment_file_anywhere_and_from_any_folder(
 def test_list_names_every_parameter_with_path_type_unit_and_default(project_root: Path) -> None:
     found = json.loads(here("list", "--json")[1])
     names = {e["name"] for e in found}
-    assert names == {f.stem for f in (project_root / "experiments").glob("*.py")}
+    assert names == set(experiment_files(project_root))
     assert names >= {"ecoflex_cylinder", "ekf_cone", "ekf_cube", "fluid_phantom", "kf_cube"}
     detail = json.loads(here("list", "fluid_phantom", "--json")[1])
     paths = {p["path"]: p for p in detail["parameters"]}

@@ -1,5 +1,7 @@
 """`validate new` by questions: from markers, outlines or forces and any body to a verdict."""
 
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from validate.replay import compare
 from validate.replay.find import load_file
 from validate.scene.box import box, grid
 from validate.scene.mesh_file import write_mesh
+from validate.study.job import Job, job_of
 
 E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
 T = np.linspace(0.0, 4.0, 81)
@@ -115,6 +118,30 @@ def test_answers_make_an_experiment_that_runs(here: Path) -> None:
     assert {c.name: c.verdict for c in result.checks} == dict.fromkeys(
         ("force.max@low", "force.max@high", "marker.max@low", "marker.max@high"), "good enough"
     )
+
+
+def _worked(job: Job) -> dict[str, float]:
+    """On a worker: the scores of the job's experiment."""
+    (method,) = compare(job.experiment(), methods=("linear",), quick=True).methods
+    return {s.name: s.value for s in method.scores if s.unit in ("N", "m")}
+
+
+def test_a_declaration_runs_as_json_here_and_on_a_worker(here: Path) -> None:
+    """Nothing of the experiment's file is needed then."""
+    called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    file = here / "experiments" / "mine.py"
+    written = load_file(file)
+    text = called("list", str(file), "--declaration")[1]
+    file.with_suffix(".json").write_text(text, "utf-8")
+    job = job_of(written)
+    assert job.declaration == text.strip()
+    ours = _worked(job)
+    file.unlink()
+    assert len(ours) > 3
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as workers:
+        assert workers.submit(_worked, job).result() == pytest.approx(ours, rel=1e-12)
+    code, shown = called("run", str(file.with_suffix(".json")), "--out", str(here / "reports"))
+    assert (code, (here / "reports" / "mine" / "results.json").is_file()) == (0, True), shown
 
 
 def test_what_is_open_is_asked_all_at_once(here: Path) -> None:

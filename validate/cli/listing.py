@@ -11,6 +11,7 @@ from validate.cli.display import say, table
 from validate.cli.screen import Passage, cut, rows, sentences
 from validate.cli.screen import show as show_screen
 from validate.parameters import Parameter, describe
+from validate.replay.declaration import to_json
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
 from validate.replay.law_solver import laws_of
@@ -30,6 +31,11 @@ def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "sc
         show_screen(_passages(experiment))
     else:
         _in_full(experiment)
+
+
+def declare(name: str, named: tuple[Path, ...]) -> None:
+    """Print the declaration of an experiment as JSON."""
+    print(to_json(find(name, Path.cwd(), named)))
 
 
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:

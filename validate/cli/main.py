@@ -121,7 +121,16 @@ def cli() -> None:
 @EXPERIMENTS
 @click.option("--all", "everything", is_flag=True, help="With NAME: list every parameter.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON document only.")
-def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: bool) -> None:
+@click.option(
+    "--declaration", is_flag=True, help="With NAME: print its declaration, which NAME.json runs."
+)
+def list_(
+    name: str | None,
+    named: tuple[Path, ...],
+    everything: bool,
+    as_json: bool,
+    declaration: bool,
+) -> None:
     """List experiments, or the parameters and methods of one.
 
     \b
@@ -135,11 +144,13 @@ def list_(name: str | None, named: tuple[Path, ...], everything: bool, as_json: 
         return names.show(named, as_json)
     from validate.cli import listing
 
+    if declaration:
+        return listing.declare(name, named)
     return listing.show(name, named, as_json, "full" if everything else "screen")
 
 
 @cli.command("run")
-@click.argument("names", nargs=-1, metavar="NAME|FILE.py ...")
+@click.argument("names", nargs=-1, metavar="NAME|FILE.py|FILE.json ...")
 @click.option("--all", "everything", is_flag=True, help="Every experiment.")
 @EXPERIMENTS
 @click.option(

@@ -67,11 +67,9 @@ _LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "lin
 _SHAPES = ("file", "block", "cylinder")
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance between outlines, as 0.5mm")}  # fmt: skip
-_MOVED = "from validate.replay.measured_body import measured_body, solid"
-_PRESSED = """from validate.replay.measured_body import measured_body
-from validate.replay.measured_contact import touching"""
-_MOVING = """from validate.replay.measured_body import measured_body
-from validate.replay.moving_body import moving"""
+_MOVED = "from validate.replay.measured_body import solid"
+_PRESSED = "from validate.replay.measured_contact import touching"
+_MOVING = "from validate.replay.moving_body import moving"
 _MANY = 5  # classes whose lines would make the file longer than 60
 _PATHS = {p.path for p in describe(MeasuredBody())}
 

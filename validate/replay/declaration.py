@@ -47,6 +47,17 @@ def to_json(experiment: Experiment) -> str:
     return json.dumps(document, indent=1, allow_nan=False)
 
 
+def holds_code(declaration: str) -> bool:
+    """Whether a declaration refers to the code of the experiment's file."""
+
+    def code(value: Any) -> bool:
+        if isinstance(value, dict):
+            return "code" in value or "like" in value or any(map(code, value.values()))
+        return isinstance(value, list) and any(map(code, value))
+
+    return code(json.loads(declaration))
+
+
 def _encoded(value: Any, at: str) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return {"number": str(value)}

@@ -101,6 +101,8 @@ def _place(error: BaseException, path: Path) -> str:
 
 def sources_of(path: Path) -> tuple[Path, ...]:
     """An experiment's file and those beside it that it names."""
+    if path.suffix == ".json":
+        return (path,)
     text = path.read_text(encoding="utf-8")
     whole = path.name == FILE  # whose folder is its own
     beside = (

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any, Generic, Protocol, TypeVar
 
 from validate.errors import UsageError, ValidateError
+from validate.replay.declaration import from_json, holds_code, to_json
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file, sources_of
 from validate.replay.options import folder_of
@@ -45,7 +46,11 @@ class Where:
 @dataclass(frozen=True)
 class Job:
     """What all cells of a study share: the experiment's file, its hash and those of its recordings,
-    values set, quick, command lines of guests."""
+    values set, quick, command lines of guests.
+
+    A `declaration` without code is all that a worker needs: it executes no file. The hash is then
+    that of the declaration.
+    """
 
     path: str
     sha256: str
@@ -53,10 +58,13 @@ class Job:
     values: tuple[tuple[str, str], ...] = ()
     quick: bool = False
     guests: tuple[str, ...] = ()
+    declaration: str = ""
 
     def experiment(self) -> Experiment:
         """Raises `UsageError` when the file is not the one that the study began with."""
         path = Path(self.path)
+        if self.declaration:
+            return from_json(self.declaration, path)
         if file_sha256(path) != self.sha256:
             raise UsageError(
                 f"{path.name} has changed since the study started; start the study again"
@@ -71,7 +79,12 @@ def job_of(
     folder, path = folder_of(experiment), Path(str(experiment.path))
     loaded = experiment.load(experiment.parameters, folder)
     hashes = tuple(r.source.sha256 for r in loaded)
-    return Job(str(path), file_sha256(path), hashes, tuple(sorted((values or {}).items())), quick)
+    set_ = tuple(sorted((values or {}).items()))
+    text = to_json(experiment)
+    if holds_code(text):
+        return Job(str(path), file_sha256(path), hashes, set_, quick)
+    digest_ = hashlib.sha256(text.encode()).hexdigest()
+    return Job(str(path), digest_, hashes, set_, quick, declaration=text)
 
 
 def file_sha256(path: Path) -> str:
