@@ -95,8 +95,8 @@ def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Para
             found += describe(value, prefix, default) if _branches(value) else ()
         elif _branches(value):
             found += describe(value, f"{path}.", default)
-        elif value is not None and not isinstance(value, _LEAVES):
-            continue  # arrays and the like, which are no settings
+        elif not _is_setting(value, hint, meta) or (name == "name" and not meta):
+            continue
         else:
             unit, doc = meta.get("unit", "1"), meta.get("doc", "")
             origin: Origin = "default" if value == default else "entered"
@@ -118,7 +118,16 @@ def _default(settings: Any, name: str, library: Any) -> Any:
     return next(f.default for f in fields(settings) if f.name == name)
 
 
-_LEAVES = (str, int, float, tuple)
+def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
+    """Not names of parts, arrays, and parts of which there are none."""
+    if isinstance(value, tuple) and get_origin(hint) is tuple:
+        return not any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
+    plain = value is None or isinstance(value, str | int | float | tuple)
+    return plain and ("unit" in meta or isinstance(hint, type))
+
+
+def _kinds(hint: Any) -> tuple[Any, ...]:
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
 def _branches(value: Any) -> bool:

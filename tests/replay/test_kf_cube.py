@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import UsageError
-from validate.papers.kf_fem import seeds
-from validate.replay import compare, load
+from validate.replay import compare
 from validate.replay.experiment import Experiment
-from validate.replay.options import Options
+from validate.replay.options import Options, folder_of
 from validate.replay.road import compare as compare_with
 
 pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
@@ -29,8 +29,8 @@ PROBES = ("node_A", "node_B", "corner")
 
 
 @pytest.fixture(scope="module")
-def cube(project_root) -> Experiment:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "kf_cube.py"))
+def cube() -> Experiment:
+    return experiment("kf_cube")
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,7 @@ def some(cube: Experiment) -> Iterator[Result]:
         cube, methods=methods, accepted=("fem",), cases=cube.cases[:1], frames=10,
         published=tuple(f for f in cube.published if f.name not in TIMED),
     )  # fmt: skip
+    seeds = beside("kf_cube", "seeds")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(seeds, "VARIANCES", (seeds.PRINTED,))
         yield compare(reduced)
@@ -60,8 +61,7 @@ def figures(result: Result) -> dict[str, Any]:
 
 
 def test_the_recording_is_what_the_twin_records(cube: Experiment) -> None:
-    folder: Any = None
-    shipped = cube.load(cube.parameters, folder)[0]
+    shipped = cube.load(cube.parameters, folder_of(cube))[0]
     assert cube.twin is not None
     anew = cube.twin.record(cube.parameters, print)
     one, two = shipped.marker("markers"), anew.marker("markers")

@@ -7,6 +7,7 @@ import pytest
 from study_samples import experiment_file
 
 from validate.estimate.filters import FILTERS
+from validate.replay import load
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.study.filter_stability import (
@@ -68,7 +69,7 @@ def test_extremes_of_shipped_filters_end_with_a_reason(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """15 filters of a block, noises a million times off: some diverge, none without a reason."""
-    experiment = load_file(Path(__file__).parents[2] / "experiments" / "kf_cube.py")
+    experiment = load("kf_cube")
     found = filter_endings(experiment, out=tmp_path, where=Where(workers=0))
     assert found is not None
     assert not found.bugs

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beside import experiment
 from study_samples import experiment_file
 
 from validate.errors import SceneError, UsageError
 from validate.fem.system import Responses
 from validate.papers.accuracy.ladders import NEEDLE_LADDER
 from validate.papers.accuracy.needle import MP1, MP2
-from validate.papers.kf_fem.block import PulledBlock
 from validate.papers.kf_fem.ladders import PRINTED_LADDER
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment
@@ -217,7 +217,7 @@ def test_a_rival_takes_the_steps_and_meshes_it_declares() -> None:
 
 def test_printed_settings_are_those_of_the_papers_experiments() -> None:
     """Paper 001's block as its experiment has it; paper 002's materials on one mesh of ten."""
-    own = PulledBlock().material.material
+    own = experiment("kf_cube").parameters.scene.material
     (paper,) = PRINTED_LADDER.body.papers  # type: ignore[union-attr]
     assert (paper.variant.material, paper.dt) == (replace(own, law="linear"), 0.002)
     papers = NEEDLE_LADDER.body.papers  # type: ignore[union-attr]

@@ -31,8 +31,9 @@ class Tree:
 
 
 def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
-    """The one recording that the tree names."""
-    return (read_recording(folder / tree.recording),)
+    """The one recording that the tree names, from the experiment's folder or the current one."""
+    own = folder / tree.recording
+    return (read_recording(own if own.exists() else Path(tree.recording)),)
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ class Material:
         return _PENALTY * self.shear_modulus if self.incompressible else self.bulk_modulus
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Region:
     """Cells (k,) of another material than the scene's: both linear, or both at large strain.
 
@@ -116,3 +116,12 @@ class Region:
     material: Material = None  # type: ignore[assignment]
     where: str = quantity("", "1", "box A to B: cells whose middle lies in it")
     contrast: float = quantity(1.0, "1", "its modulus over the body's, where declared")
+
+    def _key(self) -> tuple[object, ...]:
+        return self.name, self.cells.tobytes(), self.material, self.where, self.contrast
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Region) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())

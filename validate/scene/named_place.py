@@ -42,7 +42,7 @@ def axis_of(text: str) -> tuple[float, ...]:
     word = text.strip().lower()
     if word.lstrip("+-") in tuple(_AXES) and len(word) <= 2:
         sign = -1.0 if word.startswith("-") else 1.0
-        return tuple((sign * np.eye(3)[_AXES.index(word[-1])]).tolist())
+        return tuple((sign * np.eye(3)[_AXES.index(word[-1])] + 0.0).tolist())
     try:
         v = np.array([float(part) for part in text.split(",")])
     except ValueError:

@@ -1,7 +1,6 @@
-"""The block of paper 001 under traction: parameters, scene, twin and registration.
+"""The block of paper 001 under traction: its twin and its registration.
 
-4 x 4 x 7 cells of 1 mm (200 nodes, 672 tetrahedra), held below, pulled on its upper face.
-Places are given on that grid, whatever cells the block has.
+Held below, pulled on its upper face.
 """
 
 from collections.abc import Mapping
@@ -18,45 +17,31 @@ from validate.register.follow import follow_signal
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
 from validate.register.sensing import PoseShift
-from validate.replay.cards import DampedTissue, TimeSteps, TrackedTwin
+from validate.replay.cards import TimeSteps, TrackedTwin
 from validate.replay.experiment import Progress
 from validate.replay.followed import Truth, truth_of
-from validate.scene.box import box, centroids
-from validate.scene.material import Material, Region
+from validate.replay.tree import Built, Tree
+from validate.scene.box import centroids
+from validate.scene.material import Region
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Foundation, Load, Probe, Scene, Support
+from validate.scene.scene import Foundation, Scene
 from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
 from validate.twin.stepped import SteppedTwin
 from validate.twin.tracked import Camera, Origin, Reading
 
-NODES = {"node_A": (2, 2, 7), "node_B": (2, 2, 5), "corner": (0, 0, 7)}  # in cells
-FIDUCIALS = {"f1": (0, 0, 0), "f2": (4, 0, 0), "f3": (0, 4, 0), "f4": (4, 4, 0)}
+_EVERY = (0, 1, 2)
 
 
-@dataclass(frozen=True)
-class BlockCells:
-    cell: float = quantity(1e-3, "m", "edge of a cell")
-    across: int = quantity(4, "1", "cells across")
-    high: int = quantity(7, "1", "cells high")
-
-    @property
-    def mesh(self) -> Mesh:
-        cells = (self.across, self.across, self.high)
-        return box(tuple(n * self.cell for n in cells), cells)
-
-    def places(self, which: Mapping[str, tuple[int, int, int]]) -> dict[str, tuple[float, ...]]:
-        """Points m from places on the 4 x 4 x 7 grid."""
-        across = self.across / 4 * self.cell
-        unit = (across, across, self.high / 7 * self.cell)
-        return {k: tuple(i * u for i, u in zip(ijk, unit, strict=True)) for k, ijk in which.items()}
+def on_springs(stiffness: float | str) -> dict[str, Any]:
+    """The block on springs (N/m^3) in place of its support, as a method's change of the scene."""
+    return {"supports": (), "foundations": (Foundation("z0", _EVERY, stiffness),)}  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
 class Traction:
     traction: float = quantity(3000.0, "Pa", "on the top face, upward")
-    spread: Literal["consistent", "nodal"] = quantity("consistent", "1", "nodal: equal forces")
     a0: StartName = quantity("equilibrium", "1", "first acceleration: M^-1 f, or zero")
     off: float = quantity(0.0, "s", "time at which the traction is released; 0: never")
 
@@ -81,77 +66,47 @@ class LayeredTwin(TrackedTwin):
 
 
 @dataclass(frozen=True)
-class BlockModel:
-    """What a method's scene has besides: a region of the body's own material, or springs."""
-
-    layer: bool = quantity(False, "1", "the middle rows of cells are a region, 'layer'")
-    springs: float = quantity(0.0, "N/m^3", "of an elastic support below; 0: held")
-
-
-@dataclass(frozen=True)
 class PulledBlock:
-    """Parameters; `recording` is a path."""
+    """What the scene does not hold: the traction, the models' steps, the twin, the camera."""
 
-    material: DampedTissue = DampedTissue(rho=1068.0, stiffness_damping=0.1)
-    body: BlockCells = BlockCells()
     loading: Traction = Traction()
     clock: TimeSteps = TimeSteps(0.002, 500)
     twin: LayeredTwin = LayeredTwin()
     registration: MarkerFit = MarkerFit()
     camera: PoseShift = field(default_factory=PoseShift)
-    recording: str = quantity("", "1", "the recording")
 
 
-def build(recording: Recording, p: PulledBlock, model: BlockModel | None) -> Scene:
-    model = model or BlockModel()
-    scene = _scene(p, p.material.material, model.springs)
-    if not model.layer:
-        return scene
-    layer = Region("layer", _stiff_cells(scene.mesh, "layer"), scene.material)
-    return replace(scene, regions=(layer,))
-
-
-def _scene(p: PulledBlock, material: Material, springs: float) -> Scene:
-    """On springs N/m^3, or held below."""
-    every = (0, 1, 2)
-    return Scene(
-        p.body.mesh,
-        material,
-        () if springs else (Support("z0", every),),
-        foundations=(Foundation("z0", every, springs),) if springs else (),
-        loads=(Load("pull", "z1", (0.0, 0.0, 1.0), p.loading.spread),),
-        probes=tuple(Probe(name, at) for name, at in p.body.places(NODES).items()),
-    )
-
-
-def place(recording: Recording, p: PulledBlock, scene: Scene) -> Registered:
-    seen = follow_signal(recording, scene.mesh, "pull", "N", p.registration)
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+    own: PulledBlock = tree.settings
+    seen = follow_signal(recording, scene.mesh, "pull", "N", own.registration)
     pull, markers = seen.observations
     assert isinstance(markers, MarkerObservation)
-    return replace(seen, observations=(pull, p.camera.of(markers)))
+    return replace(seen, observations=(pull, own.camera.of(markers)))
 
 
-def sets(p: PulledBlock, seen: Registered) -> Mapping[str, Any]:
-    return {"dt": p.clock.dt, "a0": p.loading.a0}
+def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
+    return {"dt": tree.settings.clock.dt, "a0": tree.settings.loading.a0}
 
 
 # --- the twin -------------------------------------------------------------------------------------
 
 
-def twin_of(p: PulledBlock) -> SteppedTwin:
+def twin_of(tree: Tree) -> SteppedTwin:
+    own: PulledBlock = tree.settings
     return SteppedTwin(
-        _true_scene(p),
-        lambda dt: Newmark(dt, a0=p.loading.a0),
-        lambda t: _force(p, t),
-        p.clock.dt,
-        p.clock.steps,
-        p.twin.finer,
+        _true_scene(tree),
+        lambda dt: Newmark(dt, a0=own.loading.a0),
+        lambda t: _force(tree, t),
+        own.clock.dt,
+        own.clock.steps,
+        own.twin.finer,
     )
 
 
-def _true_scene(p: PulledBlock) -> Scene:
-    twin = p.twin
-    scene = _scene(p, twin.true(p.material.material), twin.springs)
+def _true_scene(tree: Tree) -> Scene:
+    twin: LayeredTwin = tree.settings.twin
+    scene = Built()(None, tree, on_springs(twin.springs) if twin.springs else None)
+    scene = replace(scene, material=twin.true(scene.material))
     if twin.inside == "nothing":
         return scene
     stiff = replace(scene.material, E=twin.contrast * scene.material.E)
@@ -170,16 +125,19 @@ def _stiff_cells(mesh: Mesh, inside: str) -> Ints:
     return np.flatnonzero(layer & middle)
 
 
-def _force(p: PulledBlock, t: Floats) -> Floats:
+def _force(tree: Tree, t: Floats) -> Floats:
     """The traction's total force (nt,) N at the ends of the twin's steps, (nt,) s."""
-    dt, side = p.clock.dt / p.twin.finer, p.body.across * p.body.cell
-    on = np.where((p.loading.off > 0) & (t > p.loading.off + dt / 2), 0.0, 1.0)
-    return np.asarray(p.loading.traction * side**2 * on)
+    own: PulledBlock = tree.settings
+    dt, (width, depth, _) = own.clock.dt / own.twin.finer, tree.scene.body.size
+    on = np.where((own.loading.off > 0) & (t > own.loading.off + dt / 2), 0.0, 1.0)
+    return np.asarray(own.loading.traction * width * depth * on)
 
 
-def record(p: PulledBlock, progress: Progress) -> Recording:
-    made, twin = twin_of(p), p.twin
+def record(tree: Tree, progress: Progress) -> Recording:
+    made, twin = twin_of(tree), tree.settings.twin
     mesh = made.scene.mesh
+    width, depth, _ = tree.scene.body.size
+    corners = {"f1": (0.0, 0.0), "f2": (width, 0.0), "f3": (0.0, depth), "f4": (width, depth)}
     declared = {
         "element": f"P1 tetrahedra, {len(mesh.nodes)} nodes, {len(mesh.cells)} cells",
         "law": "linear elasticity, Rayleigh damping, average acceleration",
@@ -188,14 +146,14 @@ def record(p: PulledBlock, progress: Progress) -> Recording:
     same = twin == replace(LayeredTwin(), seed=twin.seed, noise=twin.noise)
     return made.record(
         Origin("kf_cube", twin.seed, same, declared),
-        p.body.places(FIDUCIALS),
+        {name: (*corner, 0.0) for name, corner in corners.items()},
         twin.camera,
         lambda run: {"pull": Reading(run.traces["pull.force"].y, "N")},
         progress,
     )
 
 
-def truth(p: PulledBlock, seen: Registered) -> Truth:
+def truth(tree: Tree, seen: Registered) -> Truth:
     """The twin's displacements at the steps, and its fields at 200 of them."""
-    made = twin_of(p)
-    return truth_of(made.run(output_frames(p.clock.steps, 200)), made.scene)
+    made = twin_of(tree)
+    return truth_of(made.run(output_frames(tree.settings.clock.steps, 200)), made.scene)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from validate.arrays import Floats
-from validate.papers.kf_fem.block import PulledBlock, build
 from validate.papers.swinging import swinging_trial
 from validate.recording.types import Recording
 from validate.replay.ladder import (
@@ -14,6 +13,7 @@ from validate.replay.ladder import (
     Turned,
     marker_noise,
 )
+from validate.replay.tree import Built, Tree
 from validate.scene.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
@@ -42,13 +42,13 @@ PRINTED_LADDER = Ladder(
 )
 
 
-def _swing(recording: Recording, p: PulledBlock, quick: bool) -> Trial:
-    base = build(recording, p, None)
-    width, depth, _ = base.mesh.nodes.max(axis=0).tolist()
-    force = p.loading.traction * width * depth
+def _swing(recording: Recording, tree: Tree, quick: bool) -> Trial:
+    base, loading = Built()(recording, tree), tree.settings.loading
+    width, depth, _ = tree.scene.body.size
+    force = loading.traction * width * depth
 
     def inputs(t: Floats) -> Floats:
-        return np.asarray(force * (t < p.loading.off + 1e-9)[:, None])
+        return np.asarray(force * (t < loading.off + 1e-9)[:, None])
 
     frames = np.arange(0.016, 0.5 if quick else 0.97, 0.016)
     steps = (0.004, 0.002, 0.001)

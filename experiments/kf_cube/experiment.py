@@ -5,7 +5,6 @@ The paper measures its own model (same model); what that cannot show stands besi
 the models do not know, nodes that nobody measured, other filters, other solvers.
 """
 
-from pathlib import Path
 from typing import Any
 
 from validate.compare.verdict import Accept
@@ -16,18 +15,18 @@ from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
-from validate.papers.kf_fem.block import BlockModel, PulledBlock, build, place, record, sets, truth
-from validate.papers.kf_fem.figures import FIGURES
+from validate.papers.kf_fem.block import PulledBlock, place, record, sets, truth
 from validate.papers.kf_fem.ladders import PRINTED_LADDER
-from validate.papers.kf_fem.seeds import tell
-from validate.replay.cards import shipped
 from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.method import WALK_UNRECORDED, Method
+from validate.scene.material import Region
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 
-RECORDING = Path(__file__).parents[1] / "recordings" / "kf_cube.mcap"
-PARAMETERS = PulledBlock(recording=str(RECORDING))
+from .published import FIGURES
+from .scene import SCENE
+from .seeds import tell
+
 MM2 = 1e-6
 PRINTED = 1e-3 * MM2  # the paper's .001, read as mm2
 # The paper prints neither the unit nor which matrix its .001 is: this reading gives its NRMSE here.
@@ -97,7 +96,7 @@ METHODS = {
     "roukf_layer": Method(
         "unscented filter of the stiffness of layer and rest, 3 runs",
         Roukf(parameters=("stiffness.layer", "stiffness.body"), sd=(1.0, 0.25)),
-        BlockModel(layer=True),
+        {"regions": (Region("layer", where="box 0,0,3mm to 4mm,4mm,5mm"),)},
         markers=A,
     ),
     "roukf_tied": Method(
@@ -148,7 +147,9 @@ EXPERIMENT = Experiment(
     name="kf_cube",
     title="Kalman filter finite elements on a block under traction",
     source="paper 001 (KF-FEM), section 3, Table 1",
-    parameters=PARAMETERS,
+    recording="../../recordings/kf_cube.mcap",
+    scene=SCENE,
+    settings=PulledBlock(),
     methods=METHODS,
     accepted=("fem", "kf_reduced"),
     accept=(
@@ -165,8 +166,6 @@ EXPERIMENT = Experiment(
             statistic="rms",
         ),
     ),
-    load=shipped,
-    build=build,
     place=place,
     sets=sets,
     axis="z",
@@ -185,7 +184,7 @@ EXPERIMENT = Experiment(
         truth,
         remake=("twin.", "clock.", "body.", "loading.traction", "loading.off"),
         kind="same model",
-        seed=PARAMETERS.twin.seed,
+        seed=PulledBlock().twin.seed,
         notice="The recording is a twin: the same mesh and law as the models, plus white noise.",
     ),
 )

@@ -67,8 +67,8 @@ def _printed(
 ) -> DisplacementStepper:
     """The filter as printed, seen at the observed node at every step."""
     settings = ModalKf(
-        parameters.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,
-        recursion=recursion, gains="shared", a0=parameters.loading.a0,  # type: ignore[arg-type]
+        parameters.settings.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,
+        recursion=recursion, gains="shared", a0=parameters.settings.loading.a0,
     )  # fmt: skip
     given = measurements(followed.seen, system.scene.mesh).of("node_A")
     every = replace(given, t=followed.seen.t, z=np.zeros((len(followed.run.t), 3)))

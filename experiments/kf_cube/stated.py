@@ -1,15 +1,16 @@
 """Numbers that paper 001 states, sets or times on its machine, and its pictures."""
 
-import numpy as np
-
-from validate.papers.kf_fem.block import NODES, PulledBlock
-from validate.papers.kf_fem.seeds import PRINTED
+from validate.papers.kf_fem.block import PulledBlock
 from validate.papers.stated import MACHINE, drawn, said, taken
+
+from .scene import SCENE
+from .seeds import PRINTED
 
 _P = PulledBlock()
 _TABLE = "section 3, Table 1"
-_WIDE, _DEEP, _HIGH = np.ptp(_P.body.mesh.nodes, axis=0).tolist()
-_BELOW = (NODES["node_A"][2] - NODES["node_B"][2]) * _P.body.cell
+_WIDE, _DEEP, _HIGH = SCENE.body.size
+_A, _B, _ = (probe.point[2] for probe in SCENE.probes)
+_BELOW = _A - _B
 
 STATED = (
     said("Fig. 1: block diagram of the filter", None, "1", "section 2.2, Fig. 1",
@@ -21,12 +22,12 @@ STATED = (
     taken("time increment", 0.002, _P.clock.dt, "s", _TABLE),
     taken("applied force over its area", 3000.0, _P.loading.traction, "Pa", _TABLE,
           "an input; taken as a consistent traction, because equal nodal forces pull 7 % less"),
-    taken("Rayleigh's alpha 0", 0.0, _P.material.mass_damping, "1/s", _TABLE),
-    taken("Rayleigh's alpha 1", 0.1, _P.material.stiffness_damping, "s", _TABLE),
-    taken("density", 1068.0, _P.material.rho, "kg/m^3", _TABLE),
-    taken("Poisson's ratio", 0.47, _P.material.nu, "1", _TABLE),
-    taken("Young's modulus", 10e3, _P.material.E, "Pa", _TABLE),
-    taken("edge of an element", 1e-3, _P.body.cell, "m", "section 3",
+    taken("Rayleigh's alpha 0", 0.0, SCENE.material.mass_damping, "1/s", _TABLE),
+    taken("Rayleigh's alpha 1", 0.1, SCENE.material.stiffness_damping, "s", _TABLE),
+    taken("density", 1068.0, SCENE.material.rho, "kg/m^3", _TABLE),
+    taken("Poisson's ratio", 0.47, SCENE.material.nu, "1", _TABLE),
+    taken("Young's modulus", 10e3, SCENE.material.E, "Pa", _TABLE),
+    taken("edge of an element", 1e-3, _HIGH / SCENE.body.cells[2], "m", "section 3",
           "an input; the cells' edges, diagonals of the tetrahedra are longer"),
     said("Fig. 2: mesh with the observation point", None, "1", "section 3, Fig. 2",
          "a figure without numbers: the report draws ours"),

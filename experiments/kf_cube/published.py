@@ -3,8 +3,9 @@
 from collections.abc import Callable
 
 from validate.compare.published import Figure, Values
-from validate.papers.kf_fem.seeds import SEEDS
-from validate.papers.kf_fem.stated import STATED
+
+from .seeds import SEEDS
+from .stated import STATED
 
 _BOXES = "a count of our mesh: 5 x 5 x 8 nodes, six tetrahedra a box"
 _TABLE = "section 3, Table 1"

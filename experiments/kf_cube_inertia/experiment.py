@@ -5,37 +5,34 @@ be told from another. Here the traction is switched on and released, the block s
 its axis at 12 Hz, and the twin takes ten steps in one of the models'.
 """
 
-from dataclasses import replace
-from pathlib import Path
-
 from validate.compare.verdict import Accept
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
-from validate.papers.kf_fem.block import BlockModel
+from validate.papers.kf_fem.block import (
+    LayeredTwin,
+    PulledBlock,
+    Traction,
+    on_springs,
+    place,
+    record,
+    sets,
+    truth,
+)
 from validate.papers.kf_fem.ladders import SWINGING_LADDER
-from validate.replay.experiment import Case, StepLadder, Uncertainty
-from validate.replay.find import load_file
+from validate.replay.experiment import Case, Experiment, Twin, vary
 from validate.replay.method import WALK_UNRECORDED, Method
+from validate.scene.geometry import Box
+from validate.scene.material import Material
+from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.modal import Modal
 from validate.solve.newmark import Newmark
 from validate.solve.quasi_static import QuasiStatic
 
-CREEPING = load_file(Path(__file__).with_name("kf_cube.py"))
-_p, _twin = CREEPING.parameters, CREEPING.twin
-assert _twin is not None
-PARAMETERS = replace(
-    _p,
-    material=replace(_p.material, stiffness_damping=1e-3),
-    body=replace(_p.body, cell=0.01),
-    loading=replace(_p.loading, traction=300.0, a0="zero", off=0.4),
-    twin=replace(_p.twin, finer=10, seed=2),
-    recording=str(Path(__file__).parents[1] / "recordings" / "kf_cube_inertia.mcap"),
-)
 A = ("node_A",)
 PRINTED = 1e-9  # m2
 # The joint filter's scene: the block on springs, whose stiffness and whose load nobody knows.
-SPRINGS = BlockModel(springs=3e5)
+SPRINGS = on_springs("300 kN/m3")
 METHODS = {
     "average": Method("FEM, average acceleration", Newmark()),
     "generalised_alpha": Method("FEM, generalised alpha", Newmark(rule="generalised_alpha")),
@@ -59,25 +56,38 @@ METHODS = {
 RIVALS = ("average", "kf_printed", "kf_load", "kf_reduced")
 
 
-SOFT_BASE = Case(
-    "soft_base",
-    "the truth has supporting springs of 450 kN/m3, the model of the joint filter 300",
-    {"twin.springs": 4.5e5},
-    methods=(*RIVALS, "roukf_support"),
-)
+CASES = (
+    Case("stiff_model", "the models are 20 % stiffer than the truth",
+         {"twin.stiffness": 1 / 1.2}, methods=RIVALS),
+    Case("layer", "the truth has a stiff layer (five times) at mid-height",
+         {"twin.inside": "layer"}, methods=RIVALS),
+    Case("sparse", "models are 20 % stiffer, measured every 10th step, a fifth missing",
+         {"twin.stiffness": 1 / 1.2, "twin.every": 10, "twin.missing": 0.2}, methods=RIVALS),
+    Case("soft_base",
+         "the truth has supporting springs of 450 kN/m3, the model of the joint filter 300",
+         {"twin.springs": 4.5e5}, methods=(*RIVALS, "roukf_support")),
+)  # fmt: skip
 
-
-def _named(name: str) -> Case:
-    case = next(c for c in CREEPING.cases if c.name == name)
-    return replace(case, methods=RIVALS)
-
-
-EXPERIMENT = replace(
-    CREEPING,
+EXPERIMENT = Experiment(
     name="kf_cube_inertia",
     title="Kalman filter finite elements where inertia matters",
     source="in addition to paper 001 (KF-FEM), whose scene is nearly static",
-    parameters=PARAMETERS,
+    recording="../../recordings/kf_cube_inertia.mcap",
+    scene=Scene(
+        body=Box(("40 mm", "40 mm", "70 mm"), cells=(4, 4, 7)),
+        material=Material("10 kPa", 0.47, rho="1068 kg/m3", stiffness_damping="1 ms"),
+        supports=(Support("z0"),),
+        loads=(Load("pull", "z1", "+z"),),
+        probes=(
+            Probe("node_A", ("20 mm", "20 mm", "70 mm")),
+            Probe("node_B", ("20 mm", "20 mm", "50 mm")),
+            Probe("corner", ("0 mm", "0 mm", "70 mm")),
+        ),
+    ),
+    settings=PulledBlock(
+        loading=Traction(traction=300.0, a0="zero", off=0.4), twin=LayeredTwin(finer=10, seed=2)
+    ),
+    variations=(vary("dt", "x 0.5 0.25, order 2"),),
     methods=METHODS,
     accepted=("kf_reduced",),
     accept=(
@@ -94,15 +104,23 @@ EXPERIMENT = replace(
             statistic="rms",
         ),
     ),
+    place=place,
+    sets=sets,
+    axis="z",
     reference="average",
-    uncertainty=Uncertainty(steps=StepLadder(2.0)),
-    cases=(*(_named(name) for name in ("stiff_model", "layer", "sparse")), SOFT_BASE),
-    exhibits=None,
+    cases=CASES,
     ladder=SWINGING_LADDER,
-    published=(),
-    twin=replace(
-        _twin,
-        seed=PARAMETERS.twin.seed,
+    captions={
+        "displacement_node_A": "As Figs. 3 and 4 of paper 001: measurement, FEM and KF-FEM.",
+        "displacement_node_B": "As Fig. 5 of paper 001: a node 2 mm below, which no filter "
+        "receives.",
+    },
+    twin=Twin(
+        record,
+        truth,
+        remake=("twin.", "clock.", "body.", "loading.traction", "loading.off"),
+        kind="same model",
+        seed=2,
         notice=(
             "The recording is a twin: the same mesh and law as the models, ten of its steps in one "
             "of theirs, plus white noise. Models know the load at the ends of their steps only, so "
