@@ -121,7 +121,7 @@ def _default(settings: Any, name: str, library: Any) -> Any:
 def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
     """Not names of parts, arrays, and parts of which there are none."""
     if isinstance(value, tuple) and get_origin(hint) is tuple:
-        return not any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
+        return "unit" in meta and not any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
     plain = value is None or isinstance(value, str | int | float | tuple)
     return plain and ("unit" in meta or isinstance(hint, type))
 

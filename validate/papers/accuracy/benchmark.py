@@ -2,7 +2,7 @@
 
 What its two experiments share: the twin, which is `Newmark` with consistent mass and full damping
 on the models' own mesh and step (as in the paper) or on finer ones, its recording by a tracker, and
-the methods' inputs. An experiment gives the scene, the input and the places of the fiducials.
+the methods' inputs. An experiment gives the input and the places of the fiducials.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,12 +16,12 @@ from validate.recording.types import Recording
 from validate.register.fitting import MarkerFit
 from validate.register.follow import follow_signal
 from validate.register.registered import Registered
-from validate.replay.cards import DampedTissue, TimeSteps
+from validate.replay.cards import TimeSteps
 from validate.replay.experiment import Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
-from validate.scene.material import Material
-from validate.scene.scene import PlaneState, Scene
+from validate.replay.tree import Built, Tree
+from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
@@ -32,18 +32,6 @@ from validate.twin.tracked import Camera, Origin, Reading
 FRAMES = 300  # all steps of 10 s: errors are drawn over time
 IMPLICIT = Newmark(STEP, drive_rates="given")
 EXPLICIT = ExplicitLinear(STEP, "consistent", "full", drive_rates="given")
-
-
-def card(m: Material) -> DampedTissue:
-    """A material with density as parameters."""
-    assert m.rho is not None
-    return DampedTissue(m.E, m.nu, m.rho, m.mass_damping, m.stiffness_damping)
-
-
-@dataclass(frozen=True)
-class Cells:
-    cells: int = quantity(20, "1", "cells across")
-    plane: PlaneState = quantity("strain", "1", "strain or stress, in 2-D")
 
 
 @dataclass(frozen=True)
@@ -58,25 +46,21 @@ class RefinedTwin:
 
 @dataclass(frozen=True)
 class SolverTest:
-    """Of one benchmark; `recording` is a path."""
+    """Of one benchmark, in addition to its scene."""
 
-    material: DampedTissue
-    body: Cells
     clock: TimeSteps
-    twin: RefinedTwin
-    recording: str = quantity("", "1", "the recording")
+    twin: RefinedTwin = RefinedTwin()
     registration: MarkerFit = MarkerFit()
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """`scene(material, body)` and its one input (nt,) in `unit` at times (nt,) s.
+    """The scene's one input (nt,) in `unit` at times (nt,) s.
 
     `fiducials` (d,) m are points that do not move.
     """
 
     name: str
-    scene: Callable[[Material, Cells], Scene]
     input: str
     unit: str
     values: Callable[[Floats], Floats]
@@ -84,35 +68,34 @@ class Benchmark:
 
     # --- the road ---------------------------------------------------------------------------------
 
-    def build(self, recording: Recording, p: SolverTest, model: None) -> Scene:
-        return self.scene(p.material.material, p.body)
+    def place(self, recording: Recording, p: Tree, scene: Scene) -> Registered:
+        how = p.settings.registration
+        return follow_signal(recording, scene.mesh, self.input, self.unit, how)
 
-    def place(self, recording: Recording, p: SolverTest, scene: Scene) -> Registered:
-        return follow_signal(recording, scene.mesh, self.input, self.unit, p.registration)
-
-    def sets(self, p: SolverTest, seen: Registered) -> Mapping[str, Any]:
-        return {"dt": p.clock.dt}
+    def sets(self, p: Tree, seen: Registered) -> Mapping[str, Any]:
+        return {"dt": p.settings.clock.dt}
 
     # --- the twin ---------------------------------------------------------------------------------
 
-    def twin(self, p: SolverTest) -> SteppedTwin:
-        body = replace(p.body, cells=p.body.cells * p.twin.refined)
+    def twin(self, p: Tree) -> SteppedTwin:
+        own: SolverTest = p.settings
+        cells = tuple(n * own.twin.refined for n in p.scene.body.cells)
         return SteppedTwin(
-            self.scene(p.material.material, body),
+            Built()(None, p, {"body.cells": cells}),
             lambda dt: replace(IMPLICIT, dt=dt),
             self.values,
-            p.clock.dt,
-            p.clock.steps,
-            p.twin.finer,
+            own.clock.dt,
+            own.clock.steps,
+            own.twin.finer,
         )
 
     def made(self, notice: str) -> Twin:
         """The experiment's twin, with what its report says of it."""
-        prefixes = ("body.", "clock.", "twin.")
+        prefixes = ("body.", "plane", "clock.", "twin.")
         return Twin(self.record, self.truth, prefixes, "same model", RefinedTwin().seed, notice)
 
-    def record(self, p: SolverTest, progress: Progress) -> Recording:
-        made, twin = self.twin(p), p.twin
+    def record(self, p: Tree, progress: Progress) -> Recording:
+        made, twin = self.twin(p), p.settings.twin
         scene = made.scene
         declared = {
             "element": f"{scene.mesh.kind}, {len(scene.mesh.nodes)} nodes",
@@ -127,10 +110,10 @@ class Benchmark:
             progress,
         )
 
-    def truth(self, p: SolverTest, seen: Registered) -> Truth:
+    def truth(self, p: Tree, seen: Registered) -> Truth:
         """The twin's displacements at the steps, and its fields at the frames."""
         made = self.twin(p)
-        return truth_of(made.run(output_frames(p.clock.steps, FRAMES)), made.scene)
+        return truth_of(made.run(output_frames(p.settings.clock.steps, FRAMES)), made.scene)
 
 
 # --- methods and cases ----------------------------------------------------------------------------

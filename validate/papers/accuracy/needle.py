@@ -13,6 +13,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.scene.box import grid
+from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, PlaneState, Probe, Scene, Support
@@ -26,6 +27,16 @@ SPEED = 0.08  # m/s
 STOP = 2.0  # s
 
 
+#: Probes lie on the free side, and inside.
+BLOCK = Scene(
+    body=Box((1.0, 1.0), cells=(20, 20), element="quad4"),
+    material=MP1,
+    supports=tuple(Support(side, (0, 1)) for side in ("x0", "y0", "y1")),
+    drives=(Drive("needle", "x1", (-1.0, 0.0), (1.0, 0.5), ((0.0, SPEED), (STOP, 0.0))),),
+    probes=(Probe("side", (1.0, 0.25)), Probe("inside", (0.75, 0.5))),
+)
+
+
 def needle_block(n: int, material: Material = MP1, plane: PlaneState = "strain") -> Scene:
     """n x n quadrilaterals, the drive "needle" at (1, 0.5) m; forces are N per metre.
 
@@ -35,14 +46,7 @@ def needle_block(n: int, material: Material = MP1, plane: PlaneState = "strain")
     """
     if n < 2 or n % 2:
         raise SceneError(f"needle block of {n} cells a side: an even number, so that a node is hit")
-    return Scene(
-        grid((1.0, 1.0), (n, n)),
-        material,
-        tuple(Support(side, (0, 1)) for side in ("x0", "y0", "y1")),
-        drives=(Drive("needle", "x1", (-1.0, 0.0), (1.0, 0.5), ((0.0, SPEED), (STOP, 0.0))),),
-        probes=(Probe("side", (1.0, 0.25)), Probe("inside", (0.75, 0.5))),
-        plane=plane,
-    )
+    return replace(BLOCK, material=material, plane=plane).resolved(grid((1.0, 1.0), (n, n)))
 
 
 def needle_depth(t: Floats) -> Floats:

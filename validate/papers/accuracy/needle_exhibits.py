@@ -12,7 +12,7 @@ from validate.compare.pair import Common
 from validate.fem.mixed import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES, SolverTest
+from validate.papers.accuracy.benchmark import FIVE, FRAMES, IMPLICIT, SWITCHES
 from validate.papers.accuracy.beyond import BLOCK, beyond
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
@@ -46,6 +46,7 @@ from validate.papers.accuracy.needle import (
 from validate.papers.accuracy.rules import rules_exhibit
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
+from validate.replay.tree import Tree
 from validate.scene.material import Material
 from validate.scene.scene import PlaneState, Scene
 from validate.solve.dynamic import elastic_forces
@@ -68,7 +69,7 @@ _SWEPT = (10, 20, 30)  # cells a side
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the needle's block, and the numbers of its printed figures."""
-    p, main = cast(SolverTest, parameters), cases[""]
+    p, main = cast(Tree, parameters), cases[""]
     progress("errors over time")
     errors = errors_on(main, TABLED, RIVALS)
     shown = errors_exhibit(errors, 2, _FIGURES, _words(errors))
@@ -77,8 +78,8 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     prostate, ends = _materials(p, cases)
     progress("static solution")
     system = build_system(main["implicit"].body)
-    t: Floats = p.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
-    still, end = static_exhibit(system, _SETTLING, p.clock.dt, _LONG, needle_depth(t))
+    t: Floats = p.settings.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
+    still, end = static_exhibit(system, _SETTLING, p.settings.clock.dt, _LONG, needle_depth(t))
     progress("critical steps")
     limits = _limits()
     progress("Gauss-Seidel")
@@ -163,7 +164,7 @@ def _side(main: Mapping[str, Followed], t: float) -> Chart:
 # --- materials: figure 11 ------------------------------------------------------------------------
 
 
-def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
+def _materials(p: Tree, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     """MP1's answers and MP2's own quasi-statics against the implicit run with MP2."""
     case = cases["prostate"]
     errors = errors_on(case, ("E_n", "E_s", "E_i"), ("implicit", *RIVALS))
@@ -201,12 +202,12 @@ def _materials(p: SolverTest, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     )
 
 
-def _by_scene(p: SolverTest) -> NumberTable:
+def _by_scene(p: Tree) -> NumberTable:
     """E_n of the rivals for both materials in both plane states, each against its own truth."""
     rows: list[tuple[Entry, ...]] = []
     for material, properties in MATERIALS.items():
         for plane in PLANES:
-            scene = needle_block(p.body.cells, properties, plane)
+            scene = needle_block(p.scene.body.cells[0], properties, plane)
             truth = _run(scene, FIVE["implicit"].settings, p)
             frames = at_instants(truth)
             for name in RIVALS:
@@ -227,16 +228,16 @@ def _e_n(run: Run, truth: Run, k: int) -> float:
     return float(np.linalg.norm(run.u[k] - truth.u[k]) / np.linalg.norm(truth.u[k]))
 
 
-def _refusals(p: SolverTest) -> str:
-    scene = needle_block(p.body.cells, MP2, p.body.plane)
+def _refusals(p: Tree) -> str:
+    scene = needle_block(p.scene.body.cells[0], MP2, p.scene.plane)
     run = _run(scene, FIVE["explicit"].settings, p)
     return f"The explicit method with MP2 is {run.outcome.state}: {run.outcome.why}."
 
 
-def _run(scene: Scene, settings: Any, p: SolverTest) -> Run:
-    steps = p.clock.steps
-    t: Floats = p.clock.dt * np.arange(1, steps + 1, dtype=np.float64)
-    stepper = replace(settings, **({"dt": p.clock.dt} if hasattr(settings, "dt") else {}))
+def _run(scene: Scene, settings: Any, p: Tree) -> Run:
+    steps = p.settings.clock.steps
+    t: Floats = p.settings.clock.dt * np.arange(1, steps + 1, dtype=np.float64)
+    stepper = replace(settings, **({"dt": p.settings.clock.dt} if hasattr(settings, "dt") else {}))
     prepared = stepper.prepare(build_system(scene))
     return march("own", prepared, t, needle_depth(t), output_frames(steps, FRAMES), 0.0)
 

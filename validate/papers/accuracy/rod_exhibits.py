@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.papers.accuracy.benchmark import FIVE, IMPLICIT, SolverTest
+from validate.papers.accuracy.benchmark import FIVE, IMPLICIT
 from validate.papers.accuracy.beyond import ROD, beyond
 from validate.papers.accuracy.errors import (
     LIMIT_HEADS,
@@ -33,6 +33,7 @@ from validate.papers.accuracy.errors import (
 from validate.papers.accuracy.rod import GRAVITY, MP3, SIZE, bending_rod, gravity_inputs
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases
+from validate.replay.tree import Tree
 from validate.solve.march import march
 
 _FIGURES = {
@@ -49,15 +50,15 @@ _MOVING = 4.0  # s: until here the rod falls
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the rod, and the numbers of its printed figures."""
-    p, main = cast(SolverTest, parameters), cases[""]
+    p, main = cast(Tree, parameters), cases[""]
     progress("errors over time")
     errors = errors_on(main, TABLED, RIVALS)
     shown = errors_exhibit(errors, 3, _FIGURES, _words(errors))
     switches, ratio = switches_exhibit(main, 3)
     progress("static solution")
-    t: Floats = p.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
+    t: Floats = p.settings.clock.dt * np.arange(1, _LONG + 1, dtype=np.float64)
     system = build_system(main["implicit"].body)
-    still, end = static_exhibit(system, FIVE, p.clock.dt, _LONG, gravity_inputs(t))
+    still, end = static_exhibit(system, FIVE, p.settings.clock.dt, _LONG, gravity_inputs(t))
     progress("first crossing by mesh")
     dip, crossings = _dips()
     progress("meshes")
@@ -166,8 +167,11 @@ def beam(*, shear: bool) -> float:
     return bending + (q * length**2 / (2 * kappa * MP3.shear_modulus * b * h) if shear else 0.0)
 
 
-def _limits(p: SolverTest) -> Exhibit:
-    rows = [limit_row(f"n = {n}", build_system(bending_rod(n)), p.clock.dt) for n in _MESHES[:-1]]
+def _limits(p: Tree) -> Exhibit:
+    rows = [
+        limit_row(f"n = {n}", build_system(bending_rod(n)), p.settings.clock.dt)
+        for n in _MESHES[:-1]
+    ]
     table = NumberTable(
         "limits", "Critical steps of the explicit schemes with full C, exact.", LIMIT_HEADS,
         tuple(rows),

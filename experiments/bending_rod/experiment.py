@@ -4,8 +4,6 @@ As in the paper the truth is the implicit run with consistent mass on the same m
 beside it stand truths on a finer mesh and with smaller steps.
 """
 
-from pathlib import Path
-
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.papers.accuracy.benchmark import (
@@ -13,30 +11,18 @@ from validate.papers.accuracy.benchmark import (
     FRAMES,
     SWITCHES,
     Benchmark,
-    Cells,
-    RefinedTwin,
     SolverTest,
-    card,
     solvers,
 )
 from validate.papers.accuracy.figures import ROD_FIGURES
 from validate.papers.accuracy.ladders import ROD_LADDER
 from validate.papers.accuracy.needle import STEP
-from validate.papers.accuracy.rod import MP3, SIZE, bending_rod, gravity_inputs
+from validate.papers.accuracy.rod import ROD, SIZE, gravity_inputs
 from validate.papers.accuracy.rod_exhibits import tell
-from validate.replay.cards import TimeSteps, shipped
+from validate.replay.cards import TimeSteps
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
-from validate.scene.material import Material
-from validate.scene.scene import Scene
 from validate.solve.modal import Modal
-
-RECORDING = Path(__file__).parents[1] / "recordings" / "bending_rod.mcap"
-PARAMETERS = SolverTest(card(MP3), Cells(3), TimeSteps(STEP, 300), RefinedTwin(), str(RECORDING))
-
-
-def scene(material: Material, body: Cells) -> Scene:
-    return bending_rod(body.cells, material)
 
 
 def gravity(t: Floats) -> Floats:
@@ -45,7 +31,6 @@ def gravity(t: Floats) -> Floats:
 
 BENCHMARK = Benchmark(
     "bending_rod",
-    scene,
     "gravity",
     "m/s^2",
     gravity,
@@ -74,12 +59,12 @@ EXPERIMENT = Experiment(
     name="bending_rod",
     title="Solvers against the implicit run on a rod that bends under gravity",
     source="paper 002 (accuracy metrics and benchmarks), sections IV.B and VI",
-    parameters=PARAMETERS,
+    recording="../../recordings/bending_rod.mcap",
+    scene=ROD,
+    settings=SolverTest(TimeSteps(STEP, 300)),
     methods=METHODS,
     accepted=("explicit",),
     accept=(Accept("tip", 2e-3, "2 % of the largest displacement there"),),
-    load=shipped,
-    build=BENCHMARK.build,
     place=BENCHMARK.place,
     sets=BENCHMARK.sets,
     axis="z",

@@ -5,8 +5,6 @@ implicit run with consistent mass on the same mesh; beside it stand truths that 
 know: the prostate's material, a finer mesh, smaller steps, plane stress.
 """
 
-from pathlib import Path
-
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.papers.accuracy.benchmark import (
@@ -14,29 +12,17 @@ from validate.papers.accuracy.benchmark import (
     FRAMES,
     SWITCHES,
     Benchmark,
-    Cells,
-    RefinedTwin,
     SolverTest,
-    card,
     solvers,
 )
 from validate.papers.accuracy.figures import NEEDLE_FIGURES
 from validate.papers.accuracy.ladders import NEEDLE_LADDER
-from validate.papers.accuracy.needle import MP1, MP2, STEP, needle_block, needle_depth
+from validate.papers.accuracy.needle import BLOCK, MP2, STEP, needle_depth
 from validate.papers.accuracy.needle_exhibits import tell
-from validate.replay.cards import TimeSteps, shipped
+from validate.replay.cards import TimeSteps
 from validate.replay.experiment import Case, Experiment
 from validate.replay.method import Method
-from validate.scene.material import Material
-from validate.scene.scene import Scene
 from validate.solve.modal import Modal
-
-RECORDING = Path(__file__).parents[1] / "recordings" / "needle_block.mcap"
-PARAMETERS = SolverTest(card(MP1), Cells(20), TimeSteps(STEP, 300), RefinedTwin(), str(RECORDING))
-
-
-def scene(material: Material, body: Cells) -> Scene:
-    return needle_block(body.cells, material, body.plane)
 
 
 def depth(t: Floats) -> Floats:
@@ -45,7 +31,6 @@ def depth(t: Floats) -> Floats:
 
 BENCHMARK = Benchmark(
     "needle_block",
-    scene,
     "needle",
     "m",
     depth,
@@ -60,28 +45,28 @@ METHODS = {
 }
 CASES = (
     Case("prostate", "the truth is MP2, the models are MP1",
-         {"material": card(MP2)}, methods=tuple(FIVE)),
+         {"material": MP2}, methods=tuple(FIVE)),
     Case("finer_mesh", "the truth has twice as many cells a side",
          {"twin.refined": 2}, methods=tuple(FIVE)),
     Case("small_steps", "the truth takes 20 steps in one of the models'",
          {"twin.finer": 20}, methods=tuple(FIVE)),
     Case("plane_stress", "the truth is in plane stress, the models in plane strain",
-         {"body.plane": "stress"}, methods=tuple(FIVE)),
+         {"plane": "stress"}, methods=tuple(FIVE)),
 )  # fmt: skip
 
 EXPERIMENT = Experiment(
     name="needle_block",
     title="Solvers against the implicit run on a block poked by a needle",
     source="paper 002 (accuracy metrics and benchmarks), sections IV.A and VI",
-    parameters=PARAMETERS,
+    recording="../../recordings/needle_block.mcap",
+    scene=BLOCK,
+    settings=SolverTest(TimeSteps(STEP, 300)),
     methods=METHODS,
     accepted=("explicit",),
     accept=(
         Accept("side", 1e-3, "a few percent of the largest displacement there"),
         Accept("inside", 1e-3, "a few percent of the largest displacement there"),
     ),
-    load=shipped,
-    build=BENCHMARK.build,
     place=BENCHMARK.place,
     sets=BENCHMARK.sets,
     axis="x",
