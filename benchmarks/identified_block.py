@@ -56,7 +56,6 @@ def scene(p: Block) -> Scene:
         (Support("z0", (0, 1, 2)), Support("z1", (0, 1))),
         drives=(Drive("stage", "z1", (0.0, 0.0, -1.0)),),
         probes=tuple(Probe(name, at) for name, at in BULGES.items()),
-        dilatation="nodal",
     )
 
 

@@ -23,7 +23,7 @@ import pytest
 
 from validate.compare.result import Result
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
+from validate.replay.find import find
 from validate.replay.options import Options
 from validate.replay.road import compare
 
@@ -69,7 +69,7 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def phantom(project_root: Path) -> Experiment:
-    return load_file(project_root / "experiments" / "fluid_phantom.py")
+    return find("fluid_phantom", project_root)
 
 
 @pytest.fixture(scope="session")
@@ -84,6 +84,6 @@ def whole(project_root: Path) -> Callable[[str], Result]:
 
     @cache
     def run(name: str) -> Result:
-        return compare(load_file(project_root / "experiments" / f"{name}.py"), Options({}))
+        return compare(find(name, project_root), Options({}))
 
     return run

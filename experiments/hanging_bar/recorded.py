@@ -17,7 +17,7 @@ from validate.datasets.home import found
 from validate.parameters import quantity
 from validate.recording.formats.npz_points import read_arrays
 from validate.recording.types import Recording, Signal
-from validate.register.given import given_inputs
+from validate.register.as_declared import given_inputs
 from validate.register.observation import Deviation, Role, Selection, Simulated
 from validate.register.registered import Registered
 from validate.replay.tree import Tree

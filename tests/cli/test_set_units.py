@@ -35,7 +35,7 @@ def test_units_reach_parameters_and_lists(phantom: Experiment, project_root: Pat
     assert parameters.loads == phantom.parameters.loads
     block = find("kf_cube", project_root)
     parameters, methods = configure(block, Options({"clock.dt": "1ms", "methods.fem.dt": "1ms"}))
-    assert (parameters.clock.dt, methods["fem"].settings.dt) == (0.001, 0.001)
+    assert (parameters.settings.clock.dt, methods["fem"].settings.dt) == (0.001, 0.001)
 
 
 def test_a_modulus_a_thousand_off_is_asked_about_wherever_it_is_set(

@@ -8,12 +8,11 @@ from calibrating import NU, OPEN, E, Open
 
 from validate.replay.calibrated import calibrated, closed, identified_by
 from validate.replay.calibration import Calibrates, Calibration
-from validate.replay.cards import moved
-from validate.replay.experiment import Experiment, Identified, Input, Uncertainty
+from validate.replay.experiment import Experiment, Identified, Uncertainty, vary
 
 INPUTS = (
-    Input("Poisson ratio", moved("", nu=lambda p, z: (p.nu or 0.0) + 0.02 * z), "nu", "assumed"),
-    Input("other specimens", moved("", E=lambda p, z: p.E * (1 + 0.05 * z)), "E", "assumed"),
+    vary("nu", "absolute 0.02, below 0.5", "Poisson ratio"),
+    vary("E", "relative 5 %", "other specimens"),
 )
 DOUBTED: Experiment = replace(OPEN, uncertainty=Uncertainty(inputs=INPUTS, surrogate="fem"))
 

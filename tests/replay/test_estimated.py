@@ -78,7 +78,7 @@ def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
     project_root: Path,
 ) -> None:
     """`--set methods.roukf.parameters=...`; the block creeps alike whatever its modulus."""
-    cube = load(str(project_root / "experiments" / "kf_cube.py"))
+    cube = load("kf_cube")
     methods = {name: cube.methods[name] for name in ("fem", "roukf")}
     short = replace(
         cube, methods=methods, accepted=("fem",), cases=(), published=(), exhibits=None, frames=5

@@ -16,11 +16,11 @@ from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
-from validate.replay.cards import changed
 from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin, Uncertainty
 from validate.replay.options import Options
 from validate.replay.remade import stamped
 from validate.replay.road import compare
+from validate.replay.variation import change_of
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
@@ -31,7 +31,7 @@ FEM = {"fem": TINY.methods["fem"]}
 def other_model(**more: Any) -> Experiment:
     """The block and its twin, declared as made by another model; the twin is a file."""
     twin = replace(TINY.twin or Twin(record), kind="twin", remake=("twin.", "sd"))
-    levels = tuple(changed(cells=n) for n in (6, 9))
+    levels = tuple(change_of({"cells": n}) for n in (6, 9))
     uncertainty = Uncertainty(MeshLadder(levels, lambda card: 0.01 / card.cells))
     own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
     return replace(own, **more)

@@ -9,7 +9,7 @@ import pytest
 from study_samples import experiment_file
 
 from validate.fem.system import System
-from validate.replay.find import load_file
+from validate.replay.find import find, load_file
 from validate.replay.ladder_default import trial_of
 from validate.solve import schemes
 from validate.solve.candidates import RUNGS, Asked, Rival, StillBody, SwingingBody
@@ -108,7 +108,7 @@ def test_the_declared_order_is_that_of_the_map(one: Stepping) -> None:
 def test_a_new_scheme_enters_by_its_name_in_the_list(toy: None) -> None:
     assert "toy" in declared()
     assert steppings_for("tet4")[-1].name == "toy"
-    trial = trial_of(load_file(EXPERIMENTS / "kf_cube.py"), quick=True)
+    trial = trial_of(find("kf_cube", EXPERIMENTS), quick=True)
     assert "a toy" in {s.name for s in trial.solvers}
     assert isinstance(next(s for s in trial.solvers if s.name == "a toy").make(0.01), Toy)
 

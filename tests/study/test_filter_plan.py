@@ -14,7 +14,6 @@ from validate.cli import running
 from validate.cli.arguments import pairs
 from validate.cli.main import cli
 from validate.errors import UsageError
-from validate.replay.cards import changed
 from validate.replay.experiment import Case, Experiment, Told
 from validate.replay.find import load_file
 from validate.replay.named_run import run_name
@@ -123,7 +122,7 @@ def test_each_keeps_the_only_marker_of_a_filter_and_names_it(pulled: Experiment)
 
 
 def test_a_case_is_a_condition_by_its_name(pulled: Experiment) -> None:
-    softer = Case("soft", "made for tests", changed("twin", stiffness=0.5))
+    softer = Case("soft", "made for tests", {"twin.stiffness": 0.5})
     more = replace(pulled, cases=(softer,))
     found = plan(more, Options({}, ("kf",)), axes(["case=recorded,soft"]), 2)
     kf = [c for c in found.cells if c.name == "kf"]
@@ -141,12 +140,11 @@ def with_cases(folder: Path) -> Path:
     assert head in text
     text = text.replace(
         head,
-        "from validate.replay.cards import changed\n"
         "from validate.replay.experiment import Case, Experiment, Twin",
     )
     text = text.replace("    twin=Twin(record", """    cases=(
-        Case("soft", "half as stiff", changed("twin", stiffness=0.5)),
-        Case("stiff", "twice as stiff", changed("twin", stiffness=2.0), methods=("plain",)),
+        Case("soft", "half as stiff", {"twin.stiffness": 0.5}),
+        Case("stiff", "twice as stiff", {"twin.stiffness": 2.0}, methods=("plain",)),
     ),
     twin=Twin(record""")  # fmt: skip
     path.write_text(text, "utf-8")

@@ -19,7 +19,7 @@ from validate.errors import SceneError
 from validate.fem.critical import cell_altitudes
 from validate.fem.system import build
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
+from validate.replay.find import find
 from validate.replay.ladder import StabilityBody, squeezed
 from validate.report.store import schema
 from validate.solve.amplification import amplification
@@ -59,7 +59,7 @@ JOB = Job("", "")
 
 @cache
 def mapped(name: str) -> Experiment:
-    return load_file(ROOT / "experiments" / f"{name}.py")
+    return find(name, ROOT)
 
 
 def body(name: str) -> StabilityBody:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from validate.replay.find import load_file
+from validate.replay.find import find
 from validate.study.study_page import Findings, write_study
 
 KINDS = {
@@ -26,7 +26,7 @@ def test_the_kind_is_the_declared_one(
 ) -> None:
     if not present:
         monkeypatch.setenv("VALIDATE_SHARED_DATA", str(tmp_path / "absent"))
-    experiment = load_file(project_root / "experiments" / f"{name}.py")
+    experiment = find(name, project_root)
     told = Findings(
         "Trade: a title", "One cell.", (), {"kind": "tradeoff"}, (("a",), ((1.0,),)), True
     )

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from validate.catalogue import Card, card, experiment_files, shipped
+from validate.catalogue import Card, card, experiment_files, name_of, shipped
 from validate.cli.display import relative, say
 from validate.cli.screen import rows
 from validate.datasets.home import searched, whole
@@ -48,6 +48,6 @@ def _is_here(name: str) -> bool:
 
 def _hides(file: Path) -> str:
     """What a file of the user's stands for, when the package has one of that name."""
-    theirs = shipped() / file.name
-    other = file.resolve() != theirs.resolve() and theirs.is_file()
+    theirs = experiment_files(shipped())
+    other = name_of(file) in theirs and not file.resolve().is_relative_to(shipped().resolve())
     return "this file replaces the shipped experiment of this name" if other else ""

@@ -15,6 +15,7 @@ from validate.replay.variation import Change, change_of, unchanged
 class Free:
     """A parameter that may be identified: its path as --set spells it, and the SI bounds searched.
 
+    `on` names the residuals that identify it, where it is declared among the variations.
     `source` says where the bounds come from, or "assumed"; `helps` which measurement would identify
     it where these recordings cannot. Raises `UsageError` for bounds that are none.
     """
@@ -24,6 +25,7 @@ class Free:
     high: float
     source: str
     helps: str = ""
+    on: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):

@@ -24,7 +24,7 @@ from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.followed import Cases, Truth
 from validate.replay.ladder import Ladder
 from validate.replay.method import Method
-from validate.replay.tree import Built, CellSize, ScaledBody, Tree, beside
+from validate.replay.tree import Built, CellSize, ScaledBody, Tree, beside, placed_by_names
 from validate.replay.variation import Change as Change
 from validate.replay.variation import Shift, bound, change_of, shares
 from validate.replay.variation import unchanged as unchanged
@@ -173,10 +173,18 @@ def vary(
 
 
 def free(
-    path: str, low: str | float, high: str | float, source: str = "assumed", helps: str = ""
+    path: str,
+    low: str | float,
+    high: str | float,
+    on: str | tuple[str, ...] = (),
+    *,
+    source: str = "assumed",
+    helps: str = "",
 ) -> Free:
-    """A parameter that is identified where it stands open, between bounds with their unit."""
-    return Free(path, bound(low, path), bound(high, path), source, helps)
+    """A parameter that is identified where it stands open, between bounds with their unit, `on`
+    residuals (a quantity, or quantity@load) that are then no evidence."""
+    names = (on,) if isinstance(on, str) else tuple(on)
+    return Free(path, bound(low, path), bound(high, path), source, helps, names)
 
 
 @dataclass(frozen=True)
@@ -270,12 +278,6 @@ def _as_declared(experiment: Any, recordings: Sequence[Recording], parameters: A
 _FROM_HERE = Built()
 
 
-def _unplaced(recording: Recording, parameters: Any, scene: Any) -> Registered:
-    raise ComparisonError(
-        "the experiment does not say what drives the scene and what is compared: give `place`"
-    )
-
-
 def _states_nothing(recording: Recording) -> Mapping[str, float]:
     return {}
 
@@ -324,7 +326,7 @@ class Experiment:
     accept: tuple[Accept, ...] = ()
     load: Callable[[Any, Path], tuple[Recording, ...]] = beside
     build: Callable[[Recording, Any, Any], AnyScene] = _FROM_HERE
-    place: Callable[[Recording, Any, Any], Registered] = _unplaced
+    place: Callable[[Recording, Any, Any], Registered] = placed_by_names
     sets: Callable[[Any, Registered], Mapping[str, Any]] = _sets_nothing
     stated: Callable[[Recording], Mapping[str, float]] = _states_nothing
     identify: Callable[[Sequence[Recording], Any, Mapping[str, Method]], Identified] | None = None
@@ -383,15 +385,11 @@ class Experiment:
                 inputs=(*declared.inputs, *inputs),
             )  # fmt: skip
             object.__setattr__(self, "uncertainty", more)
-        if opens := tuple(v for v in variations if isinstance(v, Free)):
-            judged = Calibrates(self._judged, name="all checked quantities")
-            by = Calibration(next(iter(self.accepted)), opens, (judged,))
+        opens = tuple(v for v in variations if isinstance(v, Free))
+        for on in dict.fromkeys(v.on for v in opens):
+            several = tuple(v for v in opens if v.on == on)
+            by = Calibration(next(iter(self.accepted)), several, (Calibrates(on),))
             object.__setattr__(self, "calibrations", (*self.calibrations, by))
-
-    @property
-    def _judged(self) -> tuple[str, ...]:
-        names = ([f"{a.quantity}@{load}" for load in a.loads] or [a.quantity] for a in self.accept)
-        return tuple(name for several in names for name in several)
 
     def _find_from(self, folder: Path) -> None:
         """Mesh files of a declared body are found from the experiment's folder."""

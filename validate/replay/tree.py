@@ -13,6 +13,8 @@ from validate.errors import ComparisonError
 from validate.parameters import part, quantity, with_given
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
+from validate.register.as_declared import as_declared
+from validate.register.registered import Registered
 from validate.scene.geometry import Geometry, cell_size
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
@@ -34,6 +36,11 @@ def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The one recording that the tree names, from the experiment's folder or the current one."""
     own = folder / tree.recording
     return (read_recording(own if own.exists() else Path(tree.recording)),)
+
+
+def placed_by_names(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+    """The recording by the names of the scene's inputs (`register.as_declared`)."""
+    return as_declared(recording, scene)
 
 
 @dataclass(frozen=True)

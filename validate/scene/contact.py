@@ -5,14 +5,16 @@ rigid body need. All shapes are convex: a tangent plane never cuts them, on whic
 contact in dynamics rests.
 """
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from typing import Protocol
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.parameters import quantity, take_units
 from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of
 from validate.scene.select import Place, nodes_of
 
 INSIDE = 1e-6  # of the body's size: a node deeper than this at rest lies inside the rigid body
@@ -38,10 +40,11 @@ class Shape(Protocol):
 class RigidPlane:
     """The half-space behind `point` m; `normal` points out of it, towards the body."""
 
-    point: tuple[float, ...]
-    normal: tuple[float, ...]
+    point: tuple[float, ...] = quantity(MISSING, "m", "a point of the plane")
+    normal: tuple[float, ...] = quantity(MISSING, "1", "out of it, towards the body")
 
     def __post_init__(self) -> None:
+        take_units(self)
         _require_direction("a rigid plane's normal", self.normal)
 
     def gap(self, x: Floats) -> Floats:
@@ -58,10 +61,11 @@ class RigidPlane:
 class RigidSphere:
     """A ball of `radius` m; in 2-D a disc."""
 
-    centre: tuple[float, ...]
-    radius: float
+    centre: tuple[float, ...] = quantity(MISSING, "m", "its centre at rest")
+    radius: float = quantity(MISSING, "m", "its radius")
 
     def __post_init__(self) -> None:
+        take_units(self)
         _require_radius("sphere", self.radius)
 
     def gap(self, x: Floats) -> Floats:
@@ -79,11 +83,12 @@ class RigidSphere:
 class RigidCylinder:
     """An endless round bar of `radius` m around the line through `point` m along `axis`."""
 
-    point: tuple[float, ...]
-    axis: tuple[float, ...]
-    radius: float
+    point: tuple[float, ...] = quantity(MISSING, "m", "a point of its axis")
+    axis: tuple[float, ...] = quantity(MISSING, "1", "direction of its axis")
+    radius: float = quantity(MISSING, "m", "its radius")
 
     def __post_init__(self) -> None:
+        take_units(self)
         _require_radius("cylinder", self.radius)
         _require_direction("a rigid cylinder's axis", self.axis)
 
@@ -109,11 +114,12 @@ class RigidPunch:
     Its rim is a wall for nobody: nodes beyond the radius are not touched.
     """
 
-    centre: tuple[float, ...]
-    normal: tuple[float, ...]
-    radius: float
+    centre: tuple[float, ...] = quantity(MISSING, "m", "middle of its end at rest")
+    normal: tuple[float, ...] = quantity(MISSING, "1", "out of it, towards the body")
+    radius: float = quantity(MISSING, "m", "its radius")
 
     def __post_init__(self) -> None:
+        take_units(self)
         _require_radius("punch", self.radius)
         _require_direction("a rigid punch's normal", self.normal)
 
@@ -139,12 +145,15 @@ class RigidContact:
     """
 
     name: str
-    facets: Place
-    shape: Shape
-    direction: tuple[float, ...] | None = None
-    friction: float = 0.0
+    facets: Place = quantity(MISSING, "1", "faces that may touch it")
+    shape: Shape = quantity(MISSING, "1", "its shape and place")
+    direction: tuple[float, ...] | None = quantity(None, "1", "unit vector of its motion")
+    friction: float = quantity(0.0, "1", "Coulomb's coefficient")
 
     def __post_init__(self) -> None:
+        if isinstance(self.direction, str):
+            object.__setattr__(self, "direction", axis_of(self.direction))
+        take_units(self)
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise SceneError(
                 f"contact '{self.name}': friction {self.friction:g}, expected 0 or more"

@@ -22,7 +22,8 @@ LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"
 class Material:
     """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
 
-    Every law has this E and nu at small strain, which is all that the linear schemes use;
+    A declaration may leave E open (None). Every law has this E and nu at small strain, which is all
+    that the linear schemes use;
     `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
     whose isochoric stress comes late. At nu = 0.5 mixed cells and static schemes keep the volume
     exactly (`fem.incompressible`), others refuse it. Dynamic schemes need rho kg/m^3; Rayleigh
@@ -44,7 +45,7 @@ class Material:
 
     def __post_init__(self) -> None:
         take_units(self)
-        if not (np.isfinite(self.E) and self.E > 0):
+        if self.E is not None and not (np.isfinite(self.E) and self.E > 0):
             raise SceneError(f"modulus E = {self.E:g} Pa: expected a positive number")
         if not -1 < self.nu <= 0.5:
             raise SceneError(
@@ -64,7 +65,7 @@ class Material:
                 "Prony series, or use neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
                 "'split'"
             )
-        if self.coefficients.stability == "required":
+        if self.coefficients.stability == "required" and self.E is not None:
             self.require_stable()
 
     def require_stable(self) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
-from validate.parameters import quantity, take_units
+from validate.parameters import known, quantity, take_units
 from validate.scene.contact import RigidContact, require_clear
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
@@ -301,6 +301,7 @@ class Scene:
         )
 
     def _check(self) -> None:
+        known(self.material.E, "material.E")
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation needs linear elements; use order 1")
         if self.mesh.dimension == 2 and (

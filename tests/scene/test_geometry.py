@@ -1,0 +1,82 @@
+"""Geometries that are resolved late: volumes, symmetry, similar families, files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validate.errors import SceneError, UsageError
+from validate.scene.box import grid
+from validate.scene.geometry import Box, Cylinder, Geometry, MeshFile, SurfaceFile, cell_size
+from validate.scene.material import Material, Region
+from validate.scene.mesh import cell_volumes
+from validate.scene.mesh_file import write_mesh
+from validate.scene.named_place import place_of
+from validate.scene.scene import Scene, Support
+from validate.scene.select import nodes_of
+
+HERE = Path()
+BOX = Box((0.02, 0.01, 0.04), (4, 2, 8))
+ROUND = Cylinder(0.03, 0.02, (4, 4))
+
+
+@pytest.mark.parametrize("element", ["tet4", "tet10", "hex8", "hex27"])
+@pytest.mark.parametrize(("symmetry", "share"), [((), 1.0), (("x",), 0.5), (("x", "y"), 0.25)])
+def test_a_block_has_its_volume(element: str, symmetry: tuple[str, ...], share: float) -> None:
+    box = replace(BOX, element=element, symmetry=symmetry)
+    mesh = box.resolved(HERE)
+    assert mesh.kind == element
+    assert cell_volumes(mesh).sum() == pytest.approx(share * 8e-6, rel=1e-9)
+    assert box.copies * share == 1
+    assert [s.facets for s in box.held] == [f"{axis}0" for axis in symmetry]
+
+
+@pytest.mark.parametrize("body", [BOX, replace(BOX, grading=2.0), ROUND,
+                                  replace(ROUND, part="quarter", grading=2.0)])  # fmt: skip
+def test_similar_ones_scale_every_cell_by_one_factor(body: Geometry) -> None:
+    fine, coarse = (cell_size(b.resolved(HERE)) for b in (body, body.scaled(0.5)))
+    assert coarse / fine == pytest.approx(2.0, rel=0.02)
+
+
+def test_symmetry_is_held_and_its_copies_are_whole() -> None:
+    quarter = replace(BOX, symmetry=("x", "y"))
+    scene = Scene(quarter, Material(1e3, 0.3), (Support("zmax"),))
+    resolved = scene.resolved(quarter.resolved(HERE))
+    assert resolved.copies == 4
+    assert [s.components for s in resolved.supports] == [(0, 1, 2), (0,), (1,)]
+
+
+def test_texts_have_units_and_numbers_are_si() -> None:
+    assert Box(("2 cm", "10 mm", 0.04), (4, 2, 8)) == BOX  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="size=2 kPa: expected m"):
+        Box(("2 kPa", "1 mm", "1 mm"), (1, 1, 1))  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="2 sizes and 3 numbers of cells"):
+        Box((1.0, 1.0), (1, 1, 1))
+
+
+def test_a_mesh_file_is_halved_and_has_no_coarser_one(tmp_path: Path) -> None:
+    write_mesh(grid((1.0, 1.0, 1.0), (1, 1, 2)), tmp_path / "b.npz")
+    body = MeshFile("b.npz")
+    assert len(body.scaled(2.0).resolved(tmp_path).cells) == 8 * len(body.resolved(tmp_path).cells)
+    with pytest.raises(SceneError, match="whole powers of 2 above 1"):
+        body.scaled(0.5)
+    with pytest.raises(SceneError, match=r"body\.edge is not set"):
+        SurfaceFile("b.stl").scaled(2.0)
+
+
+def test_the_side_of_a_body_is_what_faces_that_way() -> None:
+    """The top layer is a thousandth of the body high, thinner than a filled surface is uneven."""
+    mesh = grid((1.0, 1.0, 1.0), (2, 2, 4))
+    thin = replace(
+        mesh, nodes=np.column_stack([mesh.nodes[:, :2], 1 - (1 - mesh.nodes[:, 2]) ** 5])
+    )
+    assert len(nodes_of(thin, place_of("zmax", thin))) == 9
+
+
+def test_a_region_is_the_cells_in_a_box_of_the_bodys_own_material() -> None:
+    layer = Region("layer", where="box 0,0,1cm to 1m,1m,2cm", contrast=5.0)
+    scene = Scene(BOX, Material(1e3, 0.3), (Support("zmin"),), regions=(layer,))
+    (found,) = scene.resolved(BOX.resolved(HERE)).regions
+    assert (found.material.E, found.material.nu) == (5e3, 0.3)
+    assert len(found.cells) == 6 * 4 * 2 * 2
