@@ -6,18 +6,20 @@ tolerance.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from beside import experiment
 
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.papers.ekf_nfem.figures import CUBE_FIGURES
 from validate.papers.ekf_nfem.tables import readings_table
-from validate.replay import compare, load
+from validate.replay import compare
 from validate.replay.experiment import Experiment
+from validate.replay.options import folder_of
+from validate.scene.box import box
 from validate.scene.scene import Scene
 
 pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
@@ -28,8 +30,8 @@ STEP = (
 
 
 @pytest.fixture(scope="module")
-def cube(project_root) -> Experiment:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "ekf_cube.py"))
+def cube() -> Experiment:
+    return experiment("ekf_cube")
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +64,7 @@ def scores(result: Result, name: str) -> dict[str, float]:
 
 
 def test_the_recording_is_what_the_twin_records(cube: Experiment) -> None:
-    folder: Any = None
-    shipped = cube.load(cube.parameters, folder)[0]
+    shipped = cube.load(cube.parameters, folder_of(cube))[0]
     assert cube.twin is not None
     anew = cube.twin.record(cube.parameters, print)
     one, two = shipped.marker("markers"), anew.marker("markers")
@@ -149,11 +150,7 @@ def test_the_accepted_filter_decides_and_does_not_claim_too_much(stiff: Result) 
 
 def test_readings_of_the_force_are_totals_or_per_node(cube: Experiment, scene: Scene) -> None:
     """On a coarse cube: a total is a total however it is spread, per node it is one for each."""
-    changed = replace(cube.parameters.mesh, cells=2)
-    coarse = cube.build(
-        cube.load(cube.parameters, cube.path.parent)[0],  # type: ignore[union-attr]
-        replace(cube.parameters, mesh=changed), cube.methods["nfem"].scene,
-    )  # fmt: skip
+    coarse = cube.parameters.scene.resolved(box((0.1, 0.1, 0.1), (2, 2, 2)))
     rows = {row[0]: row[1:] for row in readings_table(coarse, 0.05, "x").rows}
     assert rows["consistent"][0] == pytest.approx(0.05, rel=1e-9)
     assert rows["nodal"][0] == pytest.approx(0.05, rel=1e-9)

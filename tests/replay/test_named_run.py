@@ -7,10 +7,10 @@ import pytest
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
+from validate.replay.find import find
 from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid
 from validate.replay.named_run import run_folder, run_name, tag
-from validate.replay.options import Options, mesh_files
+from validate.replay.options import Options, folder_of, mesh_files
 
 
 def name(experiment: Experiment, *, quick: bool = False, methods: str = "", **values: str) -> str:
@@ -67,9 +67,9 @@ def test_many_words_are_counted_and_odd_signs_replaced() -> None:
 
 
 def test_meshes_that_parameters_name(project_root: Path, tmp_path: Path) -> None:
-    cube = load_file(project_root / "experiments" / "ekf_cube.py")
-    assert [f.name for f in mesh_files(cube.parameters, tmp_path)] == ["cube.npz"]
-    gone = with_values(cube.parameters, {"mesh.file": str(tmp_path / "gone.npz")})
+    cube = find("ekf_cube", project_root)
+    assert [f.name for f in mesh_files(cube.parameters, folder_of(cube))] == ["cube.npz"]
+    gone = with_values(cube.parameters, {"body.file": str(tmp_path / "gone.npz")})
     assert mesh_files(gone, tmp_path) == ()
 
 

@@ -43,7 +43,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
     side = float(np.ptp(scene.mesh.nodes[:, 0]))
     rates = measured_rates(scene.material, side, EDGES, INTEGRATORS)
     progress("readings of the force")
-    readings = readings_table(scene, parameters.loading.force, "x")
+    readings = readings_table(scene, parameters.settings.loading.force, "x")
     limits = steps_table(scene, PRINTED_STEP)
     progress("locking")
     locked = locking_table(scene, NU)
