@@ -58,7 +58,7 @@ def judged() -> tuple[Judged, ...]:
 
 
 def run(one: Judged) -> Result:
-    experiment = load(str(ROOT / "experiments" / f"{one.name}.py"))
+    experiment = load(one.name)
     return compare(experiment, one.values, one.methods)
 
 

@@ -37,7 +37,7 @@ class Measured:
 
 def rows_of(one: Measured) -> list[list[str]]:
     """A row a check that is evidence or undecided, furthest off first."""
-    experiment = load(str(ROOT / "experiments" / f"{one.name}.py"))
+    experiment = load(one.name)
     result = compare(experiment, one.values)
     return [
         [_called(one) if i == 0 else "", one.fitted if i == 0 else "", *_cells(c)]

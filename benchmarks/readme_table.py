@@ -109,7 +109,7 @@ def markdown(head: tuple[str, ...], table: list[list[str]]) -> str:
 
 
 def _result(name: str) -> Result:
-    return compare(load(str(ROOT / "experiments" / f"{name}.py")))
+    return compare(load(name))
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from validate.scene.box import grid
 
 @pytest.fixture(scope="module")
 def experiment(project_root) -> Experiment:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "needle_block.py"))
+    return load("needle_block")
 
 
 @pytest.fixture(scope="module")
