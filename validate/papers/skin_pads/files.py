@@ -4,6 +4,19 @@ A folder holds matrices of numbers: points and two marks per pad in pixels over 
 pad's displacement (mm) and force (no unit) on a clock of its own, some of the points once more in
 mm, and a Gmsh script with the geometry. Nothing has a time stamp: images are paired with samples of
 the force by how far the pads had come apart, and times are numbers of samples.
+
+Files of points: x0.dat, y0.dat (k, 1) at rest, xt.dat, yt.dat (k, nt) in the images. Files of the
+marks: the same with _ref_1 (moving pad) and _ref_2 (fixed pad). The marks are read as
+
+1. a history, where they have as many states as the points;
+2. named points of the field, where at rest they lie on points at its two edges (one mark a row or a
+   column). The pads then follow these points;
+3. not at all with `pads.follow=edges`: the pads follow the points at the two edges. The authors'
+   second recording (bimaterial, with a keloid) needs this: its field is a grid from pad to pad, and
+   its files of marks belong to the first recording.
+
+Points that the pads follow are not compared. Two marks of a pad are 24 mm apart, which is the
+scale; in cases 2 and 3 the scale is `pads.window`, or comes from points given in mm.
 """
 
 import re
@@ -11,8 +24,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
@@ -21,11 +36,16 @@ from validate.recording.types import Markers, Recording, Signal, Source
 from validate.units import SYMBOLIC
 
 FORCE = SYMBOLIC[0]
+Follow = Literal["marks", "edges"]
+Points = np.ndarray  # numbers of points (k,)
+Marks = tuple[Floats, Floats, Floats, Floats]  # x and y at rest, x and y in the images
 WINDOW = (
     24e-3  # m between the two marks of a pad, the extensometer's window in the authors' scripts
 )
 _LARGEST = 64_000_000  # bytes of a file of numbers
 _POINTS = ("x0.dat", "y0.dat", "xt.dat", "yt.dat")
+_MARKS = ("x0", "y0", "xt", "yt")
+_LEAST_POINTS = 2  # of the field, that a pad may follow
 _GEO = {"L": "sheet.length", "H": "sheet.width", "l_pad": "pads.length", "h_pad": "pads.width",
         "dL_pad": "pads.gap"}  # fmt: skip
 
@@ -36,7 +56,14 @@ class Tracked:
 
     points: Floats
     pads: Floats
-    window: float  # px between the marks of a pad at rest
+    window: float  # px between the outermost marks of a pad at rest
+    followed: tuple[Points, Points] | None = None  # points that are the marks of the pads
+
+    @property
+    def compared(self) -> Points:
+        """Numbers of the points that no pad follows."""
+        every = np.arange(self.points.shape[1])
+        return every if self.followed is None else np.setdiff1d(every, np.hstack(self.followed))
 
     @property
     def pulled(self) -> Floats:
@@ -45,13 +72,21 @@ class Tracked:
         return np.asarray(apart - apart[0])
 
 
-def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
+def read_folder(
+    folder: Path,
+    signs: tuple[float, float],
+    follow: Follow = "marks",
+    window: float | None = None,
+) -> Recording:
     """The recording of a folder; `signs` of displacement and force make pulling apart positive.
+
+    `follow`: whether the pads follow their marks or the points at the edges of the field; `window`
+    m between the outermost marks of a pad at rest (None: 24 mm for two marks).
 
     Raises `RecordingError` for files that are missing, no numbers, or do not belong together, for
     pads that approach each other, and where no image can be paired.
     """
-    seen = _tracked(folder)
+    seen = _tracked(folder, follow)
     u, f = (signs[i] * numbers(folder / name).ravel()
             for i, name in enumerate(("u_moving_pad.dat", "f_moving_pad.dat")))  # fmt: skip
     if len(u) != len(f) or len(u) < 20:
@@ -59,12 +94,12 @@ def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
             f"{folder}: {len(u)} displacements, {len(f)} forces; 20 of both needed"
         )
     _require_apart(folder, u, f)
-    scale, by = _scale(folder, seen)
+    scale, by = _scale(folder, seen, window)
     toe = _toe(folder, u)
     pulled = scale * seen.pulled
     t, matched = paired(folder, pulled, 1e-3 * u - toe)
-    names = tuple(f"p{i + 1:04d}" for i in range(seen.points.shape[1]))
-    points, pads = (scale * x[: len(t)] for x in (seen.points, seen.pads))
+    names = tuple(f"p{i + 1:04d}" for i in seen.compared)
+    points, pads = (scale * x[: len(t)] for x in (seen.points[:, seen.compared], seen.pads))
     samples = np.arange(len(u), dtype=np.float64)
     return Recording(
         folder.name,
@@ -87,8 +122,21 @@ def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
             "scale": {"m_per_px": f"{scale:.8g}", "by": by},
             "zero": {"displacement_m": f"{toe:.8g}"},
             "geometry": _geometry(folder),
+            **_followed(seen),
         },
     )
+
+
+def _followed(seen: Tracked) -> Mapping[str, Mapping[str, str]]:
+    if seen.followed is None:
+        return {}
+    moving, fixed = map(len, seen.followed)
+    return {
+        "pads": {
+            "follow": f"{moving} and {fixed} edge points of the field, by their median; "
+            "these points are not compared"
+        }
+    }
 
 
 def numbers(path: Path) -> Floats:
@@ -105,19 +153,118 @@ def numbers(path: Path) -> Floats:
     return np.asarray(found, dtype=np.float64)
 
 
-def _tracked(folder: Path) -> Tracked:
-    x0, y0, xt, yt = (numbers(folder / name) for name in _POINTS)
-    points = _states("points", x0, y0, xt, yt)
-    marks = []
-    for pad in (1, 2):
-        names = (f"{a}_ref_{pad}.dat" for a in ("x0", "y0", "xt", "yt"))
-        marks.append(_states(f"marks of pad {pad}", *(numbers(folder / n) for n in names)))
-    if len({len(points), *map(len, marks)}) > 1:
+def _tracked(folder: Path, follow: Follow) -> Tracked:
+    """Read points and pads; raises `RecordingError` where the marks belong to other images."""
+    points = _states("points", *(numbers(folder / name) for name in _POINTS))
+    if follow == "edges":
+        return _on_points(points, _edges(points))
+    files = [_oriented(*(numbers(folder / f"{a}_ref_{pad}.dat") for a in _MARKS)) for pad in (1, 2)]
+    if all(_is_history(marks, len(points)) for marks in files):
+        marks = [_states(f"marks of pad {pad}", *m) for pad, m in enumerate(files, start=1)]
+        window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
+        return Tracked(points, np.stack([m.mean(axis=1) for m in marks], axis=1), window)
+    return _on_points(points, _named(folder, points, files))
+
+
+def _oriented(*files: Floats) -> Marks:
+    """The files of a pad's marks with one mark a row; at rest they are a column or a row."""
+    x0, y0, xt, yt = files
+    if x0.shape[0] == 1 < x0.shape[1] == xt.shape[1]:
+        return x0.T, y0.T, xt.T, yt.T
+    return x0, y0, xt, yt
+
+
+def _is_history(marks: Marks, states: int) -> bool:
+    """Whether marks (k, 1) at rest and (k, nt) later have as many states as the points."""
+    x0, y0, xt, yt = marks
+    k = len(x0)
+    return x0.shape == y0.shape == (k, 1) and xt.shape == yt.shape == (k, states - 1)
+
+
+def _named(folder: Path, points: Floats, files: list[Marks]) -> tuple[Points, Points]:
+    """Points of the field at which the marks of the two pads lie at rest.
+
+    They are these points where every mark is within half of the points' spacing of one, each pad
+    has two or more, and these are at opposite edges of the field: inside a grid most places are
+    near to a point, also marks of other images.
+    """
+    rest, spacing = points[0], _spacing(points[0])
+    off, found = [], []
+    for number, (x0, y0, *_) in enumerate(files, start=1):
+        if x0.size != y0.size:
+            raise RecordingError(
+                f"{folder.name}: marks of pad {number} at rest: {x0.size} numbers in x0_ref_"
+                f"{number}.dat, {y0.size} in y0_ref_{number}.dat; as many of both are needed"
+            )
+        distance, nearest = _nearest(rest, np.stack([x0.ravel(), y0.ravel()], axis=1), 1)
+        off.append(float(distance.max()))
+        found.append(np.unique(nearest))
+    at_edge = _at_edges(rest, found[0], found[1], spacing)
+    count = [len(f) for f in found]
+    if max(off) > spacing / 2 or min(count) < _LEAST_POINTS or at_edge != count:
+        states = [1 + m[2].shape[1] for m in files]
         raise RecordingError(
-            f"{folder}: {len(points)} states of the points, {[len(m) for m in marks]} of the marks"
+            f"{folder.name}: {len(points)} states of the points, {states} of the marks; and as "
+            f"points of the field the marks lie up to [{off[0]:.4g}, {off[1]:.4g}] px from one "
+            f"({spacing / 2:.4g} px allowed) and name {count} points ({_LEAST_POINTS} needed), "
+            f"{at_edge} of these at the field's edges (all needed): give the marks of these "
+            "images, or, where the pads hold the two edges of the field, pass --set "
+            "pads.follow=edges"
         )
-    window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
-    return Tracked(points, np.stack([m.mean(axis=1) for m in marks], axis=1), window)
+    return found[0], found[1]
+
+
+def _at_edges(rest: Floats, one: Points, two: Points, spacing: float) -> list[int]:
+    """How many points of the pads are at the two edges of the field, from pad to pad."""
+    between = rest[two].mean(axis=0) - rest[one].mean(axis=0)
+    distance = float(np.linalg.norm(between))
+    if distance < spacing:
+        return [0, 0]
+    along, slack = rest @ (between / distance), spacing
+    return [
+        int((along[one] <= along.min() + slack).sum()),
+        int((along[two] >= along.max() - slack).sum()),
+    ]
+
+
+def _spacing(rest: Floats) -> float:
+    """Median distance px of a point (k, 2) to the nearest other one."""
+    return float(np.median(_nearest(rest, rest, 2)[0][:, 1]))
+
+
+def _nearest(rest: Floats, x: Floats, count: int) -> tuple[Floats, Points]:
+    """Distances (m, count) of x (m, 2) to the nearest of points (k, 2), and their numbers."""
+    distance, number = cKDTree(rest).query(x, k=list(range(1, count + 1)))
+    return np.asarray(distance, dtype=np.float64), np.asarray(number)
+
+
+def _edges(points: Floats) -> tuple[Points, Points]:
+    """Points at the two edges of the field across the pull; first those that move more.
+
+    The pull is the image axis of the larger strain; an edge is half of the points' spacing wide.
+    """
+    rest, moved = points[0], points[-1] - points[0]
+    near = _spacing(rest) / 2
+    strain = [float(np.polyfit(rest[:, c], moved[:, c], 1)[0]) for c in (0, 1)]
+    x = rest[:, int(np.argmax(strain))]
+    low, high = np.flatnonzero(x <= x.min() + near), np.flatnonzero(x >= x.max() - near)
+    size = [float(np.linalg.norm(np.median(moved[edge], axis=0))) for edge in (low, high)]
+    if min(len(low), len(high)) < _LEAST_POINTS:
+        raise RecordingError(
+            f"pads.follow = edges: {len(low)} and {len(high)} points within {near:.4g} px of the "
+            f"edges of the field, {_LEAST_POINTS} of both are needed: remove single points beyond "
+            "the grid from the files, or give marks of the pads"
+        )
+    return (low, high) if size[0] >= size[1] else (high, low)
+
+
+def _on_points(points: Floats, pads: tuple[Points, Points]) -> Tracked:
+    """Pads that follow points of the field: by their median, as single points may be spurious."""
+    rest = points[0]
+    moved = [np.median(points[:, pad] - rest[pad], axis=1) for pad in pads]
+    middle = [rest[pad].mean(axis=0) + m for pad, m in zip(pads, moved, strict=True)]
+    window = float(np.mean([np.linalg.norm(np.ptp(rest[pad], axis=0)) for pad in pads]))
+    return Tracked(points, np.stack(middle, axis=1), window, pads)
 
 
 def _states(what: str, x0: Floats, y0: Floats, xt: Floats, yt: Floats) -> Floats:
@@ -140,9 +287,20 @@ def _require_apart(folder: Path, u: Floats, f: Floats) -> None:
             )
 
 
-def _scale(folder: Path, seen: Tracked) -> tuple[float, str]:
-    """m per px from points that the folder has in mm as well, else from the marks' distance."""
+def _scale(folder: Path, seen: Tracked, window: float | None) -> tuple[float, str]:
+    """m per px from `window` m, else from points that the folder has in mm as well, else from the
+    distance of two marks of a pad; raises `RecordingError` where none of these is known."""
+    if window is not None:
+        return window / seen.window, f"pads.window {1e3 * window:g} mm, {seen.window:.1f} px"
     first = sorted(folder.glob("*xt_dic_0000.out"))
+    if not first and seen.followed is not None:
+        moving, fixed = map(len, seen.followed)
+        raise RecordingError(
+            f"{folder.name}: no scale: the pads follow {moving} and {fixed} points of the field, "
+            f"whose outermost are {seen.window:.1f} px apart, in a length that no file has: pass "
+            "it with its unit, as in --set pads.window=8mm, or add the points in mm "
+            "(processed_xt_dic_0000.out)"
+        )
     if not first:
         return WINDOW / seen.window, f"marks {1e3 * WINDOW:g} mm apart, {seen.window:.1f} px"
     mm = numbers(first[0])
