@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.cli.main import run
 from validate.errors import RecordingError, UsageError
 from validate.papers.skin_pads import files as files_module
 from validate.papers.skin_pads.files import FORCE, paired, read_folder
@@ -269,7 +270,8 @@ def grid_folder(path: Path, rows: int = ROWS) -> Path:
     write(path, "", states / SCALE + [600.0, 400.0])
     u = np.linspace(0.0, 9.0, 600)
     np.savetxt(path / "u_moving_pad.dat", u)
-    np.savetxt(path / "f_moving_pad.dat", 0.05 + 0.02 * u)
+    noise = 1e-4 * np.random.default_rng(1).normal(size=len(u))
+    np.savetxt(path / "f_moving_pad.dat", 0.05 + 0.02 * u + noise)
     (path / "skin.geo").write_text(GEO)
     return path
 
@@ -401,3 +403,38 @@ def test_a_log_without_samples_at_its_zero_needs_a_larger_bin() -> None:
         RecordingError, match="r: 2 samples within 1 mm of the zero of displacement,"
     ):
         binned(recording, p)  # type: ignore[arg-type]
+
+
+def test_a_run_is_driven_by_the_edge_points(project_root: Path, tmp_path: Path) -> None:
+    """The pads of the simulated sheet move by the truth at every load step with an image."""
+    edge_marks(grid_folder(tmp_path), 50, "column")
+    experiment = load_file(project_root / "experiments" / "skin_pads.py")
+    p = with_values(SOON, {"data": str(tmp_path), "pads.window": "24mm", "mesh.cells": "1",
+                           "material.E_linear": "28"})  # fmt: skip
+    recordings = load(p, Path())
+    p = with_values(p, {path: repr(value) for path, value in stated(recordings[0]).items()})
+    ended = solve(experiment, recordings, "linear", experiment.methods["linear"], p)
+    assert ended.whole
+    pads = ended.seen.inputs[ended.seen.inputs.sum(axis=1) <= 4e-3]
+    assert len(pads) > 10
+    assert 1e3 * pads[:, 0] == pytest.approx(SHARE * 1e3 * pads.sum(axis=1), abs=1e-4)
+    assert 1e3 * ended.seen.inputs[-1].sum() == pytest.approx(6.0, abs=0.2)
+    assert any("50 and 50 edge points" in text for text in ended.seen.findings)
+
+
+@pytest.mark.slow
+def test_validate_run_reports_what_the_pads_follow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "data").mkdir()
+    edge_marks(grid_folder(tmp_path / "data"), 50, "row")
+    arguments = [
+        "run", "skin_pads", "--quick", "--methods", "linear", "--out", str(tmp_path / "out"),
+        "--set", f"data={tmp_path / 'data'}", "--set", "mesh.cells=1",
+    ]  # fmt: skip
+    assert run(arguments) == 2
+    assert "pass it with its unit, as in --set pads.window=8mm" in capsys.readouterr().err
+    assert run([*arguments, "--set", "pads.window=24mm"]) == 1  # the truth is no sheet's field
+    assert "material.E_linear" in capsys.readouterr().out
+    (page,) = (tmp_path / "out").glob("skin_pads*/report.html")
+    assert "The pads follow 50 and 50 edge points of the field" in page.read_text("utf-8")
