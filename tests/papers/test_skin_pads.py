@@ -331,6 +331,18 @@ def test_the_scale_of_edge_points_is_requested_and_never_24_mm(tmp_path: Path) -
         with_values(SOON, {"pads.window": "-8mm"})
 
 
+def test_a_history_of_other_than_two_marks_has_no_known_length(tmp_path: Path) -> None:
+    """With as many states as the points have, marks are a history, also where they name points."""
+    edge_marks(grid_folder(tmp_path), 105, "row")
+    with pytest.raises(RecordingError, match=r"480\.0 px apart, .* \(only two marks"):
+        read_folder(tmp_path, (1.0, 1.0))
+    edge_marks(tmp_path, 105, "column")
+    x = np.loadtxt(tmp_path / "xt_ref_1.dat")
+    np.savetxt(tmp_path / "xt_ref_1.dat", x[:49])
+    with pytest.raises(RecordingError, match="marks of pad 1: files of shapes"):
+        read_folder(tmp_path, (1.0, 1.0))
+
+
 def test_marks_of_other_images_are_refused_with_both_readings(tmp_path: Path) -> None:
     """Inside a grid most places are near to a point: that alone makes no edge."""
     grid_folder(tmp_path)

@@ -27,25 +27,22 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.files import buffered, read_bytes, read_text
+from validate.papers.skin_pads.edge_points import Marks, Points, edges, named_points
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.units import SYMBOLIC
 
 FORCE = SYMBOLIC[0]
 Follow = Literal["marks", "edges"]
-Points = np.ndarray  # numbers of points (k,)
-Marks = tuple[Floats, Floats, Floats, Floats]  # x and y at rest, x and y in the images
 WINDOW = (
     24e-3  # m between the two marks of a pad, the extensometer's window in the authors' scripts
 )
 _LARGEST = 64_000_000  # bytes of a file of numbers
 _POINTS = ("x0.dat", "y0.dat", "xt.dat", "yt.dat")
 _MARKS = ("x0", "y0", "xt", "yt")
-_LEAST_POINTS = 2  # of the field, that a pad may follow
 _GEO = {"L": "sheet.length", "H": "sheet.width", "l_pad": "pads.length", "h_pad": "pads.width",
         "dL_pad": "pads.gap"}  # fmt: skip
 
@@ -57,6 +54,7 @@ class Tracked:
     points: Floats
     pads: Floats
     window: float  # px between the outermost marks of a pad at rest
+    window_m: float | None = None  # the same in m, where it is known
     followed: tuple[Points, Points] | None = None  # points that are the marks of the pads
 
     @property
@@ -157,13 +155,15 @@ def _tracked(folder: Path, follow: Follow) -> Tracked:
     """Read points and pads; raises `RecordingError` where the marks belong to other images."""
     points = _states("points", *(numbers(folder / name) for name in _POINTS))
     if follow == "edges":
-        return _on_points(points, _edges(points))
+        return _on_points(points, edges(points))
     files = [_oriented(*(numbers(folder / f"{a}_ref_{pad}.dat") for a in _MARKS)) for pad in (1, 2)]
-    if all(_is_history(marks, len(points)) for marks in files):
+    if all(1 + xt.shape[1] == len(points) for _, _, xt, _ in files):
         marks = [_states(f"marks of pad {pad}", *m) for pad, m in enumerate(files, start=1)]
         window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
-        return Tracked(points, np.stack([m.mean(axis=1) for m in marks], axis=1), window)
-    return _on_points(points, _named(folder, points, files))
+        two = all(m.shape[1] == 2 for m in marks)
+        middle = np.stack([m.mean(axis=1) for m in marks], axis=1)
+        return Tracked(points, middle, window, WINDOW if two else None)
+    return _on_points(points, named_points(folder.name, points, files))
 
 
 def _oriented(*files: Floats) -> Marks:
@@ -174,97 +174,13 @@ def _oriented(*files: Floats) -> Marks:
     return x0, y0, xt, yt
 
 
-def _is_history(marks: Marks, states: int) -> bool:
-    """Whether marks (k, 1) at rest and (k, nt) later have as many states as the points."""
-    x0, y0, xt, yt = marks
-    k = len(x0)
-    return x0.shape == y0.shape == (k, 1) and xt.shape == yt.shape == (k, states - 1)
-
-
-def _named(folder: Path, points: Floats, files: list[Marks]) -> tuple[Points, Points]:
-    """Points of the field at which the marks of the two pads lie at rest.
-
-    They are these points where every mark is within half of the points' spacing of one, each pad
-    has two or more, and these are at opposite edges of the field: inside a grid most places are
-    near to a point, also marks of other images.
-    """
-    rest, spacing = points[0], _spacing(points[0])
-    off, found = [], []
-    for number, (x0, y0, *_) in enumerate(files, start=1):
-        if x0.size != y0.size:
-            raise RecordingError(
-                f"{folder.name}: marks of pad {number} at rest: {x0.size} numbers in x0_ref_"
-                f"{number}.dat, {y0.size} in y0_ref_{number}.dat; as many of both are needed"
-            )
-        distance, nearest = _nearest(rest, np.stack([x0.ravel(), y0.ravel()], axis=1), 1)
-        off.append(float(distance.max()))
-        found.append(np.unique(nearest))
-    at_edge = _at_edges(rest, found[0], found[1], spacing)
-    count = [len(f) for f in found]
-    if max(off) > spacing / 2 or min(count) < _LEAST_POINTS or at_edge != count:
-        states = [1 + m[2].shape[1] for m in files]
-        raise RecordingError(
-            f"{folder.name}: {len(points)} states of the points, {states} of the marks; and as "
-            f"points of the field the marks lie up to [{off[0]:.4g}, {off[1]:.4g}] px from one "
-            f"({spacing / 2:.4g} px allowed) and name {count} points ({_LEAST_POINTS} needed), "
-            f"{at_edge} of these at the field's edges (all needed): give the marks of these "
-            "images, or, where the pads hold the two edges of the field, pass --set "
-            "pads.follow=edges"
-        )
-    return found[0], found[1]
-
-
-def _at_edges(rest: Floats, one: Points, two: Points, spacing: float) -> list[int]:
-    """How many points of the pads are at the two edges of the field, from pad to pad."""
-    between = rest[two].mean(axis=0) - rest[one].mean(axis=0)
-    distance = float(np.linalg.norm(between))
-    if distance < spacing:
-        return [0, 0]
-    along, slack = rest @ (between / distance), spacing
-    return [
-        int((along[one] <= along.min() + slack).sum()),
-        int((along[two] >= along.max() - slack).sum()),
-    ]
-
-
-def _spacing(rest: Floats) -> float:
-    """Median distance px of a point (k, 2) to the nearest other one."""
-    return float(np.median(_nearest(rest, rest, 2)[0][:, 1]))
-
-
-def _nearest(rest: Floats, x: Floats, count: int) -> tuple[Floats, Points]:
-    """Distances (m, count) of x (m, 2) to the nearest of points (k, 2), and their numbers."""
-    distance, number = cKDTree(rest).query(x, k=list(range(1, count + 1)))
-    return np.asarray(distance, dtype=np.float64), np.asarray(number)
-
-
-def _edges(points: Floats) -> tuple[Points, Points]:
-    """Points at the two edges of the field across the pull; first those that move more.
-
-    The pull is the image axis of the larger strain; an edge is half of the points' spacing wide.
-    """
-    rest, moved = points[0], points[-1] - points[0]
-    near = _spacing(rest) / 2
-    strain = [float(np.polyfit(rest[:, c], moved[:, c], 1)[0]) for c in (0, 1)]
-    x = rest[:, int(np.argmax(strain))]
-    low, high = np.flatnonzero(x <= x.min() + near), np.flatnonzero(x >= x.max() - near)
-    size = [float(np.linalg.norm(np.median(moved[edge], axis=0))) for edge in (low, high)]
-    if min(len(low), len(high)) < _LEAST_POINTS:
-        raise RecordingError(
-            f"pads.follow = edges: {len(low)} and {len(high)} points within {near:.4g} px of the "
-            f"edges of the field, {_LEAST_POINTS} of both are needed: remove single points beyond "
-            "the grid from the files, or give marks of the pads"
-        )
-    return (low, high) if size[0] >= size[1] else (high, low)
-
-
 def _on_points(points: Floats, pads: tuple[Points, Points]) -> Tracked:
     """Pads that follow points of the field: by their median, as single points may be spurious."""
     rest = points[0]
     moved = [np.median(points[:, pad] - rest[pad], axis=1) for pad in pads]
     middle = [rest[pad].mean(axis=0) + m for pad, m in zip(pads, moved, strict=True)]
     window = float(np.mean([np.linalg.norm(np.ptp(rest[pad], axis=0)) for pad in pads]))
-    return Tracked(points, np.stack(middle, axis=1), window, pads)
+    return Tracked(points, np.stack(middle, axis=1), window, followed=pads)
 
 
 def _states(what: str, x0: Floats, y0: Floats, xt: Floats, yt: Floats) -> Floats:
@@ -290,19 +206,18 @@ def _require_apart(folder: Path, u: Floats, f: Floats) -> None:
 def _scale(folder: Path, seen: Tracked, window: float | None) -> tuple[float, str]:
     """m per px from `window` m, else from points that the folder has in mm as well, else from the
     distance of two marks of a pad; raises `RecordingError` where none of these is known."""
-    if window is not None:
-        return window / seen.window, f"pads.window {1e3 * window:g} mm, {seen.window:.1f} px"
-    first = sorted(folder.glob("*xt_dic_0000.out"))
-    if not first and seen.followed is not None:
-        moving, fixed = map(len, seen.followed)
-        raise RecordingError(
-            f"{folder.name}: no scale: the pads follow {moving} and {fixed} points of the field, "
-            f"whose outermost are {seen.window:.1f} px apart, in a length that no file has: pass "
-            "it with its unit, as in --set pads.window=8mm, or add the points in mm "
-            "(processed_xt_dic_0000.out)"
-        )
+    first = sorted(folder.glob("*xt_dic_0000.out")) if window is None else []
     if not first:
-        return WINDOW / seen.window, f"marks {1e3 * WINDOW:g} mm apart, {seen.window:.1f} px"
+        length = seen.window_m if window is None else window
+        if length is None or seen.window == 0:
+            raise RecordingError(
+                f"{folder.name}: no scale: the outermost marks of a pad are {seen.window:.1f} px "
+                "apart, and no file has this length (only two marks of a pad are 24 mm apart): "
+                "pass it with its unit, as in --set pads.window=8mm, or add the points in mm "
+                "(processed_xt_dic_0000.out); 0 px cannot give a scale"
+            )
+        by = "marks" if window is None else "pads.window: marks"
+        return length / seen.window, f"{by} {1e3 * length:g} mm apart, {seen.window:.1f} px"
     mm = numbers(first[0])
     ratios = np.ptp(mm, axis=0) / np.ptp(seen.points[0], axis=0)
     if abs(ratios[0] / ratios[1] - 1) > 0.01:
