@@ -204,6 +204,7 @@ def entry(name: str, values: str = "") -> str:
         (entry(TIP, "old = 2e-3\nnew = 1e-3"), 1),
         (entry("run/rod: fem score tip"), 1),
         (entry(TIP, "new = nan"), 1),
+        (entry(TIP, "old = 2e-3"), 1),
         ("", 1),
     ],
 )

@@ -320,6 +320,16 @@ def test_marks_may_be_points_at_the_edges_of_the_field(
     assert float(found.record("scale")["m_per_px"]) == pytest.approx(1e-3 * SCALE)
 
 
+def test_a_history_of_two_marks_may_have_one_mark_a_column(tmp_path: Path) -> None:
+    expected = read_folder(folder(tmp_path), (1.0, 1.0))
+    for path in tmp_path.glob("*_ref_*.dat"):
+        np.savetxt(path, np.loadtxt(path, ndmin=2).T)
+    found = read_folder(tmp_path, (1.0, 1.0))
+    assert found.marker("pads").x == pytest.approx(expected.marker("pads").x)
+    assert found.metadata == expected.metadata
+    assert "pads" not in found.metadata
+
+
 def test_the_scale_of_edge_points_is_requested_and_never_24_mm(tmp_path: Path) -> None:
     edge_marks(grid_folder(tmp_path), 50, "column")
     with pytest.raises(RecordingError, match=r"480\.0 px apart, .* --set pads\.window=8mm"):
@@ -354,7 +364,7 @@ def test_marks_of_other_images_are_refused_with_both_readings(tmp_path: Path) ->
         read_folder(tmp_path, (1.0, 1.0))
     inside = np.loadtxt(tmp_path / "x0.dat")[300:302], np.loadtxt(tmp_path / "y0.dat")[300:302]
     for pad in (1, 2):
-        marks = np.stack(inside, axis=1) + [200.0 * (pad - 1), 0.0]
+        marks = np.stack(inside, axis=1) + [190.0 * (pad - 1), 0.0]  # five columns
         write(tmp_path, f"_ref_{pad}", np.repeat(marks[None], 50, axis=0))
     with pytest.raises(RecordingError, match=r"\[2, 2\] points .*, \[0, 0\] of these at the field"):
         read_folder(tmp_path, (1.0, 1.0))
