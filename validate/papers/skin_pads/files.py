@@ -214,7 +214,7 @@ def _scale(folder: Path, seen: Tracked, window: float | None) -> tuple[float, st
                 f"{folder.name}: no scale: the outermost marks of a pad are {seen.window:.1f} px "
                 "apart, and no file has this length (only two marks of a pad are 24 mm apart): "
                 "pass it with its unit, as in --set pads.window=8mm, or add the points in mm "
-                "(processed_xt_dic_0000.out); 0 px cannot give a scale"
+                "(processed_xt_dic_0000.out)"
             )
         by = "marks" if window is None else "pads.window: marks"
         return length / seen.window, f"{by} {1e3 * length:g} mm apart, {seen.window:.1f} px"
