@@ -1,11 +1,14 @@
 """Does a change of the code change a result? Stores what reports hold and compares two stores.
 
 python benchmarks/guard.py make DIR [--quick-studies]    runs everything into DIR/run and DIR/study
+python benchmarks/guard.py make DIR --quick              quick runs into DIR/run, no studies
 python benchmarks/guard.py collect DIR -o FILE.json      what the reports below DIR hold
-python benchmarks/guard.py compare A.json B.json [--renames FILE]    a table; exit code 1 if apart
+python benchmarks/guard.py compare A.json B.json [--renames FILE] [--intended FILE]
+                                                         a table; exit code 1 if apart
 
 Held are scores, checks (E, u_val, limit), published figures, effects, identified values, and the
 tables of studies. Times, rates and what is ranked by them are left out: they never repeat.
+Differences that guard_intended.toml lists are printed with their reason and are no failure.
 """
 
 import csv
@@ -13,8 +16,9 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -22,6 +26,9 @@ from typing import Any
 import click
 
 RELATIVE, OF_SCALE = 1e-10, 1e-12
+AS_LISTED = 1e-4  # relative; values of an intended change are written with a few digits
+INTENDED = Path(__file__).with_name("guard_intended.toml")
+_QUICK = re.compile(r"\+quick-[0-9a-f]+$")  # folder of a quick run, with a hash of its settings
 _TIMED = re.compile(r"^(setup|step)(\.|$)|\brate\b|\bHz$|\bHz,|step over|speed|real-time|seconds")
 
 
@@ -86,7 +93,8 @@ def collect(root: Path) -> dict[str, Entry]:
         kind = plain.name.removeprefix("study-")
         study = kind in _STUDIES
         read = _study(folder, _STUDIES[kind]) if study else _run(path)
-        _put(found, (plain if study else folder).relative_to(root).as_posix(), read)
+        place = plain if study else folder.with_name(_QUICK.sub("+quick", folder.name))
+        _put(found, place.relative_to(root).as_posix(), read)
     return found
 
 
@@ -205,6 +213,13 @@ class Comparison:
     equal: int
 
 
+def quick_runs(entries: Mapping[str, Entry]) -> bool | None:
+    """Return whether a store holds quick runs; None if it holds studies only."""
+    runs = {name.partition(": ")[0] for name in entries}
+    found = {run.endswith("+quick") for run in runs if "study-" not in run}
+    return any(found) if found else None
+
+
 def compared(a: Mapping[str, Entry], b: Mapping[str, Entry]) -> Comparison:
     """Two stores by name; equal is within 1e-10 relative or 1e-12 of the quantity's scale."""
     scale = _scales([*a.values(), *b.values()])
@@ -253,6 +268,59 @@ def _read_renames(path: Path | None) -> dict[str, str]:
     return {old.strip(): new.strip() for old, new in pairs}
 
 
+@dataclass(frozen=True)
+class Intended:
+    """One intended change. `name` may hold * and ?; an omitted `old` or `new` is any value."""
+
+    name: str
+    reason: str
+    old: float | str | None = None
+    new: float | str | None = None
+
+    def covers(self, name: str, old: float | str, new: float | str) -> bool:
+        """Return whether a difference is this change."""
+        # Names of table rows hold brackets: they are no sets of characters here.
+        matches = fnmatchcase(name, self.name.replace("[", "[[]"))
+        return matches and _as_listed(self.old, old) and _as_listed(self.new, new)
+
+
+def _as_listed(listed: float | str | None, value: float | str) -> bool:
+    if listed is None or listed == value:
+        return True
+    if not (isinstance(listed, float | int) and isinstance(value, float | int)):
+        return False
+    if listed != listed or value != value:  # NaN
+        return listed != listed and value != value
+    return abs(value - listed) <= AS_LISTED * abs(listed)
+
+
+def read_intended(path: Path) -> tuple[Intended, ...]:
+    """Read the tables [[intended]]; raises `UsageError` for other keys or no reason."""
+    try:
+        document = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise click.UsageError(f"{path}: {error}; correct the file or pass --intended FILE") from (
+            error
+        )
+    tables = document.pop("intended", [])
+    if document or not (isinstance(tables, list) and all(isinstance(t, dict) for t in tables)):
+        raise click.UsageError(f"{path}: {', '.join(document)}: use tables [[intended]] only")
+    return tuple(_intended(path, number, t) for number, t in enumerate(tables, start=1))
+
+
+def _intended(path: Path, number: int, table: Mapping[str, Any]) -> Intended:
+    where = f"{path}: entry {number}"
+    if other := sorted(set(table) - {f.name for f in fields(Intended)}):
+        raise click.UsageError(f"{where}: {', '.join(other)}: use name, old, new and reason")
+    for key in ("name", "reason"):
+        if not (isinstance(table.get(key), str) and table[key].strip()):
+            raise click.UsageError(f"{where}: {key} = {table.get(key)!r}: write a text")
+    for key in ("old", "new"):
+        if not isinstance(table.get(key, ""), float | int | str):
+            raise click.UsageError(f"{where}: {key} = {table[key]!r}: write a number or a text")
+    return Intended(**table)
+
+
 _STUDY_RUNS = (
     *(("stability", name) for name in ("needle_block", "bending_rod", "kf_cube")),
     *((kind, name) for name in ("fluid_phantom", "bending_rod", "kf_cube_inertia")
@@ -268,12 +336,15 @@ _OPTIONS = {
 }  # fmt: skip
 
 
-def commands(out: Path, *, quick_studies: bool) -> Iterator[list[str]]:
-    """Arguments of `validate` that make every report the guard holds."""
+def commands(out: Path, *, quick_studies: bool, quick: bool = False) -> Iterator[list[str]]:
+    """Arguments of `validate` that make every report the guard holds; `quick`: runs only."""
+    if quick:
+        yield ["run", "--all", "--quick", "--out", str(out / "run")]
+        return
     yield ["run", "--all", "--out", str(out / "run")]
-    quick = ["--quick"] if quick_studies else []
+    shorter = ["--quick"] if quick_studies else []
     for kind, name in _STUDY_RUNS:
-        options = [*_OPTIONS.get(kind, ()), *quick, "--out", str(out / "study")]
+        options = [*_OPTIONS.get(kind, ()), *shorter, "--out", str(out / "study")]
         yield ["study", kind, name, *options]
 
 
@@ -288,10 +359,13 @@ _FILE = click.Path(path_type=Path)
 @main.command()
 @click.argument("out", type=_FILE)
 @click.option("--quick-studies", is_flag=True, help="Studies in their quick form.")
-def make(out: Path, quick_studies: bool) -> None:
+@click.option("--quick", is_flag=True, help="Experiments in their quick form, and no studies.")
+def make(out: Path, quick_studies: bool, quick: bool) -> None:
     """Runs the experiments and the studies; exit 2 where a command could not run."""
+    if quick and quick_studies:
+        raise click.UsageError("--quick makes no studies: leave out --quick or --quick-studies")
     failed = []
-    for arguments in commands(out, quick_studies=quick_studies):
+    for arguments in commands(out, quick_studies=quick_studies, quick=quick):
         click.echo("validate " + " ".join(arguments), err=True)
         # 1 is a verdict (a check that failed, a choice that nothing meets), not a failure to run.
         if subprocess.run([sys.executable, "-m", "validate", *arguments]).returncode > 1:
@@ -316,19 +390,36 @@ def collect_(folder: Path, out: Path) -> None:
 @click.argument("first", type=_FILE)
 @click.argument("second", type=_FILE)
 @click.option("--renames", type=_FILE, help="Old and new name a line, for what moved on purpose.")
-def compare_(first: Path, second: Path, renames: Path | None) -> None:
+@click.option("--intended", type=_FILE, default=INTENDED, help="Changes made on purpose (TOML).")
+def compare_(first: Path, second: Path, renames: Path | None, intended: Path) -> None:
     """Prints what differs, what is missing and what is new; exit 1 on the first two."""
-    a, b = renamed(read(first), _read_renames(renames)), read(second)
+    a, b, listed = (
+        renamed(read(first), _read_renames(renames)),
+        read(second),
+        read_intended(intended),
+    )
+    if None not in (kinds := (quick_runs(a), quick_runs(b))) and kinds[0] != kinds[1]:
+        short = first if kinds[0] else second
+        raise click.UsageError(
+            f"{short} holds quick runs, the other file does not: use --quick for both or none"
+        )
     result = compared(a, b)
-    for name in result.differ:
+    known = {n: i for n in result.differ for i in listed if i.covers(n, a[n].value, b[n].value)}
+    unexpected = [name for name in result.differ if name not in known]
+    for name, change in known.items():
+        click.echo(f"intended {name}: {a[name].value} | {b[name].value} ({change.reason})")
+    for change in listed:
+        if change not in known.values():
+            click.echo(f"listed, not seen {change.name} ({change.reason})")
+    for name in unexpected:
         click.echo(f"differs  {name}: {a[name].value} | {b[name].value}")
     for name in result.missing:
         click.echo(f"missing  {name}: {a[name].value}")
     for name in result.new:
         click.echo(f"new      {name}: {b[name].value}")
-    click.echo(f"{result.equal} equal, {len(result.differ)} differ, "
-               f"{len(result.missing)} missing, {len(result.new)} new")  # fmt: skip
-    sys.exit(bool(result.differ or result.missing))
+    click.echo(f"{result.equal} equal, {len(unexpected)} differ, {len(result.missing)} missing, "
+               f"{len(result.new)} new, {len(known)} intended")  # fmt: skip
+    sys.exit(bool(unexpected or result.missing))
 
 
 if __name__ == "__main__":

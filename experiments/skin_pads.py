@@ -3,7 +3,8 @@
 One recording of aflahelouneg/inverse_identification_soft_tissue (MIT): 544 tracked points in 49
 images, pad force in a unit that nobody stated. Neither thickness nor unit is known, so modulus
 times thickness is identified, in that unit per metre. No modulus changes the field of the points.
-Other recordings of the kind: `--set data=FOLDER`.
+Other recordings of the kind: `--set data=FOLDER`. Where the marks of the pads are not of the same
+images, the pads can follow the edges of the field: `--set pads.follow=edges --set pads.window=8mm`.
 """
 
 from validate.compare.expected import Expected

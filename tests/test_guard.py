@@ -112,9 +112,9 @@ def test_it_ends_with_1_on_a_difference_and_on_what_is_missing(
     assert [done.exit_code for done in ends.values()] == [0, 1, 1]
     last = [done.output.splitlines()[-1] for done in ends.values()]
     assert last == [
-        "10 equal, 0 differ, 0 missing, 0 new",
-        "9 equal, 1 differ, 0 missing, 0 new",
-        "7 equal, 0 differ, 3 missing, 0 new",
+        "10 equal, 0 differ, 0 missing, 0 new, 0 intended",
+        "9 equal, 1 differ, 0 missing, 0 new, 0 intended",
+        "7 equal, 0 differ, 3 missing, 0 new, 0 intended",
     ]
 
 
@@ -144,3 +144,116 @@ def test_it_makes_every_experiment_and_every_kind_of_study(guard: ModuleType) ->
         "stability", "tradeoff", "choose", "filters",
     }  # fmt: skip
     assert all("--quick" in arguments for arguments in made[1:])
+
+
+def test_a_quick_make_runs_every_experiment_and_no_study(guard: ModuleType) -> None:
+    assert list(guard.commands(Path("out"), quick_studies=False, quick=True)) == [
+        ["run", "--all", "--quick", "--out", "out/run"]
+    ]
+    done = CliRunner().invoke(guard.main, ["make", "out", "--quick", "--quick-studies"])
+    assert done.exit_code == 2
+    assert "no studies" in done.output
+
+
+def quick_report(folder: Path, settings: str, value: float = 1e-3) -> Path:
+    run = report(folder, value) / "run" / "rod"
+    run.rename(run.with_name(f"rod+quick-{settings}"))
+    return folder
+
+
+def test_quick_runs_are_compared_by_experiment_and_never_with_full_ones(
+    guard: ModuleType, tmp_path: Path
+) -> None:
+    """The folder's hash of settings is no part of a name."""
+    first = stored(guard, quick_report(tmp_path / "a", "3fa2c1"))
+    same = stored(guard, quick_report(tmp_path / "b", "8ab12c"))
+    moved = stored(guard, quick_report(tmp_path / "c", "3fa2c1", value=2e-3))
+    full = stored(guard, report(tmp_path / "d"))
+    assert "run/rod+quick: fem score tip.rms@all" in guard.read(Path(first))
+    ends = [CliRunner().invoke(guard.main, ["compare", first, x]) for x in (same, moved, full)]
+    assert [done.exit_code for done in ends] == [0, 1, 2]
+    assert f"{first} holds quick runs" in " ".join(ends[-1].output.split())
+
+
+TIP = "run/rod: fem score tip.rms@all"
+
+
+def compared_with(
+    guard: ModuleType, folder: Path, intended: str, value: float = 2e-3
+) -> tuple[int, list[str]]:
+    """Exit code and lines of a comparison in which the score went from 1 mm to `value` m."""
+    first = stored(guard, report(folder / "a", value=1e-3))
+    second = stored(guard, report(folder / "b", value=value))
+    listed = folder / "intended.toml"
+    listed.write_text(intended, "utf-8")
+    done = CliRunner().invoke(guard.main, ["compare", first, second, "--intended", str(listed)])
+    return done.exit_code, done.output.splitlines()
+
+
+def entry(name: str, values: str = "") -> str:
+    return f"[[intended]]\nname = '{name}'\n{values}\nreason = 'finer mesh'\n"
+
+
+@pytest.mark.parametrize(
+    ("listed", "code"),
+    [
+        (entry(TIP, "old = 1e-3\nnew = 2.0001e-3"), 0),
+        (entry("run/rod: * score tip.rms*"), 0),
+        (entry(TIP, "old = 1e-3"), 0),
+        (entry(TIP, "old = 1e-3\nnew = 2.001e-3"), 1),
+        (entry(TIP, "old = 2e-3\nnew = 1e-3"), 1),
+        (entry("run/rod: fem score tip"), 1),
+        (entry(TIP, "new = nan"), 1),
+        (entry(TIP, "old = 2e-3"), 1),
+        ("", 1),
+    ],
+)
+def test_a_listed_change_is_no_failure_where_name_and_values_agree(
+    guard: ModuleType, tmp_path: Path, listed: str, code: int
+) -> None:
+    done, lines = compared_with(guard, tmp_path, listed)
+    assert done == code
+    known = f"intended {TIP}: 0.001 | 0.002 (finer mesh)"
+    assert (known in lines) == (code == 0)
+    assert (f"differs  {TIP}: 0.001 | 0.002" in lines) == (code == 1)
+    assert any(line.startswith("listed, not seen") for line in lines) == (
+        code == 1 and listed != ""
+    )
+    assert lines[-1].endswith(f"{code} differ, 0 missing, 0 new, {1 - code} intended")
+
+
+def test_a_listed_change_that_did_not_come_is_reported_and_no_failure(
+    guard: ModuleType, tmp_path: Path
+) -> None:
+    done, lines = compared_with(guard, tmp_path, entry(TIP), value=1e-3)
+    assert (done, lines[0]) == (0, f"listed, not seen {TIP} (finer mesh)")
+
+
+def test_a_row_of_a_table_is_listed_by_its_printed_name(guard: ModuleType) -> None:
+    change = guard.Intended("x: cells [modal, 4] error_m", "finer mesh", new="unstable")
+    assert change.covers("x: cells [modal, 4] error_m", "stable", "unstable")
+    assert not change.covers("x: cells [modal, 4] error_m", "unstable", "stable")
+    assert not change.covers("x: cells m error_m", "stable", "unstable")
+
+
+@pytest.mark.parametrize(
+    ("listed", "words"),
+    [
+        ("[[intended]]\nname = 'x'\n", "entry 1: reason = None"),
+        (entry("x", "valu = 2"), "entry 1: valu: use name"),
+        (entry("x", "old = [1, 2]"), r"entry 1: old = \[1, 2\]: write a number"),
+        ("name = 'x'", r"tables \[\[intended\]\] only"),
+        ("[[intended", "correct the file"),
+    ],
+)
+def test_a_list_that_cannot_be_read_is_refused(
+    guard: ModuleType, tmp_path: Path, listed: str, words: str
+) -> None:
+    path = tmp_path / "intended.toml"
+    path.write_text(listed, "utf-8")
+    with pytest.raises(Exception, match=words):
+        guard.read_intended(path)
+
+
+def test_the_committed_list_can_be_read(guard: ModuleType) -> None:
+    assert isinstance(guard.read_intended(guard.INTENDED), tuple)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.cli.main import run
 from validate.errors import RecordingError, UsageError
 from validate.papers.skin_pads import files as files_module
 from validate.papers.skin_pads.files import FORCE, paired, read_folder
@@ -252,11 +253,163 @@ def test_files_of_a_test_that_do_not_belong_together_are_refused(
     monkeypatch.setattr(files_module, "_LARGEST", 7)
     with pytest.raises(RecordingError, match=r"a.dat: 8 bytes, the limit is 7"):
         files_module.numbers(tmp_path / "a.dat")
-    sizes = iter((5, 4, 5))
-    monkeypatch.setattr(files_module, "numbers", lambda path: None)
-    monkeypatch.setattr(files_module, "_states", lambda *_: np.zeros((next(sizes), 3, 2)))
-    with pytest.raises(RecordingError, match=r"5 states of the points, \[4, 5\] of the marks"):
-        files_module._tracked(tmp_path)
+
+
+# A recording of which the pads' marks are points of the field: 105 states, 50 points on each edge.
+STEPS = np.linspace(0.0, 4.0, 105)
+ROWS, COLUMNS = 50, 21
+EDGE = 24.0  # mm between the outermost points of an edge
+
+
+def grid_folder(path: Path, rows: int = ROWS) -> Path:
+    """Points in a grid from pad to pad, at 38 mm; files of marks are written by the test."""
+    columns = np.linspace(-19, 19, COLUMNS), np.linspace(-EDGE / 2, EDGE / 2, rows)
+    grid = np.stack(np.meshgrid(*columns, indexing="ij"), -1).reshape(-1, 2)
+    drift = np.stack([np.zeros(105), np.linspace(0, 0.4, 105)], axis=1)
+    states = np.array([stretched(grid, p) + d for p, d in zip(STEPS, drift, strict=True)])
+    write(path, "", states / SCALE + [600.0, 400.0])
+    u = np.linspace(0.0, 9.0, 600)
+    np.savetxt(path / "u_moving_pad.dat", u)
+    noise = 1e-4 * np.random.default_rng(1).normal(size=len(u))
+    np.savetxt(path / "f_moving_pad.dat", 0.05 + 0.02 * u + noise)
+    (path / "skin.geo").write_text(GEO)
+    return path
+
+
+def write(path: Path, tail: str, states: Floats, rest_as: str = "column") -> None:
+    """States (nt, k, 2) px as the four files of points or of marks; one mark a row or a column."""
+    for c, axis in enumerate("xy"):
+        rest, later = states[0, :, c : c + 1], states[1:, :, c].T
+        if rest_as == "row":
+            rest, later = rest.T, later.T
+        np.savetxt(path / f"{axis}0{tail}.dat", rest)
+        np.savetxt(path / f"{axis}t{tail}.dat", later)
+
+
+def edge_marks(path: Path, states: int, rest_as: str, off: float = 0.0) -> None:
+    """The edges of the grid as marks, displaced in some states, `off` px beside the points."""
+    for pad, x in ((1, -19.0), (2, 19.0)):
+        edge = np.stack([np.full(ROWS, x), np.linspace(-EDGE / 2, EDGE / 2, ROWS)], axis=1)
+        marks = np.repeat((edge / SCALE + [600.0, 400.0] + [off, 0.0])[None], states, axis=0)
+        write(path, f"_ref_{pad}", marks, rest_as)
+
+
+def require_the_motion(found: Recording) -> None:
+    """The pads separate by the truth, to its shares; what they follow is not compared."""
+    images = Images(found)
+    assert 1e3 * images.pulled == pytest.approx(STEPS, abs=1e-6)
+    assert images.share == pytest.approx(SHARE, abs=1e-6)
+    assert 1e3 * found.marker("pads").x[0, 1, 0] - 1e3 * found.marker("pads").x[0, 0, 0] == (
+        pytest.approx(38.0)
+    )
+    first_column = {f"p{i + 1:04d}" for i in range(len(found.marker("points").names) // 19)}
+    assert not first_column & set(found.marker("points").names)
+
+
+@pytest.mark.parametrize("rest_as", ["column", "row"])
+@pytest.mark.parametrize("states", [2, 50])
+def test_marks_may_be_points_at_the_edges_of_the_field(
+    tmp_path: Path, rest_as: str, states: int
+) -> None:
+    """One displaced state or several, fewer than the points have; one mark a row or a column."""
+    edge_marks(grid_folder(tmp_path), states, rest_as, off=3.0)
+    found = read_folder(tmp_path, (1.0, 1.0), window=1e-3 * EDGE)
+    require_the_motion(found)
+    assert found.record("pads")["follow"].startswith("50 and 50 edge points of the field")
+    assert found.marker("points").x.shape == (105, ROWS * (COLUMNS - 2), 2)
+    assert float(found.record("scale")["m_per_px"]) == pytest.approx(1e-3 * SCALE)
+
+
+def test_a_history_of_two_marks_may_have_one_mark_a_column(tmp_path: Path) -> None:
+    expected = read_folder(folder(tmp_path), (1.0, 1.0))
+    for path in tmp_path.glob("*_ref_*.dat"):
+        np.savetxt(path, np.loadtxt(path, ndmin=2).T)
+    found = read_folder(tmp_path, (1.0, 1.0))
+    assert found.marker("pads").x == pytest.approx(expected.marker("pads").x)
+    assert found.metadata == expected.metadata
+    assert "pads" not in found.metadata
+
+
+def test_the_scale_of_edge_points_is_requested_and_never_24_mm(tmp_path: Path) -> None:
+    edge_marks(grid_folder(tmp_path), 50, "column")
+    with pytest.raises(RecordingError, match=r"480\.0 px apart, .* --set pads\.window=8mm"):
+        read_folder(tmp_path, (1.0, 1.0))
+    x, y = (np.loadtxt(tmp_path / f"{a}0.dat") for a in "xy")
+    np.savetxt(tmp_path / "processed_xt_dic_0000.out", SCALE * np.stack([x, y], axis=1))
+    require_the_motion(read_folder(tmp_path, (1.0, 1.0)))
+    with pytest.raises(UsageError, match=r"pads\.window = -8 mm: must be above 0 mm"):
+        with_values(SOON, {"pads.window": "-8mm"})
+
+
+def test_a_history_of_other_than_two_marks_has_no_known_length(tmp_path: Path) -> None:
+    """With as many states as the points have, marks are a history, also where they name points."""
+    edge_marks(grid_folder(tmp_path), 105, "row")
+    with pytest.raises(RecordingError, match=r"480\.0 px apart, .* \(only two marks"):
+        read_folder(tmp_path, (1.0, 1.0))
+    edge_marks(tmp_path, 105, "column")
+    x = np.loadtxt(tmp_path / "xt_ref_1.dat")
+    np.savetxt(tmp_path / "xt_ref_1.dat", x[:49])
+    with pytest.raises(RecordingError, match="marks of pad 1: files of shapes"):
+        read_folder(tmp_path, (1.0, 1.0))
+
+
+def test_marks_of_other_images_are_refused_with_both_readings(tmp_path: Path) -> None:
+    """Inside a grid most places are near to a point: that alone makes no edge."""
+    grid_folder(tmp_path)
+    other = np.zeros((50, 2, 2)) + [[100.0, 0.0], [100.0, 450.0]]
+    for pad in (1, 2):
+        write(tmp_path, f"_ref_{pad}", other + [700.0 * (pad - 1), 0.0])
+    both = r"105 states of the points, \[50, 50\] of the marks; and .* up to \[200, 160\.3\] px"
+    with pytest.raises(RecordingError, match=both + r".*--set pads\.follow=edges"):
+        read_folder(tmp_path, (1.0, 1.0))
+    inside = np.loadtxt(tmp_path / "x0.dat")[300:302], np.loadtxt(tmp_path / "y0.dat")[300:302]
+    for pad in (1, 2):
+        marks = np.stack(inside, axis=1) + [190.0 * (pad - 1), 0.0]  # five columns
+        write(tmp_path, f"_ref_{pad}", np.repeat(marks[None], 50, axis=0))
+    with pytest.raises(RecordingError, match=r"\[2, 2\] points .*, \[0, 0\] of these at the field"):
+        read_folder(tmp_path, (1.0, 1.0))
+
+
+def test_one_mark_a_pad_is_no_edge(tmp_path: Path) -> None:
+    edge_marks(grid_folder(tmp_path), 50, "column")
+    for axis in "xy":
+        for name in (f"{axis}0_ref_2.dat", f"{axis}t_ref_2.dat"):
+            np.savetxt(tmp_path / name, np.loadtxt(tmp_path / name, ndmin=2)[:1])
+    with pytest.raises(RecordingError, match=r"\[50, 1\] points \(2 needed\)"):
+        read_folder(tmp_path, (1.0, 1.0), window=1e-3 * EDGE)
+
+
+def test_pads_can_follow_the_edges_without_any_marks(tmp_path: Path) -> None:
+    """As in the authors' second recording; two of twelve points of an edge are spurious."""
+    grid_folder(tmp_path, rows=12)
+    xt = np.loadtxt(tmp_path / "xt.dat")
+    xt[[1, 5]] += 40.0
+    np.savetxt(tmp_path / "xt.dat", xt)
+    found = read_folder(tmp_path, (1.0, 1.0), "edges", 1e-3 * EDGE)
+    require_the_motion(found)
+    assert found.record("pads")["follow"].startswith("12 and 12 edge points")
+
+
+def test_the_pad_that_moves_more_comes_first_wherever_it_is(tmp_path: Path) -> None:
+    """The images may be mirrored or turned by a right angle."""
+    grid_folder(tmp_path, rows=12)
+    x = {name: np.loadtxt(tmp_path / f"{name}.dat", ndmin=2) for name in ("x0", "xt", "y0", "yt")}
+    for state in ("0", "t"):
+        np.savetxt(tmp_path / f"y{state}.dat", 1200.0 - x[f"x{state}"])
+        np.savetxt(tmp_path / f"x{state}.dat", x[f"y{state}"])
+    pads = read_folder(tmp_path, (1.0, 1.0), "edges", 1e-3 * EDGE).marker("pads").x
+    moved = 1e3 * np.linalg.norm(pads[-1] - pads[0], axis=1)
+    assert moved == pytest.approx(np.hypot([SHARE * 4, (1 - SHARE) * 4], 0.4))
+
+
+def test_an_edge_of_one_point_is_refused(tmp_path: Path) -> None:
+    grid_folder(tmp_path, rows=12)
+    for name in ("x0", "xt"):
+        x = np.loadtxt(tmp_path / f"{name}.dat", ndmin=2)
+        x[0] -= 100.0
+        np.savetxt(tmp_path / f"{name}.dat", x)
+    with pytest.raises(RecordingError, match=r"1 and 12 points within .* px of the edges"):
+        read_folder(tmp_path, (1.0, 1.0), "edges", 1e-3 * EDGE)
 
 
 def test_a_log_without_samples_at_its_zero_needs_a_larger_bin() -> None:
@@ -272,3 +425,38 @@ def test_a_log_without_samples_at_its_zero_needs_a_larger_bin() -> None:
         RecordingError, match="r: 2 samples within 1 mm of the zero of displacement,"
     ):
         binned(recording, p)  # type: ignore[arg-type]
+
+
+def test_a_run_is_driven_by_the_edge_points(project_root: Path, tmp_path: Path) -> None:
+    """The pads of the simulated sheet move by the truth at every load step with an image."""
+    edge_marks(grid_folder(tmp_path), 50, "column")
+    experiment = load_file(project_root / "experiments" / "skin_pads.py")
+    p = with_values(SOON, {"data": str(tmp_path), "pads.window": "24mm", "mesh.cells": "1",
+                           "material.E_linear": "28"})  # fmt: skip
+    recordings = load(p, Path())
+    p = with_values(p, {path: repr(value) for path, value in stated(recordings[0]).items()})
+    ended = solve(experiment, recordings, "linear", experiment.methods["linear"], p)
+    assert ended.whole
+    pads = ended.seen.inputs[ended.seen.inputs.sum(axis=1) <= 4e-3]
+    assert len(pads) > 10
+    assert 1e3 * pads[:, 0] == pytest.approx(SHARE * 1e3 * pads.sum(axis=1), abs=1e-4)
+    assert 1e3 * ended.seen.inputs[-1].sum() == pytest.approx(6.0, abs=0.2)
+    assert any("50 and 50 edge points" in text for text in ended.seen.findings)
+
+
+@pytest.mark.slow
+def test_validate_run_reports_what_the_pads_follow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "data").mkdir()
+    edge_marks(grid_folder(tmp_path / "data"), 50, "row")
+    arguments = [
+        "run", "skin_pads", "--quick", "--methods", "linear", "--out", str(tmp_path / "out"),
+        "--set", f"data={tmp_path / 'data'}", "--set", "mesh.cells=1",
+    ]  # fmt: skip
+    assert run(arguments) == 2
+    assert "pass it with its unit, as in --set pads.window=8mm" in capsys.readouterr().err
+    assert run([*arguments, "--set", "pads.window=24mm"]) == 1  # the truth is no sheet's field
+    assert "material.E_linear" in capsys.readouterr().out
+    (page,) = (tmp_path / "out").glob("skin_pads*/report.html")
+    assert "The pads follow 50 and 50 edge points of the field" in page.read_text("utf-8")

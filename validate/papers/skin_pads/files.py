@@ -4,6 +4,19 @@ A folder holds matrices of numbers: points and two marks per pad in pixels over 
 pad's displacement (mm) and force (no unit) on a clock of its own, some of the points once more in
 mm, and a Gmsh script with the geometry. Nothing has a time stamp: images are paired with samples of
 the force by how far the pads had come apart, and times are numbers of samples.
+
+Files of points: x0.dat, y0.dat (k, 1) at rest, xt.dat, yt.dat (k, nt) in the images. Files of the
+marks: the same with _ref_1 (moving pad) and _ref_2 (fixed pad). The marks are read as
+
+1. a history, where they have as many states as the points;
+2. named points of the field, where at rest they lie on points at its two edges (one mark a row or a
+   column). The pads then follow these points;
+3. not at all with `pads.follow=edges`: the pads follow the points at the two edges. The authors'
+   second recording (bimaterial, with a keloid) needs this: its field is a grid from pad to pad, and
+   its files of marks belong to the first recording.
+
+Points that the pads follow are not compared. Two marks of a pad are 24 mm apart, which is the
+scale; in cases 2 and 3 the scale is `pads.window`, or comes from points given in mm.
 """
 
 import re
@@ -11,21 +24,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.files import buffered, read_bytes, read_text
+from validate.papers.skin_pads.edge_points import Marks, Points, edges, named_points
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.units import SYMBOLIC
 
 FORCE = SYMBOLIC[0]
+Follow = Literal["marks", "edges"]
 WINDOW = (
     24e-3  # m between the two marks of a pad, the extensometer's window in the authors' scripts
 )
 _LARGEST = 64_000_000  # bytes of a file of numbers
 _POINTS = ("x0.dat", "y0.dat", "xt.dat", "yt.dat")
+_MARKS = ("x0", "y0", "xt", "yt")
 _GEO = {"L": "sheet.length", "H": "sheet.width", "l_pad": "pads.length", "h_pad": "pads.width",
         "dL_pad": "pads.gap"}  # fmt: skip
 
@@ -36,7 +53,15 @@ class Tracked:
 
     points: Floats
     pads: Floats
-    window: float  # px between the marks of a pad at rest
+    window: float  # px between the outermost marks of a pad at rest
+    window_m: float | None = None  # the same in m, where it is known
+    followed: tuple[Points, Points] | None = None  # points that are the marks of the pads
+
+    @property
+    def compared(self) -> Points:
+        """Numbers of the points that no pad follows."""
+        every = np.arange(self.points.shape[1])
+        return every if self.followed is None else np.setdiff1d(every, np.hstack(self.followed))
 
     @property
     def pulled(self) -> Floats:
@@ -45,13 +70,21 @@ class Tracked:
         return np.asarray(apart - apart[0])
 
 
-def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
+def read_folder(
+    folder: Path,
+    signs: tuple[float, float],
+    follow: Follow = "marks",
+    window: float | None = None,
+) -> Recording:
     """The recording of a folder; `signs` of displacement and force make pulling apart positive.
+
+    `follow`: whether the pads follow their marks or the points at the edges of the field; `window`
+    m between the outermost marks of a pad at rest (None: 24 mm for two marks).
 
     Raises `RecordingError` for files that are missing, no numbers, or do not belong together, for
     pads that approach each other, and where no image can be paired.
     """
-    seen = _tracked(folder)
+    seen = _tracked(folder, follow)
     u, f = (signs[i] * numbers(folder / name).ravel()
             for i, name in enumerate(("u_moving_pad.dat", "f_moving_pad.dat")))  # fmt: skip
     if len(u) != len(f) or len(u) < 20:
@@ -59,12 +92,12 @@ def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
             f"{folder}: {len(u)} displacements, {len(f)} forces; 20 of both needed"
         )
     _require_apart(folder, u, f)
-    scale, by = _scale(folder, seen)
+    scale, by = _scale(folder, seen, window)
     toe = _toe(folder, u)
     pulled = scale * seen.pulled
     t, matched = paired(folder, pulled, 1e-3 * u - toe)
-    names = tuple(f"p{i + 1:04d}" for i in range(seen.points.shape[1]))
-    points, pads = (scale * x[: len(t)] for x in (seen.points, seen.pads))
+    names = tuple(f"p{i + 1:04d}" for i in seen.compared)
+    points, pads = (scale * x[: len(t)] for x in (seen.points[:, seen.compared], seen.pads))
     samples = np.arange(len(u), dtype=np.float64)
     return Recording(
         folder.name,
@@ -87,8 +120,21 @@ def read_folder(folder: Path, signs: tuple[float, float]) -> Recording:
             "scale": {"m_per_px": f"{scale:.8g}", "by": by},
             "zero": {"displacement_m": f"{toe:.8g}"},
             "geometry": _geometry(folder),
+            **_followed(seen),
         },
     )
+
+
+def _followed(seen: Tracked) -> Mapping[str, Mapping[str, str]]:
+    if seen.followed is None:
+        return {}
+    moving, fixed = map(len, seen.followed)
+    return {
+        "pads": {
+            "follow": f"{moving} and {fixed} edge points of the field, by their median; "
+            "these points are not compared"
+        }
+    }
 
 
 def numbers(path: Path) -> Floats:
@@ -105,19 +151,36 @@ def numbers(path: Path) -> Floats:
     return np.asarray(found, dtype=np.float64)
 
 
-def _tracked(folder: Path) -> Tracked:
-    x0, y0, xt, yt = (numbers(folder / name) for name in _POINTS)
-    points = _states("points", x0, y0, xt, yt)
-    marks = []
-    for pad in (1, 2):
-        names = (f"{a}_ref_{pad}.dat" for a in ("x0", "y0", "xt", "yt"))
-        marks.append(_states(f"marks of pad {pad}", *(numbers(folder / n) for n in names)))
-    if len({len(points), *map(len, marks)}) > 1:
-        raise RecordingError(
-            f"{folder}: {len(points)} states of the points, {[len(m) for m in marks]} of the marks"
-        )
-    window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
-    return Tracked(points, np.stack([m.mean(axis=1) for m in marks], axis=1), window)
+def _tracked(folder: Path, follow: Follow) -> Tracked:
+    """Read points and pads; raises `RecordingError` where the marks belong to other images."""
+    points = _states("points", *(numbers(folder / name) for name in _POINTS))
+    if follow == "edges":
+        return _on_points(points, edges(points))
+    files = [_oriented(*(numbers(folder / f"{a}_ref_{pad}.dat") for a in _MARKS)) for pad in (1, 2)]
+    if all(1 + xt.shape[1] == len(points) for _, _, xt, _ in files):
+        marks = [_states(f"marks of pad {pad}", *m) for pad, m in enumerate(files, start=1)]
+        window = float(np.mean([np.linalg.norm(np.ptp(m[0], axis=0)) for m in marks]))
+        two = all(m.shape[1] == 2 for m in marks)
+        middle = np.stack([m.mean(axis=1) for m in marks], axis=1)
+        return Tracked(points, middle, window, WINDOW if two else None)
+    return _on_points(points, named_points(folder.name, points, files))
+
+
+def _oriented(*files: Floats) -> Marks:
+    """The files of a pad's marks with one mark a row; at rest they are a column or a row."""
+    x0, y0, xt, yt = files
+    if x0.shape[0] == 1 < x0.shape[1] == xt.shape[1]:
+        return x0.T, y0.T, xt.T, yt.T
+    return x0, y0, xt, yt
+
+
+def _on_points(points: Floats, pads: tuple[Points, Points]) -> Tracked:
+    """Pads that follow points of the field: by their median, as single points may be spurious."""
+    rest = points[0]
+    moved = [np.median(points[:, pad] - rest[pad], axis=1) for pad in pads]
+    middle = [rest[pad].mean(axis=0) + m for pad, m in zip(pads, moved, strict=True)]
+    window = float(np.mean([np.linalg.norm(np.ptp(rest[pad], axis=0)) for pad in pads]))
+    return Tracked(points, np.stack(middle, axis=1), window, followed=pads)
 
 
 def _states(what: str, x0: Floats, y0: Floats, xt: Floats, yt: Floats) -> Floats:
@@ -140,11 +203,21 @@ def _require_apart(folder: Path, u: Floats, f: Floats) -> None:
             )
 
 
-def _scale(folder: Path, seen: Tracked) -> tuple[float, str]:
-    """m per px from points that the folder has in mm as well, else from the marks' distance."""
-    first = sorted(folder.glob("*xt_dic_0000.out"))
+def _scale(folder: Path, seen: Tracked, window: float | None) -> tuple[float, str]:
+    """m per px from `window` m, else from points that the folder has in mm as well, else from the
+    distance of two marks of a pad; raises `RecordingError` where none of these is known."""
+    first = sorted(folder.glob("*xt_dic_0000.out")) if window is None else []
     if not first:
-        return WINDOW / seen.window, f"marks {1e3 * WINDOW:g} mm apart, {seen.window:.1f} px"
+        length = seen.window_m if window is None else window
+        if length is None or seen.window == 0:
+            raise RecordingError(
+                f"{folder.name}: no scale: the outermost marks of a pad are {seen.window:.1f} px "
+                "apart, and no file has this length (only two marks of a pad are 24 mm apart): "
+                "pass it with its unit, as in --set pads.window=8mm, or add the points in mm "
+                "(processed_xt_dic_0000.out)"
+            )
+        by = "marks" if window is None else "pads.window: marks"
+        return length / seen.window, f"{by} {1e3 * length:g} mm apart, {seen.window:.1f} px"
     mm = numbers(first[0])
     ratios = np.ptp(mm, axis=0) / np.ptp(seen.points[0], axis=0)
     if abs(ratios[0] / ratios[1] - 1) > 0.01:

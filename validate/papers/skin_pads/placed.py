@@ -67,6 +67,7 @@ def place(recording: Recording, parameters: PulledSkin, scene: Scene) -> Registe
         f"Beyond {1e3 * images.pulled[-1]:.2f} mm no image shows the share of each pad; the "
         f"moving pad's share of {images.share:.2f} is kept (it does not affect force if the "
         "far boundary is free).",
+        *(f"The pads follow {text}." for text in recording.metadata.get("pads", {}).values()),
     )
     rest, *loaded = _holds(holds, t[~mine])
     compared = (*_windows(p, curve, t[mine]), *loaded)

@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.datasets.home import found
 from validate.errors import UsageError
-from validate.papers.skin_pads.files import FORCE, read_folder
+from validate.papers.skin_pads.files import FORCE, Follow, read_folder
 from validate.parameters import Ranges, known, quantity
 from validate.recording.types import Recording
 from validate.scene.box import box
@@ -52,6 +52,19 @@ class Pads:
     length: float | None = quantity(None, "m", "of a pad along the pull", asked=True)
     width: float | None = quantity(None, "m", "of a pad across it", asked=True)
     gap: float | None = quantity(None, "m", "between the pads at rest", asked=True)
+    follow: Follow = quantity(
+        "marks", "1", "what a pad moves with: its marks, or the points at the field's edge"
+    )
+    window: float | None = quantity(
+        None, "m", "between the outermost marks of a pad at rest; none: 24 mm for two marks"
+    )
+
+    def __post_init__(self) -> None:
+        if self.window is not None and not self.window > 0:
+            raise UsageError(
+                f"pads.window = {1e3 * self.window:g} mm: must be above 0 mm; give the distance "
+                "between the outermost marks of a pad"
+            )
 
 
 @dataclass(frozen=True)
@@ -115,7 +128,8 @@ class SheetModel:
 
 def load(parameters: PulledSkin, folder: Path) -> tuple[Recording, ...]:
     where = found(FOLDER, None, folder, parameters.data)
-    return (read_folder(where, (parameters.signs.displacement, parameters.signs.force)),)
+    signs, pads = parameters.signs, parameters.pads
+    return (read_folder(where, (signs.displacement, signs.force), pads.follow, pads.window),)
 
 
 def stated(recording: Recording) -> dict[str, float]:
