@@ -45,6 +45,11 @@ def inside(found: Answers) -> bool:
     return found.get("outline.shows") == _WALL
 
 
+def filled(found: Answers) -> bool:
+    """Whether a fluid fills the inclusion."""
+    return inside(found) and found.get("outline.fluid") == "true"
+
+
 def place_questions(recording: Recording, found: Answers) -> Sequence[Question]:
     """Return the questions about the inclusion and the images' place; none if not compared."""
     if not recording.contours or found.get("outline.shows", _OTHER) == _OTHER:
@@ -113,7 +118,7 @@ def fields(found: Answers) -> dict[str, str]:
     if found.get("outline.shows", _OTHER) == _OTHER:
         return {"outline": "", "accept_outline": "", "body": specimen_arguments(found),
                 "fluid": order, "E": "None"}  # fmt: skip
-    fluid = inside(found) and found["outline.fluid"] == "true"
+    fluid = filled(found)
     return {
         "outline": f"    # The images and their position, m.\n    outline={_card(found)},\n",
         "accept_outline": f"\n        {accept_line('contour', 'm', found)}",

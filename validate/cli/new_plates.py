@@ -1,6 +1,7 @@
 """A log of a testing machine: a body pressed between plates, or pulled between grips."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,14 @@ import numpy as np
 from validate.cli import new_outline
 from validate.cli.asking import Answers, Question
 from validate.cli.new_kind import NewKind, quantity_in, reason_question
+from validate.cli.new_law import LINEAR, coefficient_values, law_questions
 from validate.cli.new_mesh import mesh_questions, mesh_sizes, specimen_mesh
 from validate.identify.modulus import stated_test
+from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression, stated_sizes
 from validate.scene.body_facts import SAME
+from validate.scene.laws import law_kind
 
 _USUAL = Compression()  # the windows of strain, unless a test ends earlier
 _TENTH = 0.1  # of a force: the proposed limit of its error
@@ -40,7 +44,10 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
                               choices=tuple(_WORDS)))  # fmt: skip
     if found.get("specimen.mesh") is not None:
         asked += _of_the_sizes(recording, found)
-    return [*asked, *_accepts(recording, found), *new_outline.place_questions(recording, found)]
+    asked += new_outline.place_questions(recording, found)
+    if not new_outline.filled(found):  # a fluid inside needs the linear law
+        asked += law_questions(_USUAL, found, LINEAR, "it holds to strains of about 0.1")
+    return [*asked, *_accepts(recording, found)]
 
 
 def _of_the_sizes(recording: Recording, found: Answers) -> list[Question]:
@@ -127,7 +134,26 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "free": free,
         "fixed": fixed,
         "ends": ends,
-        **new_outline.fields(found),
+        **_of_the_law(found, new_outline.fields(found)),
+    }
+
+
+def _of_the_law(found: Answers, outlined: dict[str, str]) -> dict[str, str]:
+    """The law in the models' words and arguments, and its coefficients beside the modulus."""
+    law = found.get("law", LINEAR)
+    if law == LINEAR:
+        return {**outlined, "law": LINEAR}
+    given = with_values(_USUAL, coefficient_values(found)).material.coefficients
+    parts = ", ".join(
+        f"{f.name}={value!r}"
+        for f in fields(given) if (value := getattr(given, f.name)) != f.default
+    )  # fmt: skip
+    extra = f", coefficients=cards.Coefficients({parts})" if parts else ""
+    return {
+        **outlined,
+        "law": law_kind(law).title,
+        "E": outlined["E"] + extra,
+        "fluid": f', law="{law}"{outlined["fluid"]}',
     }
 
 
