@@ -84,7 +84,10 @@ def test_what_the_model_does_not_have_is_left_out_and_named(seen: Path) -> None:
 
 
 def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> None:
-    write_mesh(box((0.02, 0.02, 0.03), (2, 2, 2)), seen / "cyst.npz")
+    names = {"lower_plate": "z0", "upper_plate": "z1", "wall": "x0"}
+    block = box((0.02, 0.02, 0.03), (2, 2, 2))
+    sets = {name: block.facets[side] for name, side in names.items()}
+    write_mesh(replace(block, facets=sets), seen / "cyst.npz")
     inside = {"outline.shows": "inclusion", "specimen.mesh": "cyst.npz", "outline.surface": "wall",
               "outline.fluid": "true", "material.E": "15kPa", **PLACE}  # fmt: skip
     _, text = written(seen, inside)
@@ -97,7 +100,6 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
     assert [m.scene.order for m in mine.methods.values()] == [2, 2]
     (seen / "experiments" / "mine.py").unlink()
     block = box((0.02, 0.02, 0.03), (10, 10, 10))
-    names = {"lower_plate": "z0", "upper_plate": "z1", "wall": "x0"}
     sets = {name: block.facets[side] for name, side in names.items()}
     write_mesh(replace(block, facets=sets), seen / "cyst.npz")
     said, text = written(seen, inside)
@@ -114,8 +116,10 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
 
 def test_a_specimen_of_an_unusual_size_is_a_question(seen: Path) -> None:
     mesh = box((0.02, 0.02, 0.03), (2, 2, 2))
-    meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)]).write(seen / "cyst.vtu")
-    lines = ["experiment = 'plates'", "outline.shows = 'inclusion'", "specimen.mesh = 'cyst.vtu'"]
+    plates = {"lower_plate": mesh.facet_nodes("z0"), "upper_plate": mesh.facet_nodes("z1")}
+    body = meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)], point_sets=plates)
+    body.write(seen / "cyst.inp")
+    lines = ["experiment = 'plates'", "outline.shows = 'inclusion'", "specimen.mesh = 'cyst.inp'"]
     for unit, is_asked in (("mm", True), ("m", False)):
         text = "\n".join([*lines, f"specimen.mesh_unit = '{unit}'"])
         (seen / "a.toml").write_text(text, "utf-8")

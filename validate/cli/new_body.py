@@ -35,6 +35,7 @@ from validate.cli.new_kind import (
     quadratic_fits,
     reason_question,
 )
+from validate.cli.new_law import LINEAR, law_questions, left_open
 from validate.cli.new_motion import (
     DYNAMIC,
     cells_for,
@@ -60,10 +61,10 @@ from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import NOTED, RELEASE
 from validate.replay.measured_markers import AS_SEEN
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.laws import law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 
-_LAWS = {"neo_hooke": "neo-Hooke", "svk": "St. Venant-Kirchhoff", "linear": "linear"}
 _SHAPES = ("file", "block", "cylinder")
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance between outlines, as 0.5mm")}  # fmt: skip
@@ -127,10 +128,10 @@ def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
         Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
                  check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
         by_path("material.nu", "Poisson ratio"),
-        Question("law", "law of the material", "linear", "the pressure acts on the "
-                 "undeformed surface", choices=("linear",)) if pressed else
-        Question("law", "law of the material", "neo_hooke", "large strain; the linear law is run "
-                 "in addition", choices=tuple(_LAWS)),
+        *([Question("law", "law of the material", LINEAR, "the pressure acts on the "
+                    "undeformed surface", choices=(LINEAR,))] if pressed else
+          law_questions(MeasuredBody(), found, "neo_hooke", "large strain; the linear law is run "
+                        "in addition")),
     ]  # fmt: skip
 
 
@@ -341,7 +342,8 @@ def _card(source: str, folder: Path, found: Answers, more: Mapping[str, str]) ->
 def _values(found: Answers) -> dict[str, str]:
     """The answers that are parameters, by path."""
     skipped = ("", UNKNOWN)
-    values = {k: v for k, v in found.items() if k in _PATHS and v not in skipped}
+    paths = _PATHS - left_open(found)
+    values = {k: v for k, v in found.items() if k in paths and v not in skipped}
     nothing = ("seen.markers", "seen.force", "seen.outline")
     values = {k: v for k, v in values.items() if k not in nothing or v != NONE}
     if values.get("indenter.friction") in CONTACT_WORDS:  # a parameter of another path
@@ -365,7 +367,7 @@ def _cells(found: Answers, mesh: Mesh | None, order: int) -> str:
 def _methods(law: str, maker: str, order: int, cells: str) -> list[str]:
     lines = [f'"linear": {maker}("linear law, {cells}", "linear", {order}),']
     if law != "linear":
-        words = f"{_LAWS[law]}, {cells}"
+        words = f"{law_kind(law).title}, {cells}"
         lines.insert(0, f'"solid": {maker}("{words}", "{law}", {order}),')
     return lines
 

@@ -2,26 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields as attributes
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from validate.cli.asking import Answers, Question
-from validate.cli.new_body_questions import known_size, there
+from validate.cli.new_body_questions import facets_of
 from validate.cli.new_kind import (
     accept_line,
     limit_question,
-    quadratic_fits,
     quantity_in,
     reason_question,
 )
+from validate.cli.new_mesh import linear_cells, specimen_arguments, specimen_mesh
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
-from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.mesh import Mesh
-from validate.scene.mesh_file import read_mesh
 from validate.scene.named_place import axis_of
 
 _EDGE, _WALL, _OTHER, _RECORDED = "edge", "inclusion", "other", "recorded"
@@ -29,12 +25,12 @@ _WIDTH = 88  # characters of a line inside a card
 _FRAME = "in the body's frame (z: the axis, 0 at the resting plate; x, y: across, 0 on the axis)"
 
 
-def asks(recording: Recording, found: Answers) -> Sequence[Question]:
-    """None of a recording without outlines, nor of what the model does not have."""
+def shown_questions(recording: Recording) -> list[Question]:
+    """Return which outlines are compared and what they show; none without outlines."""
     if not recording.contours:
         return []
     topics = tuple(recording.contours)
-    asked = [
+    return [
         Question("outline.topic", "outlines to compare", topics[0], "the first in the recording",
                  choices=topics),
         Question("outline.shows", f"what the outlines show: {_EDGE} (the specimen's edge), "
@@ -42,34 +38,36 @@ def asks(recording: Recording, found: Answers) -> Sequence[Question]:
                  f"compared)",
                  open=True, choices=(_EDGE, _WALL, _OTHER)),
     ]  # fmt: skip
-    shows = found.get("outline.shows", _OTHER)
-    if shows == _OTHER:
-        return asked
-    if shows == _WALL:
-        asked += _of_the_inclusion(found)
+
+
+def inside(found: Answers) -> bool:
+    """Whether the outlines show an inclusion, which a mesh file has to hold."""
+    return found.get("outline.shows") == _WALL
+
+
+def filled(found: Answers) -> bool:
+    """Whether a fluid fills the inclusion."""
+    return inside(found) and found.get("outline.fluid") == "true"
+
+
+def place_questions(recording: Recording, found: Answers) -> Sequence[Question]:
+    """Return the questions about the inclusion and the images' place; none if not compared."""
+    if not recording.contours or found.get("outline.shows", _OTHER) == _OTHER:
+        return []
+    asked = _of_the_inclusion(found) if inside(found) else []
     return [*asked, *_of_the_place(recording, found)]
 
 
 def _of_the_inclusion(found: Answers) -> list[Question]:
-    asked = [
-        Question("specimen.mesh", 'mesh file of the specimen, axis z, with the facet sets '
-                 '"lower_plate", "upper_plate" and the inclusion\'s wall', open=True, check=there,
-                 words=()),
-        Question("outline.surface", "facet set of the inclusion's wall", open=True),
+    return [
+        Question("outline.surface", "facet set of the inclusion's wall", open=True,
+                 check=facets_of(specimen_mesh(found))),
         Question("outline.fluid", "whether a fluid of constant volume fills the "
                                   "inclusion", open=True,
                  choices=("true", "false")),
         Question("material.E", "Young's modulus, as 15kPa (the log's slope holds for a specimen "
                  "without inclusion)", open=True, check=quantity_in("Pa")),
     ]  # fmt: skip
-    if Path(found.get("specimen.mesh", "")).suffix.lower() in FOREIGN:
-        asked.insert(
-            1, Question("specimen.mesh_unit", "unit of the file's lengths, as mm", open=True)
-        )
-        if unit := found.get("specimen.mesh_unit"):
-            mesh = read_mesh(Path(found["specimen.mesh"]), unit)
-            asked[2:2] = known_size("specimen.mesh_size", mesh, unit)
-    return asked
 
 
 def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
@@ -111,39 +109,23 @@ def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
     if recording.frames and not recording.contours:
         return ("the images are not compared, as the recording has no outlines: find them "
                 "with `validate outline`",)  # fmt: skip
-    mesh = _mesh_of(found)
-    if mesh is not None and not quadratic_fits(mesh):
-        return (f"{found['specimen.mesh']} has {len(mesh.cells)} cells: linear ones are proposed "
-                "(order=1), as quadratic ones do not fit into a first answer of 30 s",)  # fmt: skip
-    return ()
+    return tuple(line for line in (linear_cells(found),) if line)
 
 
 def fields(found: Answers) -> dict[str, str]:
     """What stands in the file: empty where no outlines are judged."""
+    order = ", order=1" if linear_cells(found) else ""
     if found.get("outline.shows", _OTHER) == _OTHER:
-        return {"outline": "", "accept_outline": "", "body": "", "fluid": "",
-                "E": "None"}  # fmt: skip
-    inside = found["outline.shows"] == _WALL
+        return {"outline": "", "accept_outline": "", "body": specimen_arguments(found),
+                "fluid": order, "E": "None"}  # fmt: skip
+    fluid = filled(found)
     return {
         "outline": f"    # The images and their position, m.\n    outline={_card(found)},\n",
         "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
-        "body": _mesh(found) if inside else "",
-        "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside else "None",
-        "fluid": _of_the_model(found) if inside else "",
+        "body": specimen_arguments(found, found["outline.surface"] if fluid else ""),
+        "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside(found) else "None",
+        "fluid": order + (", fluid=True" if fluid else ""),
     }
-
-
-def _of_the_model(found: Answers) -> str:
-    """What the models of a mesh file are given: linear cells where it has many, and the fluid."""
-    order = "" if quadratic_fits(_mesh_of(found)) else ", order=1"
-    return order + (", fluid=True" if found["outline.fluid"] == "true" else "")
-
-
-def _mesh_of(found: Answers) -> Mesh | None:
-    """The specimen's mesh file, if it has one."""
-    if not found.get("specimen.mesh"):
-        return None
-    return read_mesh(Path(found["specimen.mesh"]), found.get("specimen.mesh_unit"))
 
 
 def _card(found: Answers) -> str:
@@ -159,13 +141,5 @@ def _card(found: Answers) -> str:
     for piece in told[1:]:  # a text may hold spaces: no piece is broken
         short = len(last) + len(piece) < _WIDTH
         lines, last = (lines, f"{last}, {piece}") if short else ([*lines, last], piece)
-    inside = "".join(f"        {line},\n" for line in (*lines, last))
-    return f"cards.PressedOutline(\n{inside}    )"
-
-
-def _mesh(found: Answers) -> str:
-    said = {"mesh": found["specimen.mesh"], "mesh_unit": found.get("specimen.mesh_unit")}
-    if found["outline.fluid"] == "true":
-        said["fluid"] = found["outline.surface"]
-    told = ", ".join(f"{k}={v!r}" for k, v in said.items() if v)
-    return f"        {told},  # from where `validate run` is called\n"
+    body = "".join(f"        {line},\n" for line in (*lines, last))
+    return f"cards.PressedOutline(\n{body}    )"

@@ -1,6 +1,7 @@
 """A log of a testing machine: a body pressed between plates, or pulled between grips."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,17 @@ import numpy as np
 from validate.cli import new_outline
 from validate.cli.asking import Answers, Question
 from validate.cli.new_kind import NewKind, quantity_in, reason_question
+from validate.cli.new_law import LINEAR, coefficient_values, law_questions
+from validate.cli.new_mesh import mesh_questions, mesh_sizes, specimen_mesh
 from validate.identify.modulus import stated_test
+from validate.parameters import with_values
 from validate.recording.types import Recording
-from validate.replay.compression_cards import stated_sizes
+from validate.replay.compression_cards import Compression, stated_sizes
+from validate.scene.body_facts import SAME
+from validate.scene.laws import law_kind
 
+_USUAL = Compression()  # the windows of strain, unless a test ends earlier
+_TENTH = 0.1  # of a force: the proposed limit of its error
 _SIZES = ("diameter", "height")
 _SIDES = ("width_m", "thickness_m", "length_m")
 _WORDS = {
@@ -26,17 +34,36 @@ def _fits(recording: Recording) -> bool:
 
 
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
-    stated, length = stated_sizes(recording), quantity_in("m")
-    asked = []
+    """What the recording does not hold is taken from the mesh, then asked."""
+    asked = new_outline.shown_questions(recording)
+    if asked and "outline.shows" not in found:
+        return asked  # an inclusion needs a mesh
+    asked += mesh_questions(found, needed=new_outline.inside(found))
     if not stated_test(recording):
         asked.append(Question("test", "whether the test presses or pulls", open=True,
                               choices=tuple(_WORDS)))  # fmt: skip
-    asked += [
+    if found.get("specimen.mesh") is not None:
+        asked += _of_the_sizes(recording, found)
+    asked += new_outline.place_questions(recording, found)
+    if not new_outline.filled(found):  # a fluid inside needs the linear law
+        asked += law_questions(_USUAL, found, LINEAR, "it holds to strains of about 0.1")
+    return [*asked, *_accepts(recording, found)]
+
+
+def _of_the_sizes(recording: Recording, found: Answers) -> list[Question]:
+    known, length = _known_sizes(recording, found), quantity_in("m")
+    if found["specimen.mesh"] and specimen_mesh(found) is None:
+        return []  # its unit is still open
+    return [
         Question(f"specimen.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
                  check=length)
-        for name in _SIZES if f"specimen.{name}" not in stated
+        for name in _SIZES if f"specimen.{name}" not in known
     ]  # fmt: skip
-    return [*asked, *_accepts(recording, found), *new_outline.asks(recording, found)]
+
+
+def _known_sizes(recording: Recording, found: Answers) -> dict[str, float]:
+    """Sizes m by parameter: those of the recording, then those of the mesh."""
+    return {**mesh_sizes(found), **stated_sizes(recording)}
 
 
 def _accepts(recording: Recording, found: Answers) -> tuple[Question, Question]:
@@ -77,21 +104,19 @@ def _judged(recording: Recording, found: Answers) -> tuple[float, float | None, 
     """Strain limit, height m, limit of the error N, and what that is a tenth of."""
     said = found.get("specimen.height", "")
     answered = quantity_in("m")(said) if said else None
-    height = stated_sizes(recording).get("specimen.height", answered)
+    height = _known_sizes(recording, found).get("specimen.height", answered)
     moved = recording.signal("displacement", "m").y[:, 0]
     force = recording.signal("force", "N").y[:, 0]
-    limit, inside, judged = 0.10, np.full(len(force), True), "the largest force recorded"
+    limit, inside, judged = _USUAL.limit, np.full(len(force), True), "the largest force recorded"
     if height is not None:
         limit = min(limit, 0.9 * float(np.ptp(moved)) / height)
         inside = np.abs(moved - moved[0]) <= limit * height
         judged = "the force at the strain limit"
-    return limit, height, 0.1 * float(np.ptp(force[inside])), judged
+    return limit, height, _TENTH * float(np.ptp(force[inside])), judged
 
 
 def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> dict[str, str]:
     limit, _, accepted, judged = _judged(recording, found)
-    stated = stated_sizes(recording)
-    by_area = "diameter_m" not in recording.metadata.get("specimen", {})
     test = stated_test(recording) or found["test"]
     free, fixed, ends = _WORDS[test]
     own = found.get("accept.force", "")
@@ -100,29 +125,64 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     reason = found.get("why.force") or default
     return {
         "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered"}',
-        "diameter": _size("diameter", stated, found, by_area=by_area),
-        "height": _size("height", stated, found),
-        "fit_from": f"{0.05 * limit:.3g}",
-        "fit_to": f"{0.5 * limit:.3g}",
+        **{name: _size(name, recording, found) for name in _SIZES},
+        "fit_from": f"{_USUAL.fit_from / _USUAL.limit * limit:.3g}",
+        "fit_to": f"{_USUAL.fit_to / _USUAL.limit * limit:.3g}",
         "limit": f"{limit:.3g}",
         "accept": f"{said:.3g}",
         "reason": repr(reason),
         "free": free,
         "fixed": fixed,
         "ends": ends,
-        **new_outline.fields(found),
+        **_of_the_law(found, new_outline.fields(found)),
     }
 
 
-def _size(name: str, stated: dict[str, float], found: Answers, *, by_area: bool = False) -> str:
-    """A value and its comment; what nobody says is left open."""
-    value, said = stated.get(f"specimen.{name}"), found.get(f"specimen.{name}", "")
-    if value is not None:
+def _of_the_law(found: Answers, outlined: dict[str, str]) -> dict[str, str]:
+    """The law in the models' words and arguments, and its coefficients beside the modulus."""
+    law = found.get("law", LINEAR)
+    if law == LINEAR:
+        return {**outlined, "law": LINEAR}
+    given = with_values(_USUAL, coefficient_values(found)).material.coefficients
+    parts = ", ".join(
+        f"{f.name}={value!r}"
+        for f in fields(given) if (value := getattr(given, f.name)) != f.default
+    )  # fmt: skip
+    extra = f", coefficients=cards.Coefficients({parts})" if parts else ""
+    return {
+        **outlined,
+        "law": law_kind(law).title,
+        "E": outlined["E"] + extra,
+        "fluid": f', law="{law}"{outlined["fluid"]}',
+    }
+
+
+def _size(name: str, recording: Recording, found: Answers) -> str:
+    """A value and its comment with its source; what nobody says is left open."""
+    path = f"specimen.{name}"
+    recorded, of_mesh, said = stated_sizes(recording), mesh_sizes(found), found.get(path, "")
+    if path in recorded:
+        by_area = name == "diameter" and "diameter_m" not in recording.metadata["specimen"]
         how = "of the header's cross-section" if by_area else "in the header"
-        return f"{value:.6g},  # m, recorded: {how}"
+        return f"{recorded[path]:.6g},  # m, recorded: {how}"
+    if path in of_mesh:
+        how = " of equal area" if name == "diameter" else ""
+        return f"{of_mesh[path]:.6g},  # m,{how} of the mesh file"
     if said:
         return f"{quantity_in('m')(said):.6g},  # m, answered"
     return "None,  # m, not in the recording: measure it and write it here"
+
+
+def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
+    """Sizes of the header that the mesh does not have, and what is assumed of outlines."""
+    recorded, of_mesh = stated_sizes(recording), mesh_sizes(found)
+    odd = [
+        f"{path}: {1e3 * recorded[path]:.4g} mm in the header, {1e3 * size:.4g} mm in "
+        f"{found['specimen.mesh']}: check which of them is this specimen's"
+        for path, size in of_mesh.items()
+        if abs(recorded.get(path, size) / size - 1) > SAME
+    ]
+    return (*odd, *new_outline.assumed(recording, found))
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:
@@ -139,5 +199,5 @@ PLATES = NewKind(
     _asks,
     _fields,
     _used,
-    new_outline.assumed,
+    _assumed,
 )

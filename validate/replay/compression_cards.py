@@ -2,12 +2,14 @@
 declared uncertainties, windows of strain, and what images show of it."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from validate.identify.modulus import CylinderSize, TestKind, stated_test
 from validate.parameters import Ranges, known, part, quantity
 from validate.recording.exports.geometry import loaded_area
 from validate.recording.types import Recording
+from validate.replay.mesh_sizes import sizes_of_file
 from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
 
@@ -109,3 +111,13 @@ class Compression:
     fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
     fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
     limit: float = quantity(0.10, "1", "largest strain compared; linear laws hold to about 0.1")
+
+    def stated_by_files(self) -> Mapping[str, float]:
+        """Return the sizes m that a mesh file holds, by parameter; none of a cylinder.
+
+        Raises what reading the file does.
+        """
+        body = self.specimen
+        if body.mesh is None or None not in (body.diameter, body.height):
+            return {}
+        return sizes_of_file(body.mesh, body.mesh_unit)

@@ -1,0 +1,109 @@
+"""What a mesh file of a specimen holds is not asked again, by `validate new` or a run."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+from commands import here, refused
+
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Recording, Signal, Source
+from validate.replay.find import load_file
+from validate.replay.origins import opened
+from validate.scene.box import box, grid
+from validate.scene.mesh_file import write_mesh
+
+SIDES, E = (0.06, 0.045, 0.07), 20e3
+ANSWERS = {"test": "compression", "accept.force": "0.1N", "why.force": "felt"}
+SIZES = {
+    "specimen.diameter": 2 * np.sqrt(SIDES[0] * SIDES[1] / np.pi), "specimen.height": SIDES[2],
+}  # fmt: skip
+
+
+def force_log(**specimen: str) -> Recording:
+    """A block of 60 x 45 x 70 mm and 20 kPa between slipping plates, to 8 % strain."""
+    t = np.arange(200) / 10
+    d = 0.08 * SIDES[2] * t / t[-1]
+    noise = np.random.default_rng(1).normal(0, 5e-3, len(t))
+    force = E * SIDES[0] * SIDES[1] * d / SIDES[2] + noise
+    signals = {
+        "displacement": Signal(t, d[:, None], "m", 0.0, "machine"),
+        "force": Signal(t, force[:, None], "N", 0.005, "machine"),
+    }
+    return Recording("block", Source("x", "", 0, "x"), 0, signals=signals,
+                     metadata={"specimen": specimen} if specimen else {})  # fmt: skip
+
+
+def block(divisions: int = 2, make: Any = box, names: tuple[str, ...] = ("z0", "z1")) -> Any:
+    mesh = make(SIDES, (divisions,) * 3)
+    plates = zip(("lower_plate", "upper_plate"), names, strict=False)
+    return replace(mesh, facets={plate: mesh.facets[name] for plate, name in plates})
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write_recording(force_log(), tmp_path / "log.mcap")
+    write_mesh(block(), tmp_path / "block.npz")
+    mesh = block()
+    sets = {name: mesh.facet_nodes(name) for name in mesh.facets}
+    foreign = meshio.Mesh(1e3 * mesh.nodes, [("tetra", mesh.cells)], point_sets=sets)
+    foreign.write(tmp_path / "block.inp")
+    return tmp_path
+
+
+def answers(folder: Path, **given: str) -> None:
+    lines = {"experiment": "plates", **ANSWERS, **given}
+    text = "\n".join(f'{key} = "{value}"' for key, value in lines.items())
+    (folder / "a.toml").write_text(text, "utf-8")
+
+
+@pytest.mark.parametrize("mesh", [
+    {"specimen.mesh": "block.npz"}, {"specimen.mesh": "block.inp", "specimen.mesh_unit": "mm"},
+])  # fmt: skip
+def test_the_sizes_of_a_mesh_are_not_asked(folder: Path, mesh: Mapping[str, Any]) -> None:
+    answers(folder, **mesh)
+    arguments = ("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
+    assert "specimen.height" not in here(*arguments, "--questions")[1]
+    code, _, err = here(*arguments)
+    assert (code, "specimen." in err) == (0, False), err
+    mine = load_file(folder / "experiments" / "mine.py")
+    used = opened(mine, mine.parameters).parameters
+    assert used.specimen.diameter == pytest.approx(SIZES["specimen.diameter"], rel=1e-5)
+    assert used.specimen.height == pytest.approx(SIZES["specimen.height"], rel=1e-5)
+    code, out, err = here("run", "mine", "--quick", "--methods", "slip")
+    assert code == 0, err
+    assert "1 of 1 requirements are met" in " ".join(out.split())
+
+
+def test_a_run_takes_the_sizes_from_the_mesh_that_it_is_given(folder: Path) -> None:
+    """It asked for specimen.diameter of a block whose mesh was given."""
+    answers(folder)
+    assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
+    assert "specimen.diameter (m) is not set" in refused("run", "mine", "--quick")
+    mesh = ("--set", "specimen.mesh=block.npz")
+    code, _, err = here("run", "mine", "--quick", "--methods", "slip", *mesh)
+    assert code == 0, err
+
+
+def test_a_size_of_the_header_that_the_mesh_does_not_have_is_named(folder: Path) -> None:
+    write_recording(force_log(height_m="0.08"), folder / "log.mcap")
+    answers(folder, **{"specimen.mesh": "block.npz"})
+    err = here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[2]
+    assert "specimen.height: 80 mm in the header, 70 mm in block.npz" in " ".join(err.split())
+
+
+@pytest.mark.parametrize(("mesh", "words"), [
+    (block(make=grid), "expected tetrahedra; for hexahedra answer experiment = body"),
+    (block(names=("z0",)), "no facet set upper_plate; there are lower_plate; name both"),
+    (block(names=("x0", "x1")), "expected flat plates normal to z: turn the mesh"),
+    (block(names=("z1", "z0")), "upper_plate is 70 mm below lower_plate"),
+])  # fmt: skip
+def test_a_mesh_that_plates_cannot_press_is_refused(folder: Path, mesh: Any, words: str) -> None:
+    write_mesh(mesh, folder / "block.npz")
+    answers(folder, **{"specimen.mesh": "block.npz"})
+    assert words in refused("new", "mine", "--from", "log.mcap", "--answers", "a.toml")

@@ -1,0 +1,85 @@
+"""Questions about the mesh file of a specimen between plates, and what it holds."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from validate.cli.asking import Answers, Question
+from validate.cli.new_body_questions import known_size, there
+from validate.cli.new_kind import quadratic_fits
+from validate.replay.mesh_sizes import PLATES, sizes_of_mesh
+from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh import Mesh
+from validate.scene.mesh_file import read_mesh
+
+
+def mesh_questions(found: Answers, *, needed: bool) -> list[Question]:
+    """Return the questions about the mesh file, its unit and its unusual size."""
+    plates = " and ".join(f'"{plate}"' for plate in PLATES)
+    asked = [
+        Question(
+            "specimen.mesh",
+            f"mesh file of the specimen, axis z, with the facet sets {plates}"
+            + ("; it needs the wall of the inclusion, too" if needed else "; empty: a cylinder"),
+            open=needed, check=_readable, words=(),
+        )
+    ]  # fmt: skip
+    file = found.get("specimen.mesh", "")
+    if not _foreign(file):
+        return asked
+    asked.append(
+        Question("specimen.mesh_unit", "unit of the file's lengths, as mm", open=True,
+                 check=lambda unit: sizes_of_mesh(read_mesh(Path(file), unit), Path(file).name))
+    )  # fmt: skip
+    if unit := found.get("specimen.mesh_unit"):
+        asked += known_size("specimen.mesh_size", specimen_mesh(found), unit)
+    return asked
+
+
+def specimen_mesh(found: Answers) -> Mesh | None:
+    """Return the mesh that the answers name; None without one, or before its unit is known."""
+    file, unit = found.get("specimen.mesh", ""), found.get("specimen.mesh_unit")
+    if not file or (_foreign(file) and not unit):
+        return None
+    return _read(file, unit, Path(file).stat().st_mtime_ns)
+
+
+def mesh_sizes(found: Answers) -> dict[str, float]:
+    """Return height and diameter of equal area m of the mesh, by parameter; none without one."""
+    mesh = specimen_mesh(found)
+    return {} if mesh is None else sizes_of_mesh(mesh, Path(found["specimen.mesh"]).name)
+
+
+def specimen_arguments(found: Answers, fluid: str = "") -> str:
+    """Return the line of an experiment file that names the mesh; empty without one."""
+    if not found.get("specimen.mesh"):
+        return ""
+    values = {"mesh": found["specimen.mesh"], "mesh_unit": found.get("specimen.mesh_unit"),
+              "fluid": fluid}  # fmt: skip
+    told = ", ".join(f"{k}={v!r}" for k, v in values.items() if v)
+    return f"        {told},  # from where `validate run` is called\n"
+
+
+def linear_cells(found: Answers) -> str:
+    """Return why linear cells are proposed; empty where quadratic ones fit, or without a mesh."""
+    mesh = specimen_mesh(found)
+    if mesh is None or quadratic_fits(mesh):
+        return ""
+    return (
+        f"{found['specimen.mesh']} has {len(mesh.cells)} cells: linear ones are proposed "
+        "(order=1), as quadratic ones do not fit into a first answer of 30 s"
+    )
+
+
+def _foreign(file: str) -> bool:
+    return Path(file).suffix.lower() in FOREIGN
+
+
+def _readable(file: str) -> None:
+    there(file)
+    if not _foreign(file):
+        sizes_of_mesh(read_mesh(Path(file)), Path(file).name)
+
+
+@lru_cache(maxsize=4)
+def _read(file: str, unit: str | None, changed: int) -> Mesh:
+    return read_mesh(Path(file), unit)
