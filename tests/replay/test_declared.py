@@ -16,6 +16,7 @@ from validate.register.as_declared import as_declared
 from validate.replay import compare
 from validate.replay.declaration import holds_code, to_json
 from validate.replay.experiment import Experiment, Uncertainty, free, vary
+from validate.replay.find import load_file
 from validate.replay.method import Method
 from validate.replay.options import Options, configure
 from validate.scene.geometry import Box
@@ -126,3 +127,54 @@ def test_a_declared_scene_is_no_mesh_yet() -> None:
         _ = BAR.mesh
     with pytest.raises(SceneError, match="direction 'down'"):
         Load("push", "zmax", "down")  # type: ignore[arg-type]
+
+
+DECLARATION = """
+from validate.replay.experiment import Case, Experiment, vary
+from validate.replay.method import Method
+from validate.scene.geometry import Box
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.solve.quasi_static import QuasiStatic
+
+EXPERIMENT = Experiment(
+    name="bar",
+    title="A bar",
+    source="a test",
+    recording="bar.mcap",
+    scene=Scene(
+        body=Box(("20 mm", "20 mm", "50 mm"), cells=(2, 2, 4)),
+        material=Material("100 kPa", 0.3),
+        drives=(Drive("stage", "zmax", "-z"),),
+    ),
+    variations=(vary("material.E", "relative 3 %"),),
+    methods={"linear": Method("linear", QuasiStatic(), {"body.element": "hex8"})},
+    cases=(Case("stiff", "stiffer", {"material.E": "x 1.2"}),),
+)
+"""
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "says"),
+    [
+        ('"100 kPa", 0.3', '"100 kPa", 0.7', "line 16, material: Poisson ratio nu = 0.7"),
+        ('"100 kPa", 0.3', '"100 mm", 0.3', "line 16, material: E=100 mm: expected Pa"),
+        ('"20 mm", "20 mm", "50 mm"', '"20 mm", "20 mm"', "line 15, body: 2 sizes and 3 numbers"),
+        ('vary("material.E"', 'vary("material.G"', "line 19: unknown parameter 'material.G'"),
+        ("relative 3 %", "relative 3 kPa", "line 19: material.E: '3 kPa': expected a number in 1"),
+        ("relative 3 %", "3 %", "line 19, variations: material.E: rule '3 %'"),
+        ("body.element", "body.elements", "line 20: method 'linear' changes the unknown"),
+        ('{"material.E": "x', '{"material.e": "x', "line 21: unknown parameter 'material.e'"),
+        ("Support\n", "Supports\n", "line 6: ImportError: cannot import name 'Supports'"),
+    ],
+)
+def test_an_error_of_a_declaration_names_its_path_and_line(
+    one: str, other: str, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "bar.py").write_text(DECLARATION, "utf-8")
+    assert load_file(tmp_path / "bar.py").name == "bar"
+    (tmp_path / "bar.py").write_text(DECLARATION.replace(one, other), "utf-8")
+    with pytest.raises(UsageError) as refusal:
+        load_file(tmp_path / "bar.py")
+    assert says in str(refusal.value)
+    assert "\n" not in str(refusal.value)

@@ -1,5 +1,6 @@
 """Experiments by name or by file: the one that is asked for is run, and only that."""
 
+import ast
 import importlib.util
 import sys
 import traceback
@@ -9,11 +10,12 @@ from shlex import quote
 from types import ModuleType
 
 from validate.catalogue import FILE, card, experiment_files, name_of, searched_folders
-from validate.errors import UsageError
+from validate.errors import UsageError, ValidateError
 from validate.files import read_text
 from validate.parameters import nearest_names
 from validate.replay.completed import completed
 from validate.replay.declaration import from_json
+from validate.replay.declared_paths import require_paths
 from validate.replay.experiment import Experiment
 
 _LARGEST = 16_000_000  # bytes of a declaration as JSON
@@ -58,6 +60,7 @@ def load_file(path: Path) -> Experiment:
     if experiment.name != name_of(path):
         of = "folder" if path.name == FILE else "file"
         raise UsageError(f"{path}: EXPERIMENT.name is '{experiment.name}', not the {of}'s name")
+    require_paths(experiment, path)
     return completed(experiment, path)
 
 
@@ -86,17 +89,42 @@ def _executed(path: Path) -> ModuleType:
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise UsageError(
-            f"{path}{_place(error, path)}: {type(error).__name__}: {error}; correct the file "
+            f"{path}{_place(error, path)}: {_kind(error)}{error}; correct the file "
             f"(`python {quote(str(path))}` shows the full traceback)"
         ) from error
     return module
+
+
+def _kind(error: BaseException) -> str:
+    """What is wrong in the words of the library, which need no class; else the class."""
+    return "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
 
 
 def _place(error: BaseException, path: Path) -> str:
     """The file's own line that failed, whatever lies below it; "" where there is none."""
     own = str(path.resolve())
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == own]
-    return f", line {lines[-1]}" if lines else ""
+    if not lines or lines[-1] is None:
+        return ""
+    within = _declared_at(path, lines[-1])
+    return f", line {lines[-1]}" + (f", {within}" if within else "")
+
+
+def _declared_at(path: Path, line: int) -> str:
+    """The path of the declaration that a line belongs to: `material`, `methods.fem`."""
+    names: list[tuple[int, str]] = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        pairs = [(node.arg, node.value)] if isinstance(node, ast.keyword) else []
+        if isinstance(node, ast.Dict):
+            pairs = [(k.value, v) for k, v in zip(node.keys, node.values, strict=True)
+                     if isinstance(k, ast.Constant) and isinstance(k.value, str)]  # fmt: skip
+        names += [
+            (value.lineno, name) for name, value in pairs
+            if name and value.lineno <= line <= (value.end_lineno or value.lineno)
+            and any(isinstance(n, ast.Call) for n in ast.walk(value))  # no number has parts
+        ]  # fmt: skip
+    return ".".join(name for _, name in sorted(names, key=lambda n: n[0])
+                    if name not in ("scene", "settings", "parameters"))  # fmt: skip
 
 
 def sources_of(path: Path) -> tuple[Path, ...]:
