@@ -159,7 +159,11 @@ EXPERIMENT = Experiment(
     [
         ('"100 kPa", 0.3', '"100 kPa", 0.7', "line 16, material: Poisson ratio nu = 0.7"),
         ('"100 kPa", 0.3', '"100 mm", 0.3', "line 16, material: E=100 mm: expected Pa"),
-        ('"20 mm", "20 mm", "50 mm"', '"20 mm", "20 mm"', "line 15, body: 2 sizes and 3 numbers"),
+        (
+            '"20 mm", "20 mm", "50 mm"',
+            '"20 mm", "20 mm"',
+            "line 15, body: a block of 2 sizes and 3 numbers",
+        ),
         ('vary("material.E"', 'vary("material.G"', "line 19: unknown parameter 'material.G'"),
         ("relative 3 %", "relative 3 kPa", "line 19: material.E: '3 kPa': expected a number in 1"),
         ("relative 3 %", "3 %", "line 19, variations: material.E: rule '3 %'"),

@@ -74,12 +74,12 @@ class Box:
         take_units(self)
         if len(self.size) not in (2, 3) or len(self.cells) != len(self.size):
             raise SceneError(
-                f"body: {len(self.size)} sizes and {len(self.cells)} numbers of cells; give two or "
-                "three of both"
+                f"a block of {len(self.size)} sizes and {len(self.cells)} numbers of cells: give "
+                "two or three of both"
             )
         if self.grading < 1 or not set(self.symmetry) <= set(_AXES[: len(self.size)]):
             raise SceneError(
-                f"body: grading {self.grading:g} (1 or above), symmetry {self.symmetry} (axes)"
+                f"a block of grading {self.grading:g} (1 or above), symmetry {self.symmetry} (axes)"
             )
 
     @property
@@ -130,7 +130,7 @@ class Cylinder:
         quarter, bricks = self.part == "quarter", self.element.startswith("hex")
         if (quarter and bricks) or (not quarter and self.grading != 1):
             raise SceneError(
-                "body: a quarter of a cylinder is of tetrahedra, and only a quarter is graded"
+                "a quarter of a cylinder is of tetrahedra, and only a quarter is graded"
             )
 
     def resolved(self, folder: Path) -> Mesh:
