@@ -178,8 +178,8 @@ def test_identification(road: Experiment) -> None:
 
 @ROADS
 def test_bands(road: Experiment) -> None:
-    banded = declared(road, uncertainty=FINER, band=lambda card: card.E / 1e6)
-    assert of(compare(banded, Options({})), "fem").band == pytest.approx(0.01)
+    banded = declared(road, uncertainty=FINER, band="sd")
+    assert of(compare(banded, Options({})), "fem").band == road.parameters.sd
     bare = declared(road, uncertainty=FINER)
     assert of(compare(bare, Options({})), "fem").band == 0.0
 

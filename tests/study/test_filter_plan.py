@@ -14,7 +14,7 @@ from validate.cli import running
 from validate.cli.arguments import pairs
 from validate.cli.main import cli
 from validate.errors import UsageError
-from validate.replay.experiment import Case, Experiment, Told
+from validate.replay.experiment import Case, Experiment, Told, vary
 from validate.replay.find import load_file
 from validate.replay.named_run import run_name
 from validate.replay.options import Options, chosen_cases
@@ -130,6 +130,35 @@ def test_a_case_is_a_condition_by_its_name(pulled: Experiment) -> None:
     assert errors[1] > 5 * errors[0]  # the model is twice as stiff as that truth
     with pytest.raises(UsageError, match=r"no case 'sof' of pulled; nearest: soft"):
         plan(more, Options({}, ("kf",)), axes(["case=sof"]), 2)
+
+
+def test_a_declared_sweep_is_the_one_that_nobody_asks_for(
+    pulled: Experiment, tmp_path: Path
+) -> None:
+    swept = vary("methods.kf.Q", "log 1e-12 1e-8, 2 values")
+    more = replace(pulled, variations=(swept, vary("methods.none.Q", "of 1, 2")))
+    found = study(more, methods=("kf",), seeds=2, out=tmp_path, where=Where(0))
+    assert [a.path for a in found.plan.axes] == ["methods.kf.Q"]
+    asked = study(
+        more, ["methods.kf.Q=1e-9"], methods=("kf",), seeds=2, out=tmp_path, where=Where(0)
+    )
+    assert [a.values for a in asked.plan.axes] == [("1e-9",)]
+
+
+@pytest.mark.parametrize(
+    ("rule", "text"),
+    [("log 1e-9 1e-5", "q=log:1e-09:1e-05:5"), ("log 1 10, 3 values", "q=log:1.0:10.0:3"),
+     ("linear 0 1, 5 values", "q=lin:0.0:1.0:5"), ("of 1e-9, 1e-7", "q=1e-9,1e-7")],
+)  # fmt: skip
+def test_a_rule_of_settings_is_a_sweep(rule: str, text: str) -> None:
+    assert vary("q", rule).text == text
+    assert axes([text])
+
+
+@pytest.mark.parametrize("rule", ["log 1", "log 0 1", "linear 0 1", "of", "log 1e-5 1e-9"])
+def test_a_rule_that_is_no_sweep_is_refused(rule: str) -> None:
+    with pytest.raises(UsageError, match=r"^q: "):
+        vary("q", rule)
 
 
 def with_cases(folder: Path) -> Path:

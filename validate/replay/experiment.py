@@ -26,7 +26,7 @@ from validate.replay.ladder import Ladder
 from validate.replay.method import Method
 from validate.replay.tree import Built, CellSize, ScaledBody, Tree, beside, placed_by_names
 from validate.replay.variation import Change as Change
-from validate.replay.variation import Shift, bound, change_of, shares
+from validate.replay.variation import Shift, bound, change_of, shares, swept
 from validate.replay.variation import unchanged as unchanged
 from validate.scene.meshless import AnyScene
 from validate.scene.scene import Scene
@@ -145,7 +145,20 @@ class Uncertainty:
     draws: int = 12
 
 
-Variation = Input | MeshLadder | StepLadder | Free
+@dataclass(frozen=True)
+class Sweep:
+    """Settings that `validate study filters` tries where no `--sweep` is given."""
+
+    path: str
+    rule: str
+
+    @property
+    def text(self) -> str:
+        """As `--sweep` takes it."""
+        return swept(self.rule, self.path)
+
+
+Variation = Input | MeshLadder | StepLadder | Free | Sweep
 
 
 def vary(
@@ -157,10 +170,14 @@ def vary(
         vary("material.nu", "absolute 0.005, below 0.5")          (`replay.variation`)
         vary("body.cells", "x 0.5 0.75 1.3, order 2")             similar meshes, for u_num
         vary("dt", "x 0.5 0.25, order 2")                         time steps, for u_num
+        vary("methods.kf.Q", "log 1e-9 1e-5")                     settings of `study filters`
 
     `order` is the formal one. Raises `UsageError` for a rule that is none.
     """
     paths = (path,) if isinstance(path, str) else tuple(path)
+    if rule.split(" ")[0] in ("log", "linear", "of"):
+        swept(rule, paths[0])
+        return Sweep(paths[0], rule)
     if not rule.startswith("x "):
         words = doc or f"{paths[0]} within its standard uncertainty"
         return Input(name or paths[0], Shift(paths, rule), words, source)
@@ -303,14 +320,16 @@ class Experiment:
     finds parameters from the recordings, by the methods as the user set them; `calibrations` says
     which parameters that stand open (None) are identified, on which residuals. `exhibits` adds
     what this experiment shows besides, from all runs by case ("" is the recorded one) and method.
-    `band` is the relative standard uncertainty of the force that the modulus brings. `axis` is the
-    component that displacement charts follow, `reference` the method that speeds are compared with.
+    `band` is the path of the relative standard uncertainty of the force that the modulus brings.
+    `axis` is the component that displacement charts follow, `reference` the method that speeds are
+    compared with.
     `captions` are sentences under charts, by name; `frames` how many fields of a run are kept.
     `ladder` is how it enters the studies; what it leaves out is derived from the scene.
     `follows` is the experiment as its recordings have it (title, limits, what figures belong to);
     `locates` are parameters that only say where recordings lie, so that `follows` judges these.
     `specimen` names the one that a recording is of: repeats of one specimen count once over all
     experiments; without it all recordings are of one.
+    `sweeps` are settings that `validate study filters` tries where none are asked for.
     `refine` returns the settings by path that `--refine` makes: a first answer is coarser.
     `kind` is what its recordings are where no twin makes them; `needs` names the public data set
     (`validate data`) that they come from. `expected` are the verdicts that it
@@ -336,7 +355,7 @@ class Experiment:
     cases: tuple[Case, ...] = ()
     effects: tuple[EffectSpec, ...] = ()
     sensors: tuple[Sensor, ...] = ()
-    band: Callable[[Any], float] | None = None
+    band: str = ""
     exhibits: Callable[[Any, Cases, Progress], Told] | None = None
     published: tuple[Figure, ...] = ()
     captions: Mapping[str, str] = field(default_factory=dict)
@@ -352,6 +371,7 @@ class Experiment:
     kind: Kind = "measured"
     needs: str = ""
     expected: tuple[Expected, ...] = ()
+    sweeps: tuple[Sweep, ...] = ()
     path: Path | None = field(default=None, compare=False)
     scene: InitVar[Scene | None] = None
     settings: InitVar[Any] = None
@@ -385,6 +405,9 @@ class Experiment:
                 inputs=(*declared.inputs, *inputs),
             )  # fmt: skip
             object.__setattr__(self, "uncertainty", more)
+        object.__setattr__(
+            self, "sweeps", (*self.sweeps, *(v for v in variations if isinstance(v, Sweep)))
+        )
         opens = tuple(v for v in variations if isinstance(v, Free))
         for on in dict.fromkeys(v.on for v in opens):
             several = tuple(v for v in opens if v.on == on)

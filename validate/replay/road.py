@@ -17,7 +17,7 @@ from validate.compare.score import Score, run_scores, scores_of
 from validate.compare.track import track_scores
 from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError
-from validate.parameters import Changed, Parameter, changed, describe
+from validate.parameters import Changed, Parameter, changed, describe, value_at
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.replay.calibrated import (
@@ -266,7 +266,7 @@ def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
             *(s for f in followed for s in consistency_scores(f)),
         ),
         checks=checks_of(road, mine) if accepted else (),
-        band=experiment.band(road.parameters) if experiment.band else 0.0,
+        band=value_at(road.parameters, experiment.band)[0] if experiment.band else 0.0,
         chosen=road.methods[mine.method].chosen,
     )
 

@@ -10,6 +10,7 @@ A standard uncertainty has one meaning: the value moves up by z of them. Where o
 would reach the bound, it moves down instead, and it never lies beyond the bound.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
@@ -167,6 +168,26 @@ def shares(rule: str, path: str) -> tuple[tuple[float, ...], float]:
     if len(factors) < 1 or not formal > 0 or not all(x > 0 and x != 1 for x in factors):
         raise UsageError(f"{path}: rule '{rule}': expected for example x 0.5 0.75 1.3, order 2")
     return factors, formal
+
+
+def swept(rule: str, path: str) -> str:
+    """As `--sweep` takes it: "log 1e-9 1e-5" (a value a decade), "log 1e-9 1e-5, 9 values", "linear
+    0 1, 5 values" or "of 1e-9, 1e-7". Raises `UsageError` for anything else."""
+    kind, _, rest = rule.partition(" ")
+    if kind == "of" and rest.strip():
+        return f"{path}={','.join(part.strip() for part in rest.split(','))}"
+    ends, _, count = (part.strip() for part in rest.partition(","))
+    try:
+        low, high = (float(word) for word in ends.split())
+        decades = round(math.log10(high / low)) + 1 if kind == "log" and 0 < low < high else 0
+        number = int(count.removesuffix("values")) if count else decades
+    except ValueError:
+        number = 0
+    if kind not in ("log", "linear") or number < 2:
+        raise UsageError(
+            f"{path}: rule '{rule}': expected for example log 1e-9 1e-5, 9 values; or of 1e-9, 1e-7"
+        )
+    return f"{path}={'log' if kind == 'log' else 'lin'}:{low!r}:{high!r}:{number}"
 
 
 def bound(given: str | float, path: str) -> float:

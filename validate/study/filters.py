@@ -117,7 +117,7 @@ def study(
     """
     declared = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     options = Options(dict(values or {}), methods, quick)
-    planned = plan(declared, options, axes(sweeps), seeds, hold_out)
+    planned = plan(declared, options, axes(sweeps or _declared(declared, options)), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(declared, KIND, out) / CELLS, where, report)
     _require_filters(planned, done)
@@ -125,6 +125,15 @@ def study(
     by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
+
+
+def _declared(experiment: Experiment, options: Options) -> list[str]:
+    """The sweeps that the experiment declares, of the chosen methods."""
+    chosen = options.methods or tuple(experiment.methods)
+    return [
+        s.text for s in experiment.sweeps
+        if not s.path.startswith("methods.") or s.path.split(".")[1] in chosen
+    ]  # fmt: skip
 
 
 def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
