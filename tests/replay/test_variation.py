@@ -35,6 +35,15 @@ def test_no_input_passes_its_bound_and_one_uncertainty_stays_one(
     assert abs(rule(body, 1.0).material.nu - nu) == pytest.approx(sd, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("bound", "moved"), [("below 0.5", 0.47), ("at most 0.5", 0.5), ("at least 0.5", 0.51)]
+)
+def test_a_bound_turns_a_value_round_or_stops_it(bound: str, moved: float) -> None:
+    body = MeasuredBody(material=Tissue(E=1.0, nu=0.49))
+    at = Shift(("material.nu",), f"absolute 0.02, {bound}")(body, 1.0).material.nu
+    assert at == pytest.approx(moved, abs=1e-12)
+
+
 def test_an_amount_has_a_unit_or_is_another_parameter() -> None:
     by_path = Shift(("material.E",), "relative ranges.E")
     assert pytest.approx(10e3 * 1.05) == by_path(BODY, 1.0).material.E

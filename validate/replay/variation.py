@@ -6,8 +6,9 @@
     vary("material.nu", "absolute 0.005, below 0.5")          the same, with a bound
     vary("material.E", "relative ranges.E")                   ... as large as another parameter says
 
-A standard uncertainty has one meaning: the value moves up by z of them. Where one of them upwards
-would reach the bound, it moves down instead, and it never lies beyond the bound.
+A standard uncertainty has one meaning: the value moves up by z of them. "below": where one of them
+upwards would reach the bound, it moves down instead. "at most", "at least": it stops there. It
+never lies beyond a bound.
 """
 
 import math
@@ -111,9 +112,10 @@ class Shift:
         return self._number(parameters, path, value, z)
 
     def _number(self, parameters: Any, path: str, value: float, z: float) -> float:
-        low, high = _bounds(_parts(self.rule, path)[2], path, value_at(parameters, path)[1])
+        bounds = _parts(self.rule, path)[2]
+        low, high, turns = _bounds(bounds, path, value_at(parameters, path)[1])
         by = self.sd(value, parameters, path)
-        if value + by >= high:
+        if value + by >= turns:
             by = -by
         return max(min(low, value), min(value + z * by, max(high, value)))
 
@@ -142,19 +144,20 @@ def _number(text: str, path: str, unit: str) -> float:
     return value
 
 
-def _bounds(bounds: tuple[str, ...], path: str, unit: str) -> tuple[float, float]:
-    low, high = -float("inf"), float("inf")
+def _bounds(bounds: tuple[str, ...], path: str, unit: str) -> tuple[float, float, float]:
+    """The least and the largest value, and the one from which on a value moves down instead."""
+    low, high, turns = -math.inf, math.inf, math.inf
     for bound in bounds:
         words, _, number = bound.rpartition(" ")
         if words == "below":
-            high = _number(number, path, unit) * (1 - _SHORT_OF)
+            high = turns = _number(number, path, unit) * (1 - _SHORT_OF)
         elif words == "at most":
             high = _number(number, path, unit)
         elif words == "at least":
             low = _number(number, path, unit)
         else:
             raise UsageError(f"{path}: bound '{bound}': expected below, at most or at least")
-    return low, high
+    return low, high, turns
 
 
 def shares(rule: str, path: str) -> tuple[tuple[float, ...], float]:
