@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from beside import beside
 
 from validate.compare.published import Figure
-from validate.papers.ekf_nfem.liver_figures import LIVER_FIGURES
 from validate.replay import load
 from validate.replay.experiment import Experiment
 from validate.replay.method import WALK_UNRECORDED
@@ -147,7 +147,8 @@ def test_tetrahedra_at_a_rate_that_no_mesh_has_are_no_fault() -> None:
 
 
 def test_both_bodies_of_the_liver_have_the_same_figures_with_values_of_their_own() -> None:
-    one, two = LIVER_FIGURES["generated"], LIVER_FIGURES["data"]
+    figures_of = beside("ekf_liver", "published").LIVER_FIGURES
+    one, two = figures_of["generated"], figures_of["data"]
     assert [(f.name, f.theirs, f.claim) for f in one] == [(f.name, f.theirs, f.claim) for f in two]
     held = [(a.expected, b.expected) for a, b in zip(one, two, strict=True) if a.expected]
     assert sum(a != b for a, b in held) >= 8

@@ -8,27 +8,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import beside
+from beside import experiment as shipped_experiment
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, SceneError
-from validate.papers.ekf_nfem import haptic as haptic_module
-from validate.papers.ekf_nfem import haptic_exhibits
-from validate.papers.ekf_nfem.haptic import (
-    STOPS,
-    ToolPath,
-    TouchedLiver,
-    follows,
-    place,
-    touchable_liver,
-    touched_place,
-    way,
-)
-from validate.papers.ekf_nfem.haptic_exhibits import felt_by
 from validate.papers.ekf_nfem.liver_body import LiverBody, generated_liver
+from validate.parameters import with_given
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source
-from validate.replay import load as experiment_named
 from validate.replay.experiment import Experiment
 from validate.replay.live import RecordedPath, live, prepared, written
 from validate.replay.live.clock import _first_too
@@ -37,6 +26,10 @@ from validate.replay.road import compare
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import write_mesh
 from validate.solve.haptic_loop import HapticStepper
+
+TWIN = beside("haptic_liver", "twin")
+STOPS, ToolPath = TWIN.STOPS, TWIN.ToolPath
+follows, place, touched_place, way = TWIN.follows, TWIN.place, TWIN.touched_place, TWIN.way
 
 
 def silent(_: str) -> None:
@@ -53,11 +46,12 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @cache
 def mesh() -> Mesh:
-    return touchable_liver(TouchedLiver(body=LiverBody("generated")))
+    made: Mesh = TWIN.touchable(LiverBody("generated").resolved(Path()))
+    return made
 
 
 def experiment() -> Experiment:
-    return experiment_named("haptic_liver")
+    return shipped_experiment("haptic_liver")
 
 
 class Turned:
@@ -105,17 +99,17 @@ def test_a_path_that_cannot_be_walked_is_refused(wrong: dict[str, float]) -> Non
 
 def test_the_shipped_recording_is_the_twin_of_the_generated_body(project_root: Path) -> None:
     shipped = read_recording(project_root / "recordings" / "haptic_liver.mcap")
-    p = TouchedLiver(body=LiverBody("generated"))
-    t, x = way(p.path, touched_place(mesh()))
+    p = experiment().parameters
+    t, x = way(p.settings.path, touched_place(mesh()))
     tip = np.hstack([shipped.signals[f"tip.{a}"].y for a in "xyz"])
     assert tip == pytest.approx(x, abs=1e-12)
     force = shipped.signals["force.z"]
     assert force.t == pytest.approx(t[::5])
     assert 2.5 < force.y.max() < 3.5
     file = project_root / "recordings" / "haptic_liver.mcap"
-    other = replace(p, body=LiverBody("data"), recording=str(file))
+    other = with_given(p, {"body.body": "data", "recording": str(file)})
     with pytest.raises(RecordingError, match=r"body\.body=generated"):
-        experiment().load(other, project_root / "experiments")
+        experiment().load(other, TWIN.FOLDER)
 
 
 def _path(x: Floats, t: Floats) -> Recording:
@@ -124,10 +118,10 @@ def _path(x: Floats, t: Floats) -> Recording:
 
 
 def test_a_path_of_ones_own_sets_the_tick_and_says_what_was_left_out(small: dict[str, str]) -> None:
-    p = TouchedLiver(body=LiverBody("data", small["body.file"]))
+    p = with_given(experiment().parameters, {"body.body": "data", "body.file": small["body.file"]})
     t = np.arange(40) / 500
     t[20:] += 0.1
-    x = np.tile(touched_place(touchable_liver(p)) + [0, 0, 0.01], (40, 1))
+    x = np.tile(touched_place(p.scene.body.resolved(Path())) + [0, 0, 0.01], (40, 1))
     x[5] = np.nan
     recording = _path(x, t)
     scene = experiment().build(recording, p, None)
@@ -149,7 +143,7 @@ def test_a_path_of_ones_own_sets_the_tick_and_says_what_was_left_out(small: dict
 def test_what_is_told_of_a_coarse_liver(
     small: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(haptic_exhibits, "_LIVE_SECONDS", 0.01)
+    monkeypatch.setattr(beside("haptic_liver", "exhibits"), "_LIVE_SECONDS", 0.01)
     result = compare(experiment(), Options(small))
     (check,) = result.checks
     assert check.verdict == "same model"
@@ -171,7 +165,7 @@ def test_what_is_told_of_a_coarse_liver(
 
 
 def test_nothing_is_felt_without_the_reference() -> None:
-    assert felt_by({}) == {}
+    assert beside("haptic_liver", "exhibits").felt_by({}) == {}
 
 
 # --- live -----------------------------------------------------------------------------------------
@@ -227,11 +221,12 @@ def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch)
     loop = SimpleNamespace(prepare=lambda system: None)
     for name, found in (
         ("way", lambda *_: (t, x)), ("touched_place", lambda *_: None), ("march", ended),
-        ("touchable_liver", lambda p: None), ("liver_under", lambda *_: None),
+        ("_BUILT", lambda *_: SimpleNamespace(mesh=None)), ("under", lambda *_: None),
         ("replace", lambda *_, **__: loop), ("build_system", lambda scene: None),
     ):  # fmt: skip
-        monkeypatch.setattr(haptic_module, name, found)
+        monkeypatch.setattr(TWIN, name, found)
     hand = SimpleNamespace(spring=1, reach=1, pad=1, grip=1, limit=1)
     p = SimpleNamespace(path=SimpleNamespace(rate=500.0), hand=hand)
+    tree = SimpleNamespace(settings=p)
     with pytest.raises(SceneError, match="the twin: diverged at step 3"):
-        haptic_module.record(p, lambda what: None)
+        TWIN.record(tree, lambda what: None)

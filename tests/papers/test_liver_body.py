@@ -4,20 +4,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.datasets.home import SHARED
 from validate.errors import RecordingError, SceneError
 from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build
-from validate.papers.ekf_nfem.cube import LargeStrain
 from validate.papers.ekf_nfem.ladder import LIVER_LADDER
-from validate.papers.ekf_nfem.liver import fiducials, liver_scene, watched
-from validate.papers.ekf_nfem.liver_body import FOLDER, LiverBody, generated_liver, with_sets
+from validate.papers.ekf_nfem.liver_body import (
+    FOLDER,
+    LiverBody,
+    generated_liver,
+    watched,
+    with_sets,
+)
 from validate.scene.box import box
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
 
 NOTHING = str(Path(__file__).parent / "nowhere")
+HERE = Path(__file__).parent
 
 
 @pytest.fixture(scope="module", params=["generated", "data"])
@@ -26,11 +33,12 @@ def mesh(request: pytest.FixtureRequest) -> Mesh:
         folder = request.getfixturevalue("shared_data") / FOLDER
         if not folder.is_dir():
             pytest.skip(f"real data absent: {folder}")
-    return LiverBody(request.param).mesh(request.param)
+    return LiverBody(request.param).resolved(HERE)
 
 
 def scene_of(mesh: Mesh) -> Scene:
-    return liver_scene(mesh, LargeStrain().material)
+    declared: Scene = experiment("ekf_liver").parameters.scene
+    return declared.resolved(mesh)
 
 
 def test_the_generated_body_is_a_liver_in_size_and_has_sound_cells() -> None:
@@ -93,7 +101,7 @@ def test_a_is_loaded_b_is_free_and_fiducials_are_held(mesh: Mesh) -> None:
     assert nodes["node_A"] in loaded
     assert nodes["node_B"] not in np.union1d(loaded, held)
     assert nodes["node_B"] in mesh.surface
-    marks = np.array(list(fiducials(mesh).values()))
+    marks = np.array(list(beside("ekf_liver", "twin").fiducials(mesh).values()))
     assert len(np.unique(marks, axis=0)) == 4
     assert all((np.abs(mesh.nodes[held] - at).max(axis=1) == 0).any() for at in marks)
 
@@ -123,16 +131,16 @@ def test_without_the_data_folder_our_own_body_stands_for_it(
 ) -> None:
     monkeypatch.setenv(SHARED, NOTHING)
     monkeypatch.setattr("validate.datasets.home.cache_folder", lambda: tmp_path)
-    assert LiverBody().which == "generated"
+    assert LiverBody().which(HERE) == "generated"
     with pytest.raises(RecordingError, match=r"mesh/liver/.*is missing: `validate data get"):
-        LiverBody("data").mesh("data")
+        LiverBody("data").resolved(HERE)
 
 
 def test_with_the_data_folder_its_liver_is_taken(shared_data: Path) -> None:
     if not (shared_data / FOLDER).is_dir():
         pytest.skip(f"real data absent: {shared_data / FOLDER}")
-    assert LiverBody().which == "data"
-    assert LiverBody("generated").which == "generated"
+    assert LiverBody().which(HERE) == "data"
+    assert LiverBody("generated").which(HERE) == "generated"
 
 
 def test_a_body_without_such_faces_is_refused() -> None:
@@ -148,9 +156,14 @@ def test_the_ladders_bodies_are_coarser_and_whole() -> None:
     assert body is not None
     sizes = []
     for n in body.meshes:
-        scene = body.shaped(n, LargeStrain().material)
+        scene = body.shaped(n, Material(30e3, 0.49, "svk", 1000.0))
         require_positive_cells(scene.mesh)
         sizes.append(scene.mesh.nodes.size)
         assert {"held", "loaded"} <= set(scene.mesh.facets)
     assert sizes == sorted(sizes)
     assert sizes[-1] <= 1000
+
+
+def test_the_liver_has_no_similar_meshes() -> None:
+    with pytest.raises(SceneError, match="no similar meshes"):
+        LiverBody().scaled(0.5)

@@ -5,23 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import RecordingError
-from validate.papers.ekf_nfem.liver import PulledLiver, same_model
 from validate.papers.ekf_nfem.liver_body import FOLDER
-from validate.papers.ekf_nfem.liver_figures import LIVER_FIGURES
+from validate.parameters import with_given
 from validate.recording.types import Recording
-from validate.replay import compare, load
+from validate.replay import compare
 from validate.replay.experiment import Experiment
+from validate.replay.tree import Tree
 
 STEPS = 700  # of the printed 0.1 ms: more than the printed filter lives for
 NOISE = float(np.sqrt(1e-9))  # m
 
 
 @pytest.fixture(scope="module")
-def liver(project_root: Path) -> Experiment:
-    return load(str(project_root / "experiments" / "ekf_liver.py"))
+def liver() -> Experiment:
+    return experiment("ekf_liver")
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +38,12 @@ def data_body(shared_data: Path) -> None:
         pytest.skip(f"real data absent: {shared_data / FOLDER}")
 
 
-def parameters(liver: Experiment, body: str, **twin: float) -> PulledLiver:
-    p: PulledLiver = liver.parameters
-    return replace(p, body=replace(p.body, body=body), twin=replace(p.twin, **twin))
+def parameters(liver: Experiment, body: str, recording: str = "") -> Tree:
+    tree: Tree = with_given(liver.parameters, {"body.body": body, "recording": recording})
+    return tree
 
 
-def read(liver: Experiment, p: PulledLiver) -> Recording:
+def read(liver: Experiment, p: Tree) -> Recording:
     assert liver.path is not None
     (recording,) = liver.load(p, liver.path.parent)
     return recording
@@ -71,7 +72,7 @@ def test_the_shipped_recording_is_of_our_body_and_what_the_twin_records(liver: E
 
 def test_a_recording_of_the_other_body_is_refused(liver: Experiment, project_root: Path) -> None:
     shipped = str(project_root / "recordings" / "ekf_liver.mcap")
-    p = replace(parameters(liver, "data"), recording=shipped)
+    p = parameters(liver, "data", recording=shipped)
     with pytest.raises(RecordingError, match=r"of body 'generated', not of 'data'; pass --set"):
         read(liver, p)
 
@@ -89,7 +90,8 @@ def test_the_data_folders_liver_is_recorded_in_memory_and_has_its_own_figures(
     held = scores(result, "ekf_held")
     assert held["node_A.rmse"] == pytest.approx(0.99 * NOISE, rel=0.02)
     p = parameters(liver, "here")
-    assert liver.follows(liver, result.recordings, p).published == LIVER_FIGURES["data"]
+    figures = beside("ekf_liver", "published").LIVER_FIGURES
+    assert liver.follows(liver, result.recordings, p).published == figures["data"]
 
 
 @pytest.mark.slow
@@ -136,7 +138,8 @@ def test_table_2_goes_together_for_some_250_samples_only() -> None:
 def test_a_recording_says_whether_the_models_own_model_made_it(
     liver: Experiment, twin: dict[str, float], same: bool
 ) -> None:
-    assert same_model(parameters(liver, "generated", **twin)) == same
+    changed = replace(liver.parameters.settings.twin, **twin)
+    assert beside("ekf_liver", "twin").same_model(changed) == same
 
 
 @pytest.mark.slow

@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-from validate.papers.ekf_nfem.cube import SIDE
 from validate.papers.ekf_nfem.figures import PRINTED_LIVER_STEP
-from validate.papers.ekf_nfem.liver import liver_scene
 from validate.papers.ekf_nfem.liver_body import generated_liver, with_sets
 from validate.replay.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.scene.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
+
+SIDE = 0.1  # m, of the cube
 
 
 def _cube(n: int, material: Material) -> Scene:
@@ -40,7 +40,12 @@ CUBE_LADDER = Ladder(
 
 def _liver(n: int, material: Material) -> Scene:
     """The body made by formulas, coarser, so that all modes are at hand."""
-    return liver_scene(with_sets(generated_liver((2 * n, n + 1, n))), material)
+    return Scene(
+        with_sets(generated_liver((2 * n, n + 1, n))),
+        material,
+        (Support("held", (0, 1, 2)),),
+        loads=(Load("pull", "loaded", (0.0, 0.0, 1.0)),),
+    )
 
 
 _LIVER = replace(_COARSE, mesh=3)

@@ -2,9 +2,11 @@
 
 The paper's mesh (4941 tetrahedra, 1083 nodes) is not printed, nor are its sets beyond words: "nodes
 on the left side of the top surface" held, "the right lobe, on both top and bottom surfaces" loaded.
-Here both are rules that hold on any such body. Axes: x to the body's left, z up.
+Here both are rules that hold on any such body, and so are the nodes that are observed. Axes: x to
+the body's left, z up.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -13,8 +15,12 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.datasets.home import found, sought
-from validate.errors import SceneError
+from validate.errors import RecordingError, SceneError
 from validate.parameters import quantity
+from validate.recording.types import Recording
+from validate.replay.experiment import Progress
+from validate.replay.remade import stamped
+from validate.replay.tree import Tree, beside
 from validate.scene.box import box
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.mesh_file import read_mesh
@@ -33,27 +39,30 @@ _FACING = 0.35  # least vertical part of an outward normal: what counts as top o
 
 @dataclass(frozen=True)
 class LiverBody:
+    """The geometry of a scene, with the facet sets "held" and "loaded"."""
+
     body: Literal["here", "data", "generated"] = quantity(
         "here", "1", "the data folder's liver, a generated one, or the first where it is here"
     )
     file: str = quantity("", "1", "another body in m instead of the data folder's (.inp, .npz)")
-    beside: str = quantity("", "1", "folder of the experiment, for a data folder next to it")
 
-    @property
-    def which(self) -> Body:
-        """What stands for the liver on this machine."""
+    def which(self, folder: Path) -> Body:
+        """What stands for the liver on this machine; `folder` is that of the experiment."""
         if self.body != "here":
             return self.body
-        here = self.file or sought(FOLDER, FILE, Path(self.beside))
-        return "data" if here else "generated"
+        return "data" if self.file or sought(FOLDER, FILE, folder) else "generated"
 
-    def mesh(self, which: Body) -> Mesh:
-        """With the facet sets "held" and "loaded". Raises `RecordingError` naming the command that
-        brings an absent file, `SceneError` for a body that has no such faces."""
-        if which == "generated":
+    def resolved(self, folder: Path) -> Mesh:
+        """The mesh. Raises `RecordingError` naming the command that brings an absent file,
+        `SceneError` for a body that has no faces to hold or to load."""
+        if self.which(folder) == "generated":
             return with_sets(generated_liver())
-        path = found(FOLDER, FILE, Path(self.beside), self.file or None, "body.file")
+        path = found(FOLDER, FILE, folder, self.file or None, "body.file")
         return with_sets(read_mesh(path, "m"))
+
+    def scaled(self, share: float) -> "LiverBody":
+        """Raises `SceneError`: no other mesh of the data folder's body is known."""
+        raise SceneError("the liver has no similar meshes; vary another parameter")
 
 
 def generated_liver(cells: tuple[int, int, int] = CELLS) -> Mesh:
@@ -99,6 +108,45 @@ def with_sets(mesh: Mesh) -> Mesh:
         if not len(chosen):
             raise SceneError(f"no faces are {name}: the body's length must lie along x, up along z")
     return replace(mesh, facets={**mesh.facets, **sets})
+
+
+def watched(mesh: Mesh) -> dict[str, int]:
+    """Return nodes A, of the loaded ones the nearest to their middle, and B, of the free ones of
+    the surface the nearest to the middle of the body's top."""
+    x, loaded = mesh.nodes, mesh.facet_nodes("loaded")
+    taken = np.union1d(loaded, mesh.facet_nodes("held"))
+    free = np.setdiff1d(np.unique(mesh.surface), taken)
+    low, high = x.min(axis=0), x.max(axis=0)
+    top = np.array([*(low + high)[:2] / 2, high[2]])
+    return {
+        "node_A": _nearest(x, loaded, x[loaded].mean(axis=0)),
+        "node_B": _nearest(x, free, top),
+    }
+
+
+def _nearest(x: Floats, nodes: Ints, point: Floats) -> int:
+    return int(nodes[np.argmin(np.linalg.norm(x[nodes] - point, axis=1))])
+
+
+def of_its_body(
+    tree: Tree, folder: Path, shipped: str, record: Callable[[Tree, Progress], Recording]
+) -> tuple[Recording, ...]:
+    """Return the named recording, else the shipped one of the generated body, else one of the data
+    folder's body, made in memory.
+
+    Raises `RecordingError` for a recording of another body than the one that is here.
+    """
+    which = tree.scene.body.which(folder)
+    if which == "data" and not tree.recording:
+        return (stamped(record(tree, lambda _: None), tree),)
+    (recording,) = beside(replace(tree, recording=tree.recording or shipped), folder)
+    of = recording.metadata.get("provenance", {}).get("body", which)
+    if of != which:
+        raise RecordingError(
+            f"{recording.source.path} is of body '{of}', not of '{which}'; pass --set "
+            f"body.body={of}"
+        )
+    return (recording,)
 
 
 def _vertical(mesh: Mesh) -> Floats:

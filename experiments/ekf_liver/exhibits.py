@@ -1,14 +1,12 @@
 """What `ekf_liver` shows besides: its node sets drawn, and what the printed numbers leave open."""
 
-from typing import Any
-
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build as build_system
 from validate.papers.ekf_nfem.figures import PRINTED_LIVER_STEP
-from validate.papers.ekf_nfem.liver import watched
+from validate.papers.ekf_nfem.liver_body import watched
 from validate.papers.ekf_nfem.tables import (
     fields_apart,
     locking_table,
@@ -17,9 +15,12 @@ from validate.papers.ekf_nfem.tables import (
 )
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
+from validate.replay.tree import Tree
 from validate.report.node_sets import node_sets_picture
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene
+
+from .twin import FOLDER
 
 NU = (0.45, 0.49, 0.499)  # what locking is shown at
 _MM = 1e3
@@ -30,7 +31,7 @@ _NAMED = {
 }
 
 
-def tell_liver(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell_liver(tree: Tree, cases: Cases, progress: Progress) -> Told:
     """Node sets, both readings of the force, critical steps, locking, and how near two fields are.
 
     The filter's field is held against the plain one's, as the paper's Figs. 3 (b) and (c) are.
@@ -38,11 +39,11 @@ def tell_liver(parameters: Any, cases: Cases, progress: Progress) -> Told:
     main = cases[""]
     scene = main["nfem"].body
     progress("readings of the force")
-    readings = readings_table(scene, parameters.loading.force, "z")
+    readings = readings_table(scene, tree.settings.loading.force, "z")
     limits = steps_table(scene, PRINTED_LIVER_STEP)
     progress("locking")
     locked = locking_table(scene, NU)
-    body = _NAMED[parameters.body.which]
+    body = _NAMED[tree.scene.body.which(FOLDER)]
     model = Exhibit(
         "model",
         "Choices that the printed numbers do not determine",

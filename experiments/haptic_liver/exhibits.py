@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +12,17 @@ from validate.compare.held_force import HeldForce
 from validate.compare.published import Figure
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.papers.ekf_nfem.haptic import AXES, EACH_TICK, TOOL, TouchedLiver, sets
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.replay.live import Lived, RecordedPath, live
+from validate.replay.tree import Tree
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.extrapolate import NAMES, between_answers
 from validate.solve.haptic import QUANTILES, RealTime, TickTimes
 from validate.solve.haptic_loop import HapticLoop, HapticStepper
+
+from .twin import AXES, EACH_TICK, TOOL, sets
 
 REFERENCE, JUDGED = "every_tick", "linear"
 PERIODS = (2, 5, 10, 20, 33, 50)  # ticks between readings
@@ -54,9 +55,9 @@ class Felt:
         return np.asarray(self.held.given[:, 2])
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
     """All exhibits, of the methods that came to the end of the path."""
-    p, main = cast(TouchedLiver, parameters), cases[""]
+    main = cases[""]
     felt = felt_by(main)
     if not felt:
         return Told()
@@ -64,7 +65,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     reference = felt[REFERENCE]
     periods = _periods_exhibit(reference)
     progress("live")
-    ticks = _ticks_exhibit(p, main[REFERENCE])
+    ticks = _ticks_exhibit(tree, main[REFERENCE])
     numbers = {f"peak.{name}": share_off(f) for name, f in felt.items()}
     numbers |= {f"least.{name}": f.held.least for name, f in felt.items()}
     force = _force_exhibit(felt, _shape(main[REFERENCE], reference))
@@ -271,10 +272,10 @@ def _counted(held: HeldForce) -> tuple[float, ...]:
 # --- ticks ----------------------------------------------------------------------------------------
 
 
-def _ticks_exhibit(p: TouchedLiver, reference: Followed) -> Exhibit:
+def _ticks_exhibit(tree: Tree, reference: Followed) -> Exhibit:
     """The live loop along the path, against the clock: quantiles of its ticks."""
     scene, seen = reference.body, reference.seen
-    given = sets(p, seen)
+    given = sets(tree, seen)
     system = build_system(scene)
     path = RecordedPath(seen.t, seen.inputs + np.array(scene.tools[0].tip))
     rows: list[tuple[Entry, ...]] = []

@@ -3,8 +3,8 @@
 Ours are of two bodies, neither of which is the paper's: each has its own values, held apart.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from validate.papers.ekf_nfem.figures import (
     noise_left,
     rate,
 )
-from validate.papers.ekf_nfem.liver import PulledLiver
 from validate.papers.ekf_nfem.liver_body import Body
-from validate.recording.types import Recording
-from validate.replay.experiment import Experiment
 
 # MAE, RMSE, SD m.
 _TABLE_2 = {
@@ -119,8 +116,3 @@ def _figures(ours: Ours) -> tuple[Figure, ...]:
 LIVER_FIGURES: Mapping[Body, tuple[Figure, ...]] = {
     body: _figures(ours) for body, ours in OURS.items()
 }
-
-
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: PulledLiver) -> Experiment:
-    """The experiment with the figures of the body that stands for the liver."""
-    return replace(experiment, published=LIVER_FIGURES[p.body.which])

@@ -1,4 +1,4 @@
-"""The liver of paper 003 under a tool at 1 kHz (section 3.5): parameters, path, twin, registration.
+"""The hand and the twin of paper 003's liver under a tool at 1 kHz (section 3.5); registration.
 
 The paper's device, tool path and coupling are not printed. Here a synthetic hand pushes, slides,
 lets go and pokes at the middle of the liver's top, through the spring of a probe. The recording is
@@ -18,20 +18,18 @@ from validate.compare.verdict import Accept
 from validate.errors import RecordingError, SceneError
 from validate.fem.system import build as build_system
 from validate.papers.async_regions.line import LoadCell
-from validate.papers.ekf_nfem.cube import LargeStrain
-from validate.papers.ekf_nfem.liver import watched
-from validate.papers.ekf_nfem.liver_body import LiverBody
+from validate.papers.ekf_nfem.liver_body import of_its_body, watched
 from validate.papers.needle_pocket.hand import moved, tremor
 from validate.parameters import quantity
-from validate.recording.readers import read_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating
 from validate.replay.experiment import Experiment, Progress
 from validate.replay.live import LIVE, as_given, recorded_tip
-from validate.replay.remade import made_here, stamped
+from validate.replay.remade import made_here
+from validate.replay.tree import Built, Tree
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Probe, Scene, Support
+from validate.scene.scene import Probe, Scene
 from validate.scene.tool import Needle
 from validate.solve.haptic import HAPTIC_HZ
 from validate.solve.haptic_loop import HapticLoop
@@ -40,8 +38,10 @@ from validate.twin.sensors import signal, streams
 from validate.twin.tracked import START_NS
 
 TOOL, AXES = "tool", "xyz"
-SHIPPED = "haptic_liver.mcap"  # of the generated body
+FOLDER = Path(__file__).parent
+SHIPPED = "../../recordings/haptic_liver.mcap"  # of the generated body
 EACH_TICK = HapticLoop(every=1, late=0, extrapolation="hold")
+_BUILT = Built(FOLDER)
 _DOWN = (0.0, 0.0, -1.0)
 _FRAME = "liver"
 #: Stops of the hand: time s, depth and way sideways in units of the path's depth. Approach, push,
@@ -87,23 +87,15 @@ _CELL = LoadCell(seed=35, noise=5e-3, every=5)
 
 @dataclass(frozen=True)
 class TouchedLiver:
-    """Parameters; the damping is ours, the paper prints none. Section 3.5 prints no Poisson ratio:
-    the 0.49 of section 3.2 takes steps half as long, and its linear cells lock. `recording` is a
-    path."""
+    """What no scene holds; `path` and `twin` are what made the recording."""
 
-    material: LargeStrain = LargeStrain(nu=0.45, mass_damping=20.0)
-    body: LiverBody = LiverBody()
     hand: ToolSpring = ToolSpring()
     path: ToolPath = ToolPath()
     twin: LoadCell = _CELL
-    recording: str = quantity(
-        "", "1", "the recording; none: the shipped one of the generated body, else made in memory"
-    )
 
 
-def touchable_liver(p: TouchedLiver) -> Mesh:
+def touchable(mesh: Mesh) -> Mesh:
     """The body with the facet set "surface": all that is not held."""
-    mesh = p.body.mesh(p.body.which)
     held = set(map(tuple, np.sort(mesh.facets["held"], axis=1).tolist()))
     free = [tuple(f) not in held for f in np.sort(mesh.surface, axis=1).tolist()]
     return replace(mesh, facets={**mesh.facets, "surface": mesh.surface[free]})
@@ -129,39 +121,27 @@ def way(p: ToolPath, above: Floats) -> tuple[Floats, Floats]:
     return np.round(t[walked], 9), np.round(x[walked], 9)  # a nanometre: short files
 
 
-def liver_under(p: TouchedLiver, tip: Floats) -> Scene:
-    """The held liver and the tool with its tip at (3,) m."""
-    mesh = touchable_liver(p)
-    return Scene(
-        mesh, p.material.material, (Support("held", (0, 1, 2)),),
+def under(scene: Scene, tip: Floats) -> Scene:
+    """The liver and the tool with its tip at (3,) m, observed where it is touched."""
+    return replace(
+        scene,
+        body=touchable(scene.mesh),
         tools=(Needle(TOOL, "surface", tuple(tip.tolist()), _DOWN),),
-        probes=(Probe("touched", tuple(touched_place(mesh).tolist())),),
-    )  # fmt: skip
+        probes=(Probe("touched", tuple(touched_place(scene.mesh).tolist())),),
+    )
 
 
-def load(p: TouchedLiver, folder: Path) -> tuple[Recording, ...]:
-    """The named recording, else the shipped one, else the data folder's body walked in memory.
-
-    Raises `RecordingError` for a recording of another body.
-    """
-    which = p.body.which
-    if which == "data" and not p.recording:
-        return (stamped(record(p, lambda _: None), p),)
-    path = Path(p.recording) if p.recording else folder.parent / "recordings" / SHIPPED
-    recording = read_recording(path)
-    of = recording.metadata.get("provenance", {}).get("body", which)
-    if of != which:
-        raise RecordingError(
-            f"{path.name} is of body '{of}', not of '{which}'; pass --set body.body={of}"
-        )
-    return (recording,)
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return of_its_body(tree, folder, SHIPPED, record)
 
 
-def record(p: TouchedLiver, progress: Progress) -> Recording:
+def record(tree: Tree, progress: Progress) -> Recording:
     """The path at every tick, and the force on the hand with a load cell's noise."""
     progress("simulate")
-    t, x = way(p.path, touched_place(touchable_liver(p)))
-    scene = liver_under(p, x[0])
+    p: TouchedLiver = tree.settings
+    liver = _BUILT(None, tree)
+    t, x = way(p.path, touched_place(liver.mesh))
+    scene = under(liver, x[0])
     hand = {name: getattr(p.hand, name) for name in ("spring", "reach", "pad", "grip", "limit")}
     loop = replace(EACH_TICK, dt=1 / p.path.rate, **hand)
     run = march("twin", loop.prepare(build_system(scene)), t, x - x[0], np.array([len(t) - 1]), 0.0)
@@ -174,7 +154,8 @@ def record(p: TouchedLiver, progress: Progress) -> Recording:
         force = run.traces[f"{TOOL}.force.{a}"].y[some]
         signals[f"force.{a}"] = signal(t[some], force, "N", p.twin.noise, _FRAME, rng)
     provenance = {
-        "kind": "twin", "same_model": "true", "body": p.body.which, "seed": str(p.twin.seed),
+        "kind": "twin", "same_model": "true", "body": tree.scene.body.which(FOLDER),
+        "seed": str(p.twin.seed),
         "law": f"{scene.material.law}, central difference at every tick, the mesh of the models",
         "element": f"P1 tetrahedra, {len(scene.mesh.nodes)} nodes, {len(scene.mesh.cells)} cells",
         "hand": "minimum-jerk moves with tremor, synthetic",
@@ -185,11 +166,11 @@ def record(p: TouchedLiver, progress: Progress) -> Recording:
     )  # fmt: skip
 
 
-def build(recording: Recording, p: TouchedLiver, model: None) -> Scene:
-    return liver_under(p, _walkable(recording)[1][0])
+def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None = None) -> Scene:
+    return under(_BUILT(recording, tree, changes), _walkable(recording)[1][0])
 
 
-def place(recording: Recording, p: TouchedLiver, scene: Scene) -> Registered:
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """The tip drives; what was recorded or given of the force is compared."""
     t, x, sd, findings = _walkable(recording)
     gone = x - np.array(scene.tools[0].tip)
@@ -228,16 +209,16 @@ def _walkable(recording: Recording) -> tuple[Floats, Floats, float, tuple[str, .
     return t[seen], x[seen], sd, tuple(findings)
 
 
-def sets(p: TouchedLiver, seen: Registered) -> Mapping[str, Any]:
+def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
     """The tick is the recording's own."""
-    h = p.hand
+    h: ToolSpring = tree.settings.hand
     return {
         "dt": round(float(np.median(np.diff(seen.t))), 9), "spring": h.spring, "reach": h.reach,
         "pad": h.pad, "grip": h.grip, "limit": h.limit,
     }  # fmt: skip
 
 
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: TouchedLiver) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """The experiment as its recording has it: a live loop's own force, or a user's path."""
     recording, twin = recordings[0], experiment.twin
     if made_here(recording) or twin is None:
