@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from validate.catalogue import shipped
+from validate.catalogue import experiment_files, shipped
 
 # Kernels are compiled anew in every copy of the package: minutes where the cores are shared.
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheel"), pytest.mark.timeout(600)]
@@ -62,7 +62,7 @@ def test_every_shipped_experiment_is_listed_from_an_empty_folder(
     done = called(installed, tmp_path, "list", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     cards = json.loads(done.stdout)
-    assert {c["name"] for c in cards} == {path.stem for path in shipped().glob("*.py")}
+    assert {c["name"] for c in cards} == set(experiment_files(shipped()))
     assert [c["note"] for c in cards if c["note"]] == []
 
 
@@ -86,7 +86,7 @@ for path in experiment_files(Path.cwd()).values():
     assert done.returncode == 0, done.stderr
     home, *lines = done.stdout.splitlines()
     assert home == str(installed / "validate" / "__init__.py")
-    assert len(lines) == len(list(shipped().glob("*.py"))) - 1
+    assert len(lines) == len(experiment_files(shipped())) - 1
     assert all(int(line.split()[1]) >= 1 for line in lines)
 
 
