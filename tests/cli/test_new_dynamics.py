@@ -171,7 +171,7 @@ def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
 
 @pytest.mark.parametrize(("law", "names"), [
     ("linear", "implicit,ensemble_kf,filterpy,modal"),
-    ("neo_hooke", "large,implicit,central,reduced_ekf,modal"),
+    ("neo_hooke", "large,static,modal"),
 ])  # fmt: skip
 def test_methods_are_chosen(here: Path, law: str, names: str) -> None:
     """Each runs; its markers are within a millimetre, of a motion of 3.9 mm."""
@@ -180,10 +180,10 @@ def test_methods_are_chosen(here: Path, law: str, names: str) -> None:
     code, said = new(here, "pushed", chosen, ('law = "linear"', f'law = "{law}"'))
     assert code == 0, said
     mine = experiment(here)
-    assert tuple(mine.methods) == tuple(names.split(","))
+    assert set(mine.methods) == set(names.split(","))
     short = replace(
         mine, parameters=replace(
-            mine.parameters, motion=replace(mine.parameters.motion, length=0.1)
+            mine.parameters, motion=replace(mine.parameters.motion, length=0.05)
         )
     )  # fmt: skip
     for name in names.split(","):

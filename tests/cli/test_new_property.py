@@ -284,7 +284,7 @@ COMMON: dict[str, Any] = {
 }  # fmt: skip
 
 
-@settings(max_examples=6, **COMMON)
+@settings(max_examples=3, **COMMON)
 @given(case=CASES)
 @example(case=Case())
 @example(case=Case("gravity", "bricks.npz", held=""))  # not held: roots of rounding errors

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import cast
@@ -17,7 +18,7 @@ from validate.fem.system import build
 from validate.identify.recorded_motion import FRACTION, motion_of
 from validate.parameters import with_values
 from validate.recording.types import Recording
-from validate.replay.body_mesh import unknowns_of
+from validate.replay.body_mesh import body_of, mesh_of, unknowns_of
 from validate.replay.first_modes import first_frequencies
 from validate.replay.measured_body import static_scene
 from validate.replay.measured_cards import MeasuredBody, SolidModel
@@ -44,19 +45,20 @@ _STILL = 0.05  # of the largest motion: a marker that moves less teaches a filte
 GIVEN, CHOSEN = "filters.markers", "methods"
 #: Methods in the order of a file: what is checked first, the cheapest last.
 _ORDER = (
-    "large", "central", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf",
+    "large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf",
     "roukf", "ensemble_kf", "filterpy", "load_scale", "node_ekf", "reduced_ekf", "modal",
 )  # fmt: skip
 _USUAL = ("large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf", "roukf",
           "modal")  # fmt: skip
 _OF_NODES = ("kf_fem", "modal_kf", "node_ekf")  # whose cost grows with the cube of the nodes
-_EXPLICIT = ("central", "node_ekf", "reduced_ekf")
+_EXPLICIT = ("node_ekf", "reduced_ekf")  # tetrahedra without stiffness damping only
 #: Entries of the registries that no body in motion is offered, and why.
 NOT_OFFERED = {
     **dict.fromkeys(("NoFluid", "ExactPressure", "PressureLoop", "ElasticPressure",
                      "PulsePressure"), "statics of a body with fluid in a cavity"),
     "Tabulated": "a table of static loads, for plates",
     "StaticNewton": "statics at large strain: `solid` of a static body",
+    "CentralDifference": "its stable step under stiffness damping is not known beforehand",
     "NewtonDynamics": "starts unloaded; FromEquilibrium is the same rule from any rest",
     "ContactNewton": "statics of a body that an indenter touches: `touching`",
     "NeedleLoop": "a needle that is held by hand",
@@ -269,10 +271,12 @@ def offered(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str,
     preloaded = kind == "releases" or bool(p.motion.gravity)
     measured = bool(judged_markers(recording, p) or p.seen.outline)
     law = cast(LawName, found.get("law", "linear"))
+    undamped = not (p.motion.stiffness_damping or p.motion.damping_ratio or p.motion.fit_window)
+    explicit = undamped and not mesh_of(p, partial(body_of, folder=Path())).bricks
     small = unknowns_of(p, 1, Path()) <= _FILTERED
     return tuple(
         name for name in _ORDER
-        if (small or name not in _OF_NODES)
+        if (small or name not in _OF_NODES) and (explicit or name not in _EXPLICIT)
         and fits_motion(name, law, kind, preloaded=preloaded, measured=measured)
     )  # fmt: skip
 

@@ -43,7 +43,6 @@ from validate.replay.moving_seen import (
 from validate.report.motion_words import motion_words
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
-from validate.solve.central import CentralDifference
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.from_equilibrium import FromEquilibrium
 from validate.solve.modal import Modal
@@ -60,7 +59,6 @@ MovingName = Literal[
     "modal_kf",
     "reduced_kf",
     "roukf",
-    "central",
     "load_scale",
     "filterpy",
     "ensemble_kf",
@@ -81,7 +79,6 @@ METHODS: Mapping[str, tuple[Any, str]] = {
     "reduced_kf": (ReducedKf(modes=_MODES), "Kalman filter of {modes} modes and the load, {law}"),
     "modal_kf": (ModalKf(), "Kalman filter of all modes (KF-FEM's), {law}"),
     "roukf": (Roukf(), "unscented filter of the modulus, {law}"),
-    "central": (CentralDifference(), "dynamic at large strain, explicit, {law}"),
     "load_scale": (LoadScale(), "filter of one load's scale, without inertia, {law}"),
     "filterpy": (FilterpyGuest(), "filterpy's Kalman filter of the modes and the load, {law}"),
     "ensemble_kf": (EnsembleKf(), "ensemble filter of the modulus, {law}"),
