@@ -331,3 +331,23 @@ def test_markers_that_the_layout_calls_otherwise_are_named(here: Path) -> None:
         compare(experiment)
     laid("ABCDX")
     assert "markers not in the layout are left out: 'E'" in compare(experiment).notes
+
+
+@pytest.mark.parametrize(("shape", "record", "answer"), [
+    ("cylinder", {"diameter_m": "0.03", "height_m": "0.02"}, "30mm,20mm"),
+    ("block", {"width_m": "0.04", "thickness_m": "0.03", "height_m": "0.05"}, "40mm,30mm,50mm"),
+])  # fmt: skip
+def test_sides_in_the_header_are_taken(
+    here: Path, shape: str, record: dict[str, str], answer: str
+) -> None:
+    """They were asked for; one side alone is named in the question, which stays open."""
+    write_recording(recording(signals=log(), metadata={"specimen": record}), here / "s.mcap")
+    said = f'experiment = "body"\nbody.shape = "{shape}"\n'
+    (here / "s.toml").write_text(said, "utf-8")
+    arguments = ("new", "mine", "--from", "s.mcap", "--answers", "s.toml")
+    assert f'body.{shape} = "{answer}"' in called(*arguments, "--questions")[1]
+    assert f"body.{shape}" not in called(*arguments)[1]
+    one = {"height_m": record["height_m"]}
+    write_recording(recording(signals=log(), metadata={"specimen": one}), here / "s.mcap")
+    assert f"body.{shape} (" in (open_ := called(*arguments)[1])
+    assert f"the header gives height {1e3 * float(record['height_m']):g} mm" in open_

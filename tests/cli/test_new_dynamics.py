@@ -169,6 +169,37 @@ def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
     assert (code, "no marker end; there are tip, middle, side" in said) == (2, True), said
 
 
+@pytest.mark.parametrize(("law", "names"), [
+    ("linear", "implicit,ensemble_kf,filterpy,modal"),
+    ("neo_hooke", "large,static,modal"),
+])  # fmt: skip
+def test_methods_are_chosen(here: Path, law: str, names: str) -> None:
+    """Each runs; its markers are within a millimetre, of a motion of 3.9 mm."""
+    start = 'motion = {how = "dynamic"'
+    chosen = (start, f'methods = "{names}"\n{start}')
+    code, said = new(here, "pushed", chosen, ('law = "linear"', f'law = "{law}"'))
+    assert code == 0, said
+    mine = experiment(here)
+    assert set(mine.methods) == set(names.split(","))
+    short = replace(
+        mine, parameters=replace(
+            mine.parameters, motion=replace(mine.parameters.motion, length=0.05)
+        )
+    )  # fmt: skip
+    for name in names.split(","):
+        found = run(short, name)
+        assert found.run.finished, name
+        assert off(found) < 1e-3, name
+
+
+def test_a_method_that_does_not_fit_is_refused(here: Path) -> None:
+    start = 'motion = {how = "dynamic"'
+    for names, why in (("implicit,node_ekf", "no method node_ekf fits; choose of implicit"),
+                       ("static,modal", "'implicit' is missing")):  # fmt: skip
+        code, said = new(here, "pushed", (start, f'methods = "{names}"\n{start}'))
+        assert (code, why in said) == (2, True), said
+
+
 def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Path) -> None:
     new(here, "swinging")
     mine = experiment(here)

@@ -10,6 +10,8 @@ from commands import here, refused
 from validate.cli.new_law import LAW_NAMES
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
+from validate.replay import compare
+from validate.replay.declaration import from_json, to_json
 from validate.replay.find import load_file
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.material import LawName
@@ -83,3 +85,20 @@ def test_a_law_is_chosen_with_its_coefficients(folder: Path, kind: str, law: str
         (folder / "a.toml").write_text(f'law = "{law}"\n{text}', "utf-8")
         said = refused("new", "other", "--from", "log.mcap", "--answers", "a.toml")
         assert f"material.{names[-1]} (" in said
+
+
+@pytest.mark.parametrize("law", [name for name in get_args(LawName) if name != "linear"])
+def test_plates_run_in_every_law_at_large_strain(folder: Path, law: str) -> None:
+    """One cell an edge; force and its error are numbers, and near the log's 700 N/m."""
+    names = law_kind(law).coefficients
+    given = "".join(f'"material"."{n}" = "{value_of(n)}"\n' for n in names)
+    (folder / "a.toml").write_text(f'law = "{law}"\n{given}{PLATES}', "utf-8")
+    assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
+    mine = load_file(folder / "experiments" / "mine.py")
+    coarse = {"mesh.radial": "1", "mesh.axial": "1"}
+    (found,) = compare(mine, coarse, methods=("slip",), quick=True).methods
+    scores = {s.name: s.value for s in found.scores}
+    assert np.isfinite(list(scores.values())).all()
+    file = folder / "experiments" / "mine.py"
+    assert to_json(from_json(to_json(mine), file)) == to_json(mine)
+    assert 0 < scores["force.rms@beyond"] < 0.1

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from commands import here, refused
 
+from validate.cli.new_body import _mesh_of
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay.find import load_file
@@ -107,3 +108,18 @@ def test_a_mesh_that_plates_cannot_press_is_refused(folder: Path, mesh: Any, wor
     write_mesh(mesh, folder / "block.npz")
     answers(folder, **{"specimen.mesh": "block.npz"})
     assert words in refused("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
+
+
+def test_a_mesh_file_that_changed_is_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another file of the same name, in another folder or later, had the sides of the first."""
+    found = {"body.shape": "file", "body.file": "b.npz"}
+    for side in (0.02, 0.03):
+        folder = tmp_path / str(side)
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        write_mesh(box((side, side, side), (1, 1, 1)), folder / "b.npz")
+        mesh = _mesh_of(found)
+        assert mesh is not None
+        assert np.ptp(mesh.nodes[0]) == pytest.approx(side)

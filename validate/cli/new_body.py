@@ -23,6 +23,7 @@ from validate.cli.new_body_questions import (
     known_size,
     named_place,
     parsed,
+    size_question,
     there,
     three_of,
     unit_of,
@@ -88,7 +89,7 @@ def _dynamic(found: Answers) -> bool:
 
 
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
-    asked = _of_the_body(found)
+    asked = _of_the_body(recording, found)
     mesh = _mesh_of(found)
     asked += known_size("body.size", mesh, found.get("body.unit", "m"))
     asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
@@ -101,7 +102,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
 
 
-def _of_the_body(found: Answers) -> list[Question]:
+def _of_the_body(recording: Recording, found: Answers) -> list[Question]:
     shape, file = found.get("body.shape"), found.get("body.file", "")
     asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
     if shape == "file":
@@ -110,12 +111,8 @@ def _of_the_body(found: Answers) -> list[Question]:
                               words=()))  # fmt: skip
         if Path(file).suffix.lower() in FOREIGN:
             asked.append(Question("body.unit", "unit of the file's lengths, as mm", open=True))
-    elif shape == "block":
-        asked.append(
-            by_path("body.block", "sizes along x, y, z from the origin, as 60mm,45mm,70mm")
-        )
-    elif shape == "cylinder":
-        asked.append(by_path("body.cylinder", "diameter and height, axis z, as 25mm,30mm"))
+    elif shape in ("block", "cylinder"):
+        asked.append(size_question(recording, shape))
     return asked
 
 
@@ -276,11 +273,13 @@ def _mesh_of(found: Answers) -> Mesh | None:
         needed = "body.file"
     if not found.get(needed):
         return None
-    return _read(tuple(sorted((k, v) for k, v in found.items() if k.startswith("body."))))
+    changed = Path(file).resolve() if file else Path(), Path(file).stat().st_mtime_ns if file else 0
+    return _read(tuple(sorted((k, v) for k, v in found.items() if k.startswith("body."))), changed)
 
 
 @lru_cache(maxsize=4)
-def _read(said: tuple[tuple[str, str], ...]) -> Mesh:
+def _read(said: tuple[tuple[str, str], ...], changed: tuple[Path, int]) -> Mesh:
+    """The body that is answered; its file is read again where it has `changed`."""
     values = {k: v for k, v in said if k in _PATHS and v}
     card = with_values(MeasuredBody(), values).body
     return body_of(card, folder=Path())

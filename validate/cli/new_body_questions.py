@@ -9,6 +9,7 @@ from validate.cli.new_kind import quantity_in
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
+from validate.replay.compression_cards import recorded_sides
 from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import FEWEST, NOTED
 from validate.replay.measured_markers import AS_SEEN
@@ -16,12 +17,36 @@ from validate.scene.body_facts import SAME, largest_side, odd_size
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import GRAMMAR, place_of
 
+_SIDES = {
+    "block": (
+        ("width", "thickness", "height"),
+        "sizes along x, y, z from the origin, as 60mm,45mm,70mm",
+    ),
+    "cylinder": (("diameter", "height"), "diameter and height, axis z, as 25mm,30mm"),
+}
 UNKNOWN, NONE, RECORDED = "unknown", "none", "recorded"
 
 
 def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
     """A parameter's value as --set takes it."""
     return Question(path, text, default, why, open=not default, check=parsed(path))
+
+
+def size_question(recording: Recording, shape: str) -> Question:
+    """Return the question about the sides of a block or cylinder; the header's are proposed.
+
+    A header with some of the sides names these in the question.
+    """
+    known = recorded_sides(recording)
+    names, text = _SIDES[shape]
+    if all(name in known for name in names):
+        proposed = ",".join(f"{1e3 * known[name]:.9g}mm" for name in names)
+        why = f"{', '.join(names)} in the header of the recording"
+        return by_path(f"body.{shape}", text, proposed, why)
+    held = [f"{name} {1e3 * known[name]:.6g} mm" for name in names if name in known]
+    return by_path(
+        f"body.{shape}", text + (f"; the header gives {', '.join(held)}" if held else "")
+    )
 
 
 def a_known_modulus(text: str) -> None:

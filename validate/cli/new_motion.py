@@ -1,9 +1,11 @@
 """Questions about a body that moves in time, and the methods of its experiment."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -11,17 +13,19 @@ from validate.arrays import Floats
 from validate.cli.asking import Answers, Question
 from validate.cli.new_body_questions import by_path, parsed
 from validate.errors import UsageError, ValidateError
+from validate.estimate.filters import FILTERS
 from validate.fem.system import build
 from validate.identify.recorded_motion import FRACTION, motion_of
 from validate.parameters import with_values
 from validate.recording.types import Recording
-from validate.replay.body_mesh import unknowns_of
+from validate.replay.body_mesh import body_of, mesh_of, unknowns_of
 from validate.replay.first_modes import first_frequencies
 from validate.replay.measured_body import static_scene
 from validate.replay.measured_cards import MeasuredBody, SolidModel
 from validate.replay.measured_drive import RELEASE, drive_kind
-from validate.replay.moving_body import against_mode
+from validate.replay.moving_body import METHODS, against_mode, fits_motion, model_law
 from validate.replay.moving_seen import started, steps_of, without_rest
+from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
@@ -38,7 +42,30 @@ _FILTERED = 900  # unknowns of a filter of all nodes: its modes are all taken
 _MARGIN = 0.9  # of the critical step
 _LOAD = 0.1  # of its largest value: how unsure a filter is of the load
 _STILL = 0.05  # of the largest motion: a marker that moves less teaches a filter little
-GIVEN = "filters.markers"
+GIVEN, CHOSEN = "filters.markers", "methods"
+#: Methods in the order of a file: what is checked first, the cheapest last.
+_ORDER = (
+    "large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf",
+    "roukf", "ensemble_kf", "filterpy", "load_scale", "node_ekf", "reduced_ekf", "modal",
+)  # fmt: skip
+_USUAL = ("large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf", "roukf",
+          "modal")  # fmt: skip
+_OF_NODES = ("kf_fem", "modal_kf", "node_ekf")  # whose cost grows with the cube of the nodes
+_EXPLICIT = ("node_ekf", "reduced_ekf")  # tetrahedra without stiffness damping only
+#: Entries of the registries that no body in motion is offered, and why.
+NOT_OFFERED = {
+    **dict.fromkeys(("NoFluid", "ExactPressure", "PressureLoop", "ElasticPressure",
+                     "PulsePressure"), "statics of a body with fluid in a cavity"),
+    "Tabulated": "a table of static loads, for plates",
+    "StaticNewton": "statics at large strain: `solid` of a static body",
+    "CentralDifference": "its stable step under stiffness damping is not known beforehand",
+    "NewtonDynamics": "starts unloaded; FromEquilibrium is the same rule from any rest",
+    "ContactNewton": "statics of a body that an indenter touches: `touching`",
+    "NeedleLoop": "a needle that is held by hand",
+    "AsyncRegions": "regions with steps of their own under a stylus",
+    "HapticLoop": "the loop of a haptic device",
+    "TouchedKrylov": "a body that a stylus touches",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -105,7 +132,11 @@ def motion_questions(
     if found["moved.by"] != "gravity":
         asked.append(by_path("material.rho", "density, kg/m3"))
     asked += _of_the_start(found) + _of_the_damping(found)
-    asked += _of_the_filters(recording, with_values(MeasuredBody(), dict(values)))
+    p = with_values(MeasuredBody(), dict(values))
+    asked += _of_the_filters(recording, p)
+    if not [q for q in asked if q.key not in found]:
+        p = replace(p, body=replace(p.body, cells=cells_for(p)))
+        asked += _of_the_methods(recording, p, found)
     return [
         *asked,
         by_path("ranges.rho", "standard uncertainty of the density (relative)"),
@@ -227,16 +258,72 @@ def cells_for(p: MeasuredBody) -> int:
 
 
 def moving_methods(recording: Recording, p: MeasuredBody, found: Answers, order: int) -> list[str]:
-    """Lines of the methods: schemes with inertia, statics, and filters that are given some of the
-    markers, or the outline where only one marker is compared."""
-    law = found["law"]
-    lines = [f'"implicit": moving("implicit", order={order}),',
-             f'"explicit": moving("explicit", order=1, split={_parts(recording, p)}),',
-             f'"static": moving("static", order={order}),']  # fmt: skip
-    if law != "linear":
-        lines.insert(0, f'"large": moving("large", "{law}", {order}),')
-    lines += _filters(recording, p, found.get(GIVEN, ""), order)
-    return [*lines, f'"modal": moving("modal", order={order}),']
+    """Lines of the chosen methods, in the order of `offered`."""
+    law, given = cast(LawName, found["law"]), _measurements(recording, p, found)
+    chosen = _listed(found.get(CHOSEN, "")) or proposed_methods(recording, p, found)
+    names = [name for name in offered(recording, p, found) if name in chosen]
+    return [_line(name, (recording, p), law, order, given) for name in names]
+
+
+def offered(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+    """Names of the methods that fit the body and the recording; the cheapest is the last."""
+    kind = drive_kind(recording, p)
+    preloaded = kind == "releases" or bool(p.motion.gravity)
+    measured = bool(judged_markers(recording, p) or p.seen.outline)
+    law = cast(LawName, found.get("law", "linear"))
+    undamped = not (p.motion.stiffness_damping or p.motion.damping_ratio or p.motion.fit_window)
+    explicit = undamped and not mesh_of(p, partial(body_of, folder=Path())).bricks
+    small = unknowns_of(p, 1, Path()) <= _FILTERED
+    return tuple(
+        name for name in _ORDER
+        if (small or name not in _OF_NODES) and (explicit or name not in _EXPLICIT)
+        and fits_motion(name, law, kind, preloaded=preloaded, measured=measured)
+    )  # fmt: skip
+
+
+def proposed_methods(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+    """The usual ones of those that are offered."""
+    return tuple(n for n in offered(recording, p, found) if n in _USUAL)
+
+
+def _of_the_methods(recording: Recording, p: MeasuredBody, found: Answers) -> list[Question]:
+    names = offered(recording, p, found)
+    needed = "large" if found.get("law", "linear") != "linear" else "implicit"
+
+    def check(text: str) -> None:
+        chosen = _listed(text)
+        if absent := [n for n in chosen if n not in names]:
+            raise UsageError(f"no method {', '.join(absent)} fits; choose of {', '.join(names)}")
+        if needed not in chosen:
+            raise UsageError(f"'{needed}' is missing: its errors are checked; add it")
+
+    words = "; ".join(f"{n}: {METHODS[n][1].partition(', {law}')[0]}" for n in names)
+    words = words.replace("{modes}", "20")
+    return [Question(CHOSEN, f"methods of the motion ({words})",
+                     ",".join(proposed_methods(recording, p, found)),
+                     "the usual ones that fit", check=check)]  # fmt: skip
+
+
+def _line(
+    name: str,
+    of: tuple[Recording, MeasuredBody],
+    law: LawName,
+    order: int,
+    given: tuple[str, ...],
+) -> str:
+    recording, p = of
+    settings, kind = METHODS[name][0], drive_kind(*of)
+    used = model_law(name, law)
+    parts = [f'"{name}"', *([f'"{used}"'] if used != "linear" else [])]
+    explicit = name == "explicit" or name in _EXPLICIT
+    parts.append(f"order={1 if explicit or name in _OF_NODES else order}")
+    parts += [f"markers={given!r}"] if isinstance(settings, FILTERS) else []
+    parts += [f"split={_parts(recording, p)}"] if explicit else []
+    if kind not in ("moves", "follows"):
+        unsure = f"{_LOAD * _largest(recording, p, kind):.3g}"
+        walks = ("load_start", "load_walk", "load_sd")
+        parts += [f"{w}={unsure}" for w in walks if hasattr(settings, w)]
+    return f'"{name}": moving({", ".join(parts)}),'
 
 
 def _parts(recording: Recording, p: MeasuredBody) -> int:
@@ -247,27 +334,13 @@ def _parts(recording: Recording, p: MeasuredBody) -> int:
     return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
 
 
-def _filters(recording: Recording, p: MeasuredBody, answer: str, order: int) -> list[str]:
-    names = judged_markers(recording, p)
+def _measurements(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+    """What filters are given: markers, or the outline where only one marker is compared."""
+    names, answer = judged_markers(recording, p), found.get(GIVEN, "")
     if not names and not p.seen.outline:
-        return []
+        return ()
     given = _given(recording, p, names) if len(names) > 1 else (p.seen.outline or names[0],)
-    given = _listed(answer) if answer not in ("", ",".join(given)) else given
-    kind, lines = drive_kind(recording, p), []
-    small = _scene(recording, p, Path(), 1).mesh.nodes.size <= _FILTERED
-    if small:
-        lines.append(f'"kf_fem": moving("kf_fem", order=1, markers={given!r}),')
-    if kind in ("moves", "follows"):
-        if small:
-            lines.append(f'"modal_kf": moving("modal_kf", order=1, markers={given!r}),')
-        return lines
-    unsure = _LOAD * _largest(recording, p, kind)
-    return [
-        *lines,
-        f'"reduced_kf": moving("reduced_kf", order={order}, markers={given!r}, '
-        f"load_start={unsure:.3g}, load_walk={unsure:.3g}),",
-        f'"roukf": moving("roukf", order={order}, markers={given!r}),',
-    ]  # fmt: skip
+    return _listed(answer) if answer not in ("", ",".join(given)) else given
 
 
 def _given(recording: Recording, p: MeasuredBody, names: tuple[str, ...]) -> tuple[str, ...]:

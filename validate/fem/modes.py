@@ -43,7 +43,7 @@ def _modes(system: System, count: int | None) -> Modes:
         raise SceneError(f"{wanted} modes of {m} unknowns: expected at most {m}")
     K, M = (X[free][:, free] for X in (system.K, system.M))
     squares, shapes = lowest(K, M, wanted + max(8, wanted // 10))
-    omega = np.sqrt(squares)
+    omega = np.sqrt(np.maximum(squares, 0.0))  # a body that is not held: 0 less rounding
     end = wanted
     while end < len(omega) and omega[end] <= omega[wanted - 1] * (1 + _CLUSTER):
         end += 1

@@ -282,8 +282,8 @@ def _threshold(force: Floats, noise: float) -> float:
 
 def _parabola_start(d: Floats, force: Floats, toe: float) -> float:
     count = max(PLATEAU, int(np.argmax(d - d[0] > toe)))
-    if np.ptp(d[:count]) == 0:
-        return float(force[:count].mean())
+    if len(np.unique(d[:count])) < 3:  # too few places for a parabola
+        return float(force[:count][d[:count] == d[0]].mean())
     x = (d[:count] - d[0]) / np.ptp(d[:count])
     return float(np.polyfit(x, force[:count], 2)[-1])
 

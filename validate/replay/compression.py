@@ -7,7 +7,7 @@ the modulus where none is given, the second predicts.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -18,12 +18,11 @@ from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.identify.modulus import MIN_SAMPLES, fit_modulus
-from validate.parameters import quantity
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import beside, scaled
-from validate.replay.compression_cards import Compression, stated_sizes
+from validate.replay.compression_cards import Compression, Pressed, stated_sizes
 from validate.replay.cost import affordable
 from validate.replay.experiment import (
     CORNER_ORDER,
@@ -59,15 +58,6 @@ STAGE = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
 PULLED = Drive("stage", "upper_plate", (0.0, 0.0, 1.0))
 SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a quarter
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
-
-
-@dataclass(frozen=True)
-class Pressed:
-    """What a method's scene is built with."""
-
-    plates: Contact = quantity("slip", "1", "contact of both plates")
-    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
-    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
 
 
 def pressed(

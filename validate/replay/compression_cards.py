@@ -4,6 +4,7 @@ declared uncertainties, windows of strain, and what images show of it."""
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from validate.identify.modulus import CylinderSize, TestKind, stated_test
 from validate.parameters import Ranges, known, part, quantity
@@ -12,6 +13,8 @@ from validate.recording.types import Recording
 from validate.replay.mesh_sizes import sizes_of_file
 from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
+from validate.scene.material import LawName
+from validate.scene.plates import Contact
 
 
 def size_of(diameter: float | None, height: float | None) -> CylinderSize:
@@ -24,8 +27,7 @@ def stated_sizes(recording: Recording) -> dict[str, float]:
 
     Another cross-section has the diameter of the circle of its area.
     """
-    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
-    found = {k: v for k, v in said.items() if v is not None}
+    found = _record(recording)
     area, sizes = loaded_area(found, stated_test(recording)), {}
     if "diameter_m" in found:
         sizes["specimen.diameter"] = found["diameter_m"]
@@ -34,6 +36,20 @@ def stated_sizes(recording: Recording) -> dict[str, float]:
     if "height_m" in found:
         sizes["specimen.height"] = found["height_m"]
     return sizes
+
+
+def recorded_sides(recording: Recording) -> dict[str, float]:
+    """Return the sides m in a recording's record `specimen` by name: diameter, width, thickness,
+    height."""
+    names = ("diameter", "width", "thickness", "height")
+    found = _record(recording)
+    return {name: found[f"{name}_m"] for name in names if f"{name}_m" in found}
+
+
+def _record(recording: Recording) -> dict[str, float]:
+    """The numbers above zero of the record `specimen`."""
+    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
+    return {k: v for k, v in said.items() if v is not None}
 
 
 def _above_zero(text: str) -> float | None:
@@ -121,3 +137,12 @@ class Compression:
         if body.mesh is None or None not in (body.diameter, body.height):
             return {}
         return sizes_of_file(body.mesh, body.mesh_unit)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What a method's scene is built with."""
+
+    plates: Contact = quantity("slip", "1", "contact of both plates")
+    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
+    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")

@@ -14,8 +14,14 @@ import numpy as np
 
 from validate.compare.score import Score
 from validate.errors import ComparisonError, UsageError, ValidateError
+from validate.estimate.ensemble_kf import EnsembleKf
+from validate.estimate.filterpy_guest import FilterpyGuest
+from validate.estimate.filters import FILTERS
 from validate.estimate.kf_fem import KfFem
+from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
+from validate.estimate.node_ekf import NodeEKF
+from validate.estimate.reduced_ekf import ReducedEKF
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
 from validate.identify.recorded_motion import RecordedMotion, motion_of
@@ -53,9 +59,15 @@ MovingName = Literal[
     "modal_kf",
     "reduced_kf",
     "roukf",
+    "load_scale",
+    "filterpy",
+    "ensemble_kf",
+    "node_ekf",
+    "reduced_ekf",
 ]
 _MODES = 20
-_SCHEMES: Mapping[str, tuple[Any, str]] = {
+#: Settings and words of every method of a motion in time, by name.
+METHODS: Mapping[str, tuple[Any, str]] = {
     "implicit": (Newmark(), "dynamic, implicit (Newmark), {law}"),
     "modal": (Modal(modes=_MODES), "dynamic, {modes} modes and the statics of the rest, {law}"),
     "explicit": (
@@ -67,6 +79,11 @@ _SCHEMES: Mapping[str, tuple[Any, str]] = {
     "reduced_kf": (ReducedKf(modes=_MODES), "Kalman filter of {modes} modes and the load, {law}"),
     "modal_kf": (ModalKf(), "Kalman filter of all modes (KF-FEM's), {law}"),
     "roukf": (Roukf(), "unscented filter of the modulus, {law}"),
+    "load_scale": (LoadScale(), "filter of one load's scale, without inertia, {law}"),
+    "filterpy": (FilterpyGuest(), "filterpy's Kalman filter of the modes and the load, {law}"),
+    "ensemble_kf": (EnsembleKf(), "ensemble filter of the modulus, {law}"),
+    "node_ekf": (NodeEKF(), "extended filter of the nodes at large strain, {law}"),
+    "reduced_ekf": (ReducedEKF(), "extended filter of shapes at large strain, {law}"),
 }  # fmt: skip
 
 
@@ -82,7 +99,7 @@ def moving(
     """A method of a moving body, by name: schemes with inertia, statics beside them, and filters
     that are given `markers`. `split` steps in one of the recording's, for the explicit one;
     `settings` are those of the scheme or filter."""
-    scheme, words = _SCHEMES[name]
+    scheme, words = METHODS[name]
     cells = "quadratic cells" if order == 2 else "linear cells"
     label = words.format(law=f"{law} law, {cells}", modes=_MODES)
     if markers:
@@ -90,6 +107,25 @@ def moving(
     return Method(
         label, replace(scheme, **settings), SolidModel(law, order), markers=markers, split=split
     )
+
+
+def model_law(name: str, law: LawName) -> LawName | None:
+    """Return the law that a method has where the material's is `law`: the linear one if the method
+    handles it, none if it handles neither."""
+    handled = type(METHODS[name][0]).handles.law
+    return "linear" if "linear" in handled else law if law in handled else None
+
+
+def fits_motion(name: str, law: LawName, kind: str, *, preloaded: bool, measured: bool) -> bool:
+    """Whether a method can solve a body in motion: its law, drives or loads of that `kind` of
+    motion, and a start at rest under a load (`preloaded`). Filters need something `measured`."""
+    settings = METHODS[name][0]
+    handles, driven = type(settings).handles, kind in ("moves", "follows")
+    if model_law(name, law) is None or not (handles.drives if driven else handles.loads):
+        return False
+    if isinstance(settings, FILTERS) and not measured:
+        return False
+    return not preloaded or model_law(name, law) == "linear" or hasattr(settings, "preload")
 
 
 def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
