@@ -173,3 +173,8 @@ def unreadable(path: Path, error: Exception) -> RecordingError:
     """The error of a path that the system does not open, with its reason."""
     why = getattr(error, "strerror", None) or error
     return RecordingError(f"{path}: cannot be read ({why})")
+
+
+def modified(path: Path) -> int:
+    """When a file was changed last, ns; 0 for one that is not there."""
+    return path.stat().st_mtime_ns if path.is_file() else 0

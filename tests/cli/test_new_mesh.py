@@ -122,4 +122,4 @@ def test_a_mesh_file_that_changed_is_read_again(
         write_mesh(box((side, side, side), (1, 1, 1)), folder / "b.npz")
         mesh = _mesh_of(found)
         assert mesh is not None
-        assert np.ptp(mesh.nodes[0]) == pytest.approx(side)
+        assert np.ptp(mesh.nodes[:, 0]) == pytest.approx(side)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from validate.errors import SceneError, UsageError
+from validate.files import modified
 from validate.replay.measured_cards import MeasuredBody, Solid
 from validate.replay.measured_contact import pressed_mesh, spans_of
 from validate.scene.box import box, grid
@@ -54,14 +55,16 @@ def body_of(
 
     Raises `UsageError` for a card that says none, `SceneError` for a mesh of 2-D cells.
     """
-    mesh = _meshed(card, folder, places, bricks)
+    changed = modified(folder / card.file) if card.file else 0
+    mesh = _meshed(card, folder.resolve(), places, bricks, changed)
     if mesh.dimension != 3:
         raise SceneError(f"{card.file}: cells of {mesh.kind}; expected 3-D cells")
     return replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
 
 
 @lru_cache(maxsize=8)
-def _meshed(card: Solid, folder: Path, places: tuple[str, ...], bricks: bool) -> Mesh:
+def _meshed(card: Solid, folder: Path, places: tuple[str, ...], bricks: bool, changed: int) -> Mesh:
+    """The body of a card; a file is read again where it has `changed`."""
     if card.file is not None:
         whole = linear(read_mesh(folder / card.file, card.unit))
         scene = Scene(_with_places(whole, places), Material(1.0, 0.3))

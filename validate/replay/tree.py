@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError
+from validate.files import modified
 from validate.parameters import part, quantity, with_given
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
@@ -86,7 +87,8 @@ def mesh_of(recording: Recording | None, tree: Tree, folder: Path) -> Mesh:
     if isinstance(body, Mesh):
         return body
     if isinstance(body, Geometry):
-        return _meshed(body, folder)
+        file = getattr(body, "file", "")
+        return _meshed(body, folder.resolve(), modified(folder / file) if file else 0)
     if recording is None:
         raise ComparisonError("the mesh of this body follows from a recording; give one")
     mesh: Mesh = body(recording, tree)
@@ -94,5 +96,6 @@ def mesh_of(recording: Recording | None, tree: Tree, folder: Path) -> Mesh:
 
 
 @lru_cache(maxsize=8)
-def _meshed(body: Geometry, folder: Path) -> Mesh:
+def _meshed(body: Geometry, folder: Path, changed: int) -> Mesh:
+    """The mesh of a geometry; a file is read again where it has `changed`."""
     return body.resolved(folder)
