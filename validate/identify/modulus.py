@@ -170,7 +170,8 @@ def load_noise(force: Floats) -> float:
     """
     if len(force) < MIN_SAMPLES:
         raise RecordingError(
-            f"{len(force)} forces for a noise estimate, at least {MIN_SAMPLES} needed"
+            f"{len(force)} forces for a noise estimate: at least {MIN_SAMPLES} are needed; record "
+            "more samples, or state the force's standard deviation in the recording"
         )
     return rms(np.diff(force, 2)) / float(np.sqrt(6))
 
