@@ -285,7 +285,6 @@ COMMON: dict[str, Any] = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @settings(max_examples=3, **COMMON)
 @given(case=CASES)
 @example(case=Case())
