@@ -14,7 +14,6 @@ never lies beyond a bound.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 from validate.errors import UsageError
@@ -139,7 +138,7 @@ def _amount(parameters: Any, text: str, path: str, unit: str) -> float:
 def _number(text: str, path: str, unit: str) -> float:
     given = split(text)
     value = in_si(given[0], given[1] or unit, unit) if given else None
-    if value is None or not isfinite(value):
+    if value is None or not math.isfinite(value):
         raise UsageError(f"{path}: '{text}': expected a number in {unit}")
     return value
 
