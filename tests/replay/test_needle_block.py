@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 from validate.compare.result import MethodResult, Result
-from validate.errors import RegistrationError
+from validate.errors import RegistrationError, SceneError
 from validate.recording.types import Markers
 from validate.register.markers import MarkerObservation, observe_markers
 from validate.replay import compare, load
 from validate.replay.experiment import Experiment
+from validate.replay.own_body import own_body
 from validate.scene.box import grid
 
 
 @pytest.fixture(scope="module")
-def experiment(project_root) -> Experiment:  # type: ignore[no-untyped-def]
+def experiment() -> Experiment:
     return load("needle_block")
 
 
@@ -89,3 +90,15 @@ def test_all_claims_stand(experiment: Experiment) -> None:
     assert slopes[2] == pytest.approx(exact, rel=2e-3)
     told = next(e for e in result.exhibits if e.anchor == "mesh-error").words[1]
     assert "93 % of a mixed reference's motion with MP1 and 76 % with MP2" in told
+
+
+def test_a_needle_between_nodes_is_refused(experiment: Experiment) -> None:
+    """21 cells a side have no node in the middle of the free side."""
+    with pytest.raises(SceneError, match=r"nearest node is 23\.81 mm away: take even numbers"):
+        compare(experiment, {"body.cells": "21,21"}, ("explicit",), quick=True)
+
+
+def test_derived_meshes_of_a_declared_body_are_touched_at_its_place(experiment: Experiment) -> None:
+    own = own_body(experiment)
+    assert [p.path for p in own.refining] == ["body.cells"]
+    assert own.levels((25, 50, 75, 100, 200)) == (50, 100, 200)

@@ -89,7 +89,7 @@ class OwnBody:
             scene = self.at(level)
         except ValidateError:
             return 0
-        mine, first = ([tool.tip for tool in s.tools] for s in (scene, self.scene))
+        mine, first = (_acted_on(s) for s in (scene, self.scene))
         return len(scene.mesh.cells) if np.allclose(mine, first) else 0
 
     def _built(self, parameters: Any) -> Scene:
@@ -133,14 +133,32 @@ def with_law(scene: Scene, law: LawName) -> Scene:
     return replace(scene, material=scene.material.of_law(law), regions=regions)
 
 
+def _acted_on(scene: Scene) -> list[float]:
+    """Places m of tools' tips, and of the nodes at which drives act on a point."""
+    driven = [
+        scene.mesh.nodes[scene.mesh.nearest_node(np.array(d.point))]
+        for d in scene.drives if d.point is not None
+    ]  # fmt: skip
+    return [float(c) for place in (*(tool.tip for tool in scene.tools), *driven) for c in place]
+
+
 def _may_refine(p: Parameter) -> bool:
+    if _counts(p):
+        return True
     if isinstance(p.default, bool) or not isinstance(p.default, int | float):
         return False
     whole = p.type.startswith("int") and p.default >= 1
     return whole or (p.unit == "m" and p.default > 0 and "mesh" in p.path)
 
 
+def _counts(p: Parameter) -> bool:
+    """Whether it is the cells of a declared body, along its axes."""
+    return p.type.startswith("tuple[int") and p.path == "body.cells" and bool(p.default)
+
+
 def _scaled(p: Parameter, factor: float) -> str:
+    if _counts(p):
+        return ",".join(str(max(1, round(n * factor))) for n in p.default)
     if p.type.startswith("int"):
         return str(max(1, round(p.default * factor)))
     return repr(float(p.default / factor))

@@ -9,7 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from validate.arrays import Floats
+from validate.errors import SceneError
 from validate.papers.accuracy.needle import STEP
 from validate.parameters import quantity
 from validate.recording.types import Recording
@@ -21,7 +24,7 @@ from validate.replay.experiment import Progress, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
 from validate.replay.tree import Built, Tree
-from validate.scene.scene import Scene
+from validate.scene.scene import Drive, Scene
 from validate.solve.explicit_linear import ExplicitLinear
 from validate.solve.march import output_frames
 from validate.solve.newmark import Newmark
@@ -69,6 +72,8 @@ class Benchmark:
     # --- the road ---------------------------------------------------------------------------------
 
     def place(self, recording: Recording, p: Tree, scene: Scene) -> Registered:
+        for drive in scene.drives:
+            _require_node(scene, drive)
         how = p.settings.registration
         return follow_signal(recording, scene.mesh, self.input, self.unit, how)
 
@@ -114,6 +119,19 @@ class Benchmark:
         """The twin's displacements at the steps, and its fields at the frames."""
         made = self.twin(p)
         return truth_of(made.run(output_frames(p.settings.clock.steps, FRAMES)), made.scene)
+
+
+def _require_node(scene: Scene, drive: Drive) -> None:
+    """Raises `SceneError` where a drive acts on a point that is no node."""
+    if drive.point is None:
+        return
+    mesh, point = scene.mesh, np.array(drive.point)
+    away = float(np.linalg.norm(mesh.nodes[mesh.nearest_node(point)] - point))
+    if away > 1e-9:
+        raise SceneError(
+            f"'{drive.name}' acts at {drive.point} m, and the nearest node is {1e3 * away:.4g} mm "
+            "away: take even numbers of body.cells"
+        )
 
 
 # --- methods and cases ----------------------------------------------------------------------------
