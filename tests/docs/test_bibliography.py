@@ -19,7 +19,7 @@ STANDARD = re.compile(r"ASME V&V \d+")
 
 
 def docstrings(root: Path) -> Iterator[tuple[Path, str]]:
-    for path in sorted([*(root / "validate").rglob("*.py"), *(root / "experiments").glob("*.py")]):
+    for path in sorted([*(root / "validate").rglob("*.py"), *(root / "experiments").rglob("*.py")]):
         for node in nodes(path):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
                 yield path, " ".join((ast.get_docstring(node) or "").split())

@@ -27,7 +27,7 @@ from validate.recording.types import Markers, Recording, Source
 from validate.register.draws import Draw
 from validate.register.observation import Selection
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
+from validate.replay.find import find
 from validate.replay.options import Options
 from validate.replay.road import compare
 from validate.solve.types import Outcome, Run, Trace
@@ -38,7 +38,7 @@ T = 0.01 * np.arange(300)
 
 @pytest.fixture(scope="module")
 def beam(project_root: Path) -> Experiment:
-    return load_file(project_root / "experiments" / "silicone_beam.py")
+    return find("silicone_beam", project_root)
 
 
 def swung(x: np.ndarray, names: tuple[str, ...] = tuple(LAYOUT)) -> Recording:

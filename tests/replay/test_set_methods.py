@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from validate.catalogue import experiment_files, name_of
 from validate.errors import UsageError
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
@@ -14,11 +15,11 @@ from validate.replay.find import load_file
 from validate.replay.law_solver import laws_of
 from validate.replay.options import Options, configure
 
-FILES = sorted((Path(__file__).resolve().parents[2] / "experiments").glob("*.py"))
+FILES = sorted(experiment_files(Path(__file__).resolve().parents[2]).values(), key=name_of)
 PARTS = ("settings", "scene")
 
 
-@pytest.fixture(scope="module", params=FILES, ids=lambda file: file.stem)
+@pytest.fixture(scope="module", params=FILES, ids=name_of)
 def experiment(request: pytest.FixtureRequest) -> Experiment:
     return load_file(request.param)
 
@@ -71,7 +72,7 @@ WITHOUT = {"multimode", "stylus_phantom", "ultrasound_disk"}
 
 def test_which_experiments_have_methods_without_settings() -> None:
     assert len(FILES) > 15
-    assert {f.stem for f in FILES if not list(changes(load_file(f)))} == WITHOUT
+    assert {name_of(f) for f in FILES if not list(changes(load_file(f)))} == WITHOUT
 
 
 def test_a_field_is_set_by_its_short_path_and_by_the_whole_one(experiment: Experiment) -> None:

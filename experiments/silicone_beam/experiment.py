@@ -15,21 +15,22 @@ from validate.compare.verdict import Accept
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
 from validate.papers.released_beam.beam import build, heeded, place, sets
-from validate.papers.released_beam.cards import TIPS, HungMass, Relaxation, ReleasedBeam
+from validate.papers.released_beam.cards import TIPS, ReleasedBeam
 from validate.papers.released_beam.cards import BeamModel as Model
 from validate.papers.released_beam.exhibits import tell
 from validate.papers.released_beam.figures import follows
 from validate.papers.released_beam.recorded import load
 from validate.papers.released_beam.swing import DAMPING, FREQUENCY, LABEL, quantity_of
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
+from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
-from validate.scene.similar_grids import member
 from validate.solve.guests.guest import Guest
 from validate.solve.guests.let_go import GuestLetGo
 from validate.solve.let_go import LetGo
 from validate.solve.newton import StaticNewton
 from validate.solve.viscous_modes import ViscousModes
+
+from .changes import edge, finer, gravity_alone, hung, sooner
 
 FELUPE = "python benchmarks/guests/felupe_guest.py"
 CALCULIX = "python benchmarks/guests/calculix_guest.py"
@@ -38,123 +39,53 @@ STATIC = StaticNewton("none")
 BETA = 0.0023  # s: 2 x .055 over 2 pi 7.7 Hz, of the linear models
 LINEAR = Model("linear", damping=BETA)
 CUT = Model("svk", order=1, mixed=False, along=10, across=3, damping=BETA)
+COARSE = Model(order=1, along=12, across=3)
+LOCKING = Model(order=1, mixed=False, along=12, across=3)
+ONE = ("Tip - 1",)
 METHODS = {
     "mixed": Method("quadratic hexahedra with a pressure, neo-Hooke", LetGo(), Model()),
     "ring_down": Method("small vibrations about its rest position", ViscousModes(), Model()),
     "still": Method("its rest position only", STATIC, Model()),
     "mixed_svk": Method("rest position only, St. Venant-Kirchhoff", STATIC, Model("svk")),
-    "mixed_coarse": Method(
-        "rest position only, linear hexahedra with a pressure",
-        STATIC,
-        Model(order=1, along=12, across=3),
-    ),
-    "locking": Method(
-        "rest position only, linear hexahedra (lock)",
-        STATIC,
-        Model(order=1, mixed=False, along=12, across=3),
-    ),
+    "mixed_coarse": Method("rest position only, linear hexahedra with a pressure", STATIC, COARSE),
+    "locking": Method("rest position only, linear hexahedra (lock)", STATIC, LOCKING),
     "filter_noise": Method(
         "linear modes with uncertain load, given Tip - 1 with the noise of the capture",
-        ReducedKf(load_start=3.0, load_walk=10.0, load_jitter=3.0),
-        LINEAR,
-        markers=("Tip - 1",),
-    ),
+        ReducedKf(load_start=3.0, load_walk=10.0, load_jitter=3.0), LINEAR, markers=ONE),
     "filter_doubt": Method(
         "linear modes, given Tip - 1 to .2 mm (their model error)",
-        ReducedKf(load_start=3.0, load_walk=1.0, load_jitter=0.3, R=4e-8),
-        LINEAR,
-        markers=("Tip - 1",),
-        chosen="R and the random walk of the load, chosen on the recording under gravity",
-    ),
-    "roukf": Method(
-        "unscented filter of the modulus, linear, given Tip - 1 to .2 mm",
-        Roukf(R=4e-8),
-        LINEAR,
-        markers=("Tip - 1",),
-        chosen="R, as for the filter of the load",
-    ),
-    "felupe": Method(
-        "FElupe, rest position only, linear hexahedra of three fields",
-        Guest(FELUPE),
-        Model(order=1, along=12, across=3),
-    ),
-    "calculix": Method(
-        "CalculiX, linear hexahedra of incompatible modes",
-        GuestLetGo(CALCULIX),
-        Model(order=1, mixed=False, along=8, across=2, damping=BETA),
-    ),
-    "mujoco": Method(
-        "MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff",
-        GuestLetGo(MUJOCO),
-        CUT,
-    ),
-    "mujoco_45": Method(
-        "MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff, nu .45",
-        GuestLetGo(MUJOCO),
-        replace(CUT, nu=0.45),
-    ),
-}
-
-
-def _finer(share: float) -> Change:
-    """Cells in every direction and steps at once: both errors are of order two."""
-
-    def change(p: ReleasedBeam) -> ReleasedBeam:
-        along, across = member((p.mesh.along, p.mesh.across), share)
-        finer = replace(p, mesh=replace(p.mesh, along=along, across=across))
-        by = _edge(finer) / _edge(p)
-        return replace(finer, swing=replace(p.swing, dt=p.swing.dt * by))
-
-    return change
-
-
-def _edge(p: ReleasedBeam) -> float:
-    """The edge m of a cube as large as a cell."""
-    volume = p.size.length * p.size.width * p.size.height
-    return float((volume / p.mesh.along / p.mesh.across**2) ** (1 / 3))
-
-
-def _hung(p: ReleasedBeam, z: float) -> ReleasedBeam:
-    """No mass is none, whatever its uncertainty."""
-    mass = p.load.mass and p.load.mass + z * p.ranges.mass
-    return replace(p, load=replace(p.load, mass=mass))
-
-
-def _with(p: ReleasedBeam, relaxation: Relaxation) -> ReleasedBeam:
-    return replace(p, material=replace(p.material, relaxation=relaxation))
-
-
-def _sooner(p: ReleasedBeam, z: float) -> ReleasedBeam:
-    """What is identified is the loss, g tau of a short time: the modulus goes the other way."""
-    card, by = p.material.relaxation, 1 + z * p.ranges.fast_time
-    return _with(p, replace(card, fast_time=card.fast_time and card.fast_time * by,
-                            fast=card.fast and card.fast / by))  # fmt: skip
-
-
+        ReducedKf(load_start=3.0, load_walk=1.0, load_jitter=0.3, R=4e-8), LINEAR, markers=ONE,
+        chosen="R and the random walk of the load, chosen on the recording under gravity"),
+    "roukf": Method("unscented filter of the modulus, linear, given Tip - 1 to .2 mm",
+                    Roukf(R=4e-8), LINEAR, markers=ONE, chosen="R, as for the filter of the load"),
+    "felupe": Method("FElupe, rest position only, linear hexahedra of three fields",
+                     Guest(FELUPE), COARSE),
+    "calculix": Method("CalculiX, linear hexahedra of incompatible modes", GuestLetGo(CALCULIX),
+                       Model(order=1, mixed=False, along=8, across=2, damping=BETA)),
+    "mujoco": Method("MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff",
+                     GuestLetGo(MUJOCO), CUT),
+    "mujoco_45": Method("MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff, nu .45",
+                        GuestLetGo(MUJOCO), replace(CUT, nu=0.45)),
+}  # fmt: skip
 NONE = "assumed; the data set gives none"
 UNCERTAINTY = Uncertainty(
     # 5 x 2 x 2 cells have no coarser similar ones: 8 x 3 x 3 within 7 %, and 10 x 4 x 4.
-    MeshLadder((_finer(1.5), _finer(2.0)), _edge),
+    MeshLadder((finer(1.5), finer(2.0)), edge),
     (
         vary("material.E", "relative ranges.modulus", "modulus", "E", NONE),
         vary("material.rho", "relative ranges.rho", "density", "rho", NONE),
         vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu", NONE),
         vary("size.height", "absolute ranges.size", "height", "height of the section", NONE),
-        Input("mass", _hung, "mass at the end", NONE),
+        Input("mass", hung, "mass at the end", NONE),
         vary("material.relaxation.slow", "absolute ranges.creep, at least 0", "creep",
              "modulus of the slow branch", NONE),
-        Input("relaxation time", _sooner, "relaxation time of the fast branch, at the same "
+        Input("relaxation time", sooner, "relaxation time of the fast branch, at the same "
                                           "loss", NONE),
     ),
     surrogate="ring_down",
     # "mixed" takes minutes on the finer meshes; its time step is then no part of u_num.
     stand_in={"mixed": "ring_down"},
 )  # fmt: skip
-
-
-def _gravity_alone(p: ReleasedBeam) -> ReleasedBeam:
-    """The recording under gravity, on which what stands open is identified."""
-    return replace(p, recording=p.calibration, load=HungMass())
 
 
 SWUNG = tuple(f"{quantity_of(name)}@{LABEL}" for name in TIPS)
@@ -164,7 +95,7 @@ CALIBRATIONS = (
     Calibration(
         "still",
         (Free("material.E", 1e5, 1e6, "assumed: soft silicones", "repeats under gravity"),),
-        (Calibrates(("tip.vertical@settled",), _gravity_alone, GRAVITY),),
+        (Calibrates(("tip.vertical@settled",), gravity_alone, GRAVITY),),
         shared=True,
     ),
     Calibration(
@@ -174,7 +105,7 @@ CALIBRATIONS = (
             Free("material.relaxation.fast_time", 2e-3, 0.3, "assumed", "another mass"),
             Free("material.relaxation.slow", 0.002, 0.5, "assumed", "a recording of the creep"),
         ),
-        (Calibrates((*SWUNG, *RUNG), _gravity_alone, GRAVITY),),
+        (Calibrates((*SWUNG, *RUNG), gravity_alone, GRAVITY),),
     ),
 )
 PART = "a tenth of its measured peak to peak"
