@@ -76,7 +76,7 @@ def test_it_is_run_whatever_is_chosen_in_a_folder_of_its_own(fake: str) -> None:
 
 @pytest.fixture
 def judged(fake: str, shared_data: Path) -> Result:
-    options = Options({"mesh.across": "2"}, ("tetrahedra",), quick=True, guests=(fake,))
+    options = Options({"body.cells": "2,2,6"}, ("tetrahedra",), quick=True, guests=(fake,))
     return compare(with_guests(load("hanging_bar"), (fake,)), options)
 
 
