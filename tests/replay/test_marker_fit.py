@@ -17,7 +17,7 @@ from validate.replay.options import Options, configure, folder_of
 def test_excluded_markers_leave_the_fit_and_stay_in_the_comparison(name: str) -> None:
     experiment = find(name, Path(__file__))
     given, _ = configure(experiment, Options({}))
-    assert isinstance(given.registration, MarkerFit)
+    assert isinstance(getattr(given, "settings", given).registration, MarkerFit)
     (recording, *_) = experiment.load(given, folder_of(experiment))
     marker = next(iter(recording.markers.values())).names[-1]
     options = Options({"registration.exclude": marker, "registration.robust": "true"})

@@ -2,41 +2,49 @@
 parameters alone."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from validate.replay.compression import compression
-from validate.replay.compression_cards import Compression
 from validate.replay.experiment import Experiment
-from validate.replay.inclusion import InclusionTest, inclusion_test
-from validate.replay.measured_body import measured_body
-from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 
 #: What a declaration of such a kind holds.
 DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "accept", "kind")
+
+
+@cache
+def kinds() -> Mapping[type, Callable[..., Experiment]]:
+    """What makes an experiment, by the class of its parameters; they read all formats, so that they
+    are imported where one is asked for."""
+    from validate.replay.compression import compression
+    from validate.replay.compression_cards import Compression
+    from validate.replay.inclusion import InclusionTest, inclusion_test
+    from validate.replay.measured_body import measured_body
+    from validate.replay.measured_cards import MeasuredBody
+
+    return MappingProxyType({
+        MeasuredBody: measured_body,
+        Compression: _without_folder(compression),
+        InclusionTest: _without_folder(inclusion_test),
+    })  # fmt: skip
 
 
 def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment]:
     return lambda *, folder, **given: make(**given)
 
 
-KINDS: Mapping[type, Callable[..., Experiment]] = MappingProxyType({
-    MeasuredBody: measured_body,
-    Compression: _without_folder(compression),
-    InclusionTest: _without_folder(inclusion_test),
-})  # fmt: skip
-
-
 def of_a_kind(experiment: Experiment) -> bool:
     """Whether its parameters say all that is declared of it."""
-    return type(experiment.parameters) in KINDS
+    parameters = experiment.parameters
+    return not isinstance(parameters, Tree) and type(parameters) in kinds()
 
 
 def completed(experiment: Experiment, path: Path) -> Experiment:
     """The experiment declared in that file, with what its kind adds."""
     if of_a_kind(experiment) and not experiment.complete:
         given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
-        make = KINDS[type(experiment.parameters)]
+        make = kinds()[type(experiment.parameters)]
         experiment = make(**given, folder=path.resolve().parent)
     return experiment.at(path)

@@ -12,7 +12,6 @@ from typing import Any
 from validate.errors import ComparisonError
 from validate.files import modified
 from validate.parameters import part, quantity, with_given
-from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.register.as_declared import as_declared
 from validate.register.registered import Registered
@@ -35,6 +34,8 @@ class Tree:
 
 def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The one recording that the tree names, from the experiment's folder or the current one."""
+    from validate.recording.readers import read_recording  # all formats: only where needed
+
     own = folder / tree.recording
     return (read_recording(own if own.exists() else Path(tree.recording)),)
 
