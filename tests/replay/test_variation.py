@@ -59,6 +59,8 @@ def test_values_by_path_are_texts_with_units_numbers_factors_and_steps() -> None
     changed = change(BODY)
     assert (changed.material.E, changed.body.cells) == (15e3, 8)
     assert (changed.body.block, changed.material.nu) == ((0.01, 0.02, 0.03), 0.3)
+    one = change_of({"body.cells": 1})(BODY)
+    assert [change_of({"body.cells": by})(one).body.cells for by in ("- 1", "x 0.3")] == [3, 1]
     assert Case("a", "b", {}).change(BODY) is BODY
     with pytest.raises(UsageError, match=r"nearest: material\.nu"):
         change_of({"material.mu": 1.0})(BODY)

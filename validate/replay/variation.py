@@ -42,7 +42,11 @@ class Values:
         value, unit = value_at(parameters, path)
         sign, amount = given[0], _number(given[2:], path, "1" if given[0] == "x" else unit)
         new = value * amount if sign == "x" else value + (amount if sign == "+" else -amount)
-        return round(new) if isinstance(value, int) else new
+        if not isinstance(value, int):
+            return new
+        # Of a count one stays; a step down to none goes up instead, past the next one up.
+        least = value + 2 * round(amount) if sign == "-" else 1
+        return round(new) if round(new) >= 1 else least
 
 
 class ByPath(Mapping[str, Any]):
