@@ -12,7 +12,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from validate.papers.async_regions.sizes import HEADS, size_rows
+from validate.replay import load
+from validate.replay.find import module_name
 from validate.solve.regions import AsyncRegions
 
 CUBES = ((3, 6), (3, 8), (3, 12))  # 343, 729 and 2197 nodes
@@ -22,9 +23,12 @@ HZ = 2.5  # of the push
 def main(ticks: int) -> None:
     t = 1e-3 * np.arange(1, ticks + 1, dtype=np.float64)
     depth = 5e-3 * np.sin(2 * np.pi * HZ * t)
+    block = load("async_block")
+    assert block.path is not None
+    sizes = sys.modules[f"{module_name(block.path)}.sizes"]
     near = AsyncRegions(layers=(4,), rates=(50.0,), overlap=2)
-    print(" | ".join(HEADS))
-    for row in size_rows(CUBES, near, 5e3, depth, 4, lambda _: None):
+    print(" | ".join(sizes.HEADS))
+    for row in sizes.size_rows(block.parameters, CUBES, near, depth, 4, lambda _: None):
         print(" | ".join(f"{x:.3g}" if isinstance(x, float) else str(x) for x in row))
 
 

@@ -17,7 +17,7 @@ from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.errors import RecordingError, SceneError
 from validate.fem.system import build as build_system
-from validate.papers.async_regions.line import LoadCell
+from validate.papers.async_regions.bodies import LoadCell
 from validate.papers.ekf_nfem.liver_body import of_its_body, watched
 from validate.papers.needle_pocket.hand import moved, tremor
 from validate.parameters import quantity

@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beside import beside
+from touched import bar, block, pad_of
 
-from validate.papers.async_regions.block_figures import ring_nodes
-from validate.papers.async_regions.bodies import bar, block, pad_of
 from validate.papers.async_regions.runs import pushed
-from validate.papers.async_regions.sliding import drawn, sliding_exhibit
 from validate.papers.async_regions.tables import energy_table
 from validate.solve.regions import AsyncRegions
 from validate.solve.touched_krylov import TouchedKrylov
+
+ring_nodes = beside("async_block", "published").ring_nodes
+sliding = beside("async_block", "sliding")
+drawn, sliding_exhibit = sliding.drawn, sliding.sliding_exhibit
 
 H = 1e-3
 WHOLE = AsyncRegions(H, (), ())

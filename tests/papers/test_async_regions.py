@@ -4,30 +4,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beside import beside, experiment
+from touched import AREA, LENGTH, bar, block, block_tree, pad_of
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.async_regions import touched_block
-from validate.papers.async_regions.bodies import (
-    AREA,
-    LENGTH,
-    bar,
-    block,
-    chirp,
-    exact_force,
-    growing,
-    impedance,
-    pad_of,
-)
-from validate.papers.async_regions.claims import claims
-from validate.papers.async_regions.line import HapticProbe, LoadCell, TouchedLine, place, record
-from validate.papers.async_regions.line_exhibits import spring_words
+from validate.papers.async_regions.bodies import HapticProbe, LoadCell, Touched, chirp, growing
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
-from validate.papers.async_regions.sizes import HEADS, size_rows, size_table
+from validate.papers.async_regions.touched import place
+from validate.replay.tree import Built, Tree
 from validate.solve.regions import AsyncRegions
 
 E, KS, H = 5e3, 1000.0, 1e-3
+LINE, SIZES = beside("async_line", "line"), beside("async_block", "sizes")
+CONTINUOUS, TOUCHED_BLOCK = beside("async_line", "continuous"), beside("async_block", "block")
+
+
+def line_with(probe: HapticProbe, twin: LoadCell | None = None) -> Tree:
+    tree: Tree = experiment("async_line").parameters
+    return replace(tree, settings=Touched(probe, twin or LoadCell()))
+
+
 WHOLE = AsyncRegions(H, (), (), pad=pad_of(10))
 
 
@@ -35,24 +33,23 @@ def test_the_bar_is_the_papers() -> None:
     system = build(bar(E, 40))
     assert len(system.free) == 2 * 40
     assert system.masses.sum() / 2 == pytest.approx(1000 * AREA * LENGTH)  # x and y
-    with pytest.raises(SceneError, match="bar of 1 cells: at least 2"):
-        bar(E, 1)
 
 
 def test_impedance_by_hand_and_as_published() -> None:
     """At rest two springs in series; at 0.1, 0.5 and 1 Hz what a reconstruction published."""
     k = E * AREA / LENGTH
-    assert impedance(E, KS, np.array([0.0])) == pytest.approx(k * KS / (k + KS))
+    assert CONTINUOUS.impedance(bar(E, 40), KS, np.array([0.0])) == pytest.approx(k * KS / (k + KS))
     assert pytest.approx(25.0) == 25e3 * AREA / LENGTH * KS / 2000 * 0.05
-    exact = 0.01 * impedance(E, KS, np.array([0.1, 0.5, 1.0]))
+    exact = 0.01 * CONTINUOUS.impedance(bar(E, 40), KS, np.array([0.1, 0.5, 1.0]))
     assert exact == pytest.approx([1.66631, 1.65771, 1.63060], abs=5e-6)
 
 
 def test_the_exact_force_settles_at_the_static_limit_and_swings_with_the_impedance() -> None:
     t = H * np.arange(8001)
     held = np.minimum(t / 2.0, 1.0) * 0.01
-    assert exact_force(E, KS, t, held, 6.5)[5000] == pytest.approx(1.0 / 0.6, rel=1e-4)
-    swing = exact_force(E, KS, t, 0.01 * np.sin(2 * np.pi * t), 6.5)
+    body = bar(E, 40)
+    assert CONTINUOUS.exact_force(body, KS, t, held)[5000] == pytest.approx(1.0 / 0.6, rel=1e-4)
+    swing = CONTINUOUS.exact_force(body, KS, t, 0.01 * np.sin(2 * np.pi * t))
     assert swing[5000:].max() == pytest.approx(1.63060, rel=1e-4)
 
 
@@ -64,14 +61,14 @@ def test_signals_end_where_they_should() -> None:
 
 
 def test_the_recording_is_not_the_models_own_and_drives_and_validates() -> None:
-    p = TouchedLine(probe=HapticProbe(seconds=2.0), twin=LoadCell(every=20))
-    recording = record(p, lambda _: None)
+    p = line_with(HapticProbe(seconds=2.0), LoadCell(every=20))
+    recording = LINE.record(p, lambda _: None)
     assert recording.metadata["provenance"]["same_model"] == "false"
     seen = place(recording, p, bar(E, 10))
     assert seen.inputs.shape == (2000, 2)
     assert seen.inputs[:, 0].min() == pytest.approx(-0.01, rel=0.01)
     assert [o.role for o in seen.compared] == ["validates"]
-    again = record(p, lambda _: None).signal("force", "N").y
+    again = LINE.record(p, lambda _: None).signal("force", "N").y
     assert np.array_equal(again, recording.signal("force", "N").y)
 
 
@@ -120,7 +117,7 @@ def test_growth_is_that_of_the_tick() -> None:
 def test_a_spring_that_is_too_stiff_is_warned_of() -> None:
     """The limit of the paper's bar at 5 kPa is 26.8 kN/m (an independent reconstruction)."""
     for spring, warned in ((1e3, False), (26e3, False), (28e3, True)):
-        words = spring_words(TouchedLine(probe=HapticProbe(spring=spring)))
+        words = beside("async_line", "exhibits").spring_words(line_with(HapticProbe(spring=spring)))
         assert bool(words) is warned
     assert "spring of 28000 N/m is too stiff for ticks of 0.001 s" in words[0]
 
@@ -132,29 +129,30 @@ def test_a_block_in_no_dimension_is_refused() -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_blocks_recording_is_its_whole_solve_and_says_so(dimension: int) -> None:
-    p = touched_block.TouchedBlock(
-        body=touched_block.BlockBody(dimension, 2), probe=HapticProbe(seconds=0.2), twin=LoadCell()
-    )
-    recording = touched_block.record(p, lambda _: None)
+    tree = block_tree(E, 2, dimension)
+    p = replace(tree, settings=Touched(HapticProbe(seconds=0.2), LoadCell()))
+    recording = TOUCHED_BLOCK.record(p, lambda _: None)
     assert recording.metadata["provenance"]["same_model"] == "true"
-    scene = touched_block.build(recording, p, None)
-    seen = touched_block.place(recording, p, scene)
+    scene = Built()(recording, p)
+    seen = place(recording, p, scene)
     assert seen.inputs.shape == (200, dimension)
-    whole = pushed(scene, BLOCK["whole"].given(touched_block.sets(p, seen)), -seen.inputs[:, 0])
+    whole = pushed(scene, BLOCK["whole"].given(TOUCHED_BLOCK.sets(p, seen)), -seen.inputs[:, 0])
     measured = recording.signal("force", "N").y[1:, 0]
-    assert measured == pytest.approx(whole.force[9::10], abs=5 * p.twin.noise)
-    assert np.abs(whole.force).max() > 5 * p.twin.noise
+    assert measured == pytest.approx(whole.force[9::10], abs=5 * p.settings.twin.noise)
+    assert np.abs(whole.force).max() > 5 * p.settings.twin.noise
 
 
 def test_sizes_stand_in_one_table() -> None:
     near = AsyncRegions(H, (1,), (100.0,))
-    rows = size_rows(((2, 2), (3, 2)), near, E, np.full(40, 1e-3), 2, lambda _: None)
+    rows = SIZES.size_rows(
+        block_tree(E, 6, 3), ((2, 2), (3, 2)), near, np.full(40, 1e-3), 2, lambda _: None
+    )
     assert [row[:3] for row in rows[:3]] == [
         (2, 9, "whole, prefactored"), (2, 9, "regions"), (2, 9, "4 Krylov vectors"),
     ]  # fmt: skip
     assert [row[1] for row in rows[3:]] == [27] * 3
     assert rows[0][6:] == (0.0, 0.0)
-    assert size_table(rows).headings == HEADS
+    assert SIZES.size_table(rows).headings == SIZES.HEADS
 
 
 @pytest.mark.slow
@@ -172,9 +170,9 @@ def test_the_rows_of_table_1_that_are_printed() -> None:
 @pytest.mark.slow
 def test_sentences_of_the_paper_as_numbers() -> None:
     """A linear model's relative error knows no size; eq 4 is 2/w_max of the bar, nearly."""
-    p = TouchedLine(probe=HapticProbe(seconds=3.0))
+    p = line_with(HapticProbe(seconds=3.0))
     errors = {"error.n5_f5": 100.0, "error.n5_f500": 2.0, "error.n30_f50": 5.0}
-    found = claims(p, errors)
+    found = beside("async_line", "claims").claims(p, errors)
     assert found["error.by.size"] == pytest.approx(1, abs=1e-9)
     assert found["eq4"] == pytest.approx(1, abs=1e-3)
     assert found["size.over.rate"] == 0.4

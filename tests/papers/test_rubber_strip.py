@@ -1,20 +1,26 @@
 """A tracked strip: exact stretches, a tracker against a stage, and the strip of others."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.fem.stretch_response import response
-from validate.papers.rubber_strip.stretches import stretches
-from validate.papers.rubber_strip.strip import Strip, StripLaw, StripRatios, build, load
-from validate.papers.rubber_strip.tracker import against_stage
+from validate.parameters import with_given
 from validate.recording.formats.npz_points import StageTest, read_points, read_stage
 from validate.replay import load as load_experiment
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Built, Tree
+
+stretches = beside("rubber_strip", "stretches").stretches
+load = beside("rubber_strip", "strip").load
+against_stage = beside("rubber_strip", "tracker").against_stage
+TREE: Tree = experiment("rubber_strip").parameters
 
 NU = 0.42
 AXIAL = 1 + np.linspace(0, 0.3, 13)
@@ -37,8 +43,8 @@ def strip(axial: Floats, across: Floats) -> Floats:
 
 def contracted() -> Floats:
     """What a coupled neo-Hooke of this Poisson ratio does."""
-    p = Strip(nu=StripRatios(neo_coupled=NU))
-    point = build(None, p, StripLaw("neo_coupled", volumetric="coupled"))  # type: ignore[arg-type]
+    tree = with_given(TREE, {"nu.neo_coupled": NU})
+    point: Any = Built()(None, tree, experiment("rubber_strip").methods["neo_coupled"].scene)
     return response(point, AXIAL)["free_stretch"]
 
 
@@ -104,7 +110,7 @@ def test_archives_say_their_unit_and_hold_no_programs(tmp_path: Path) -> None:
 def test_a_strip_that_does_not_reach_beyond_its_first_steps_is_said(tmp_path: Path) -> None:
     path = written(tmp_path)
     with pytest.raises(RecordingError, match=r"12 states up to first = 40 % axial strain"):
-        load(Strip(recording=str(path), first=0.4), tmp_path)
+        load(with_given(TREE, {"recording": str(path), "first": 0.4}), tmp_path)
 
 
 def test_a_tracker_is_as_far_off_its_stage_as_it_was_made(tmp_path: Path) -> None:

@@ -226,7 +226,7 @@ def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
 
 
 def test_an_experiment_is_named_as_its_file(tmp_path: Path, project_root: Path) -> None:
-    text = (project_root / "experiments" / "async_line.py").read_text("utf-8")
+    text = (project_root / "experiments" / "multimode.py").read_text("utf-8")
     (tmp_path / "other.py").write_text(text)
-    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'async_line', not the file's name"):
+    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'multimode', not the file's name"):
         load_file(tmp_path / "other.py")

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import sparse
+from touched import AREA, LENGTH, bar, block, pad_of
 
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import AREA, LENGTH, bar, block, pad_of
 from validate.papers.async_regions.runs import growth, pushed
 from validate.scene.prony import Prony
 from validate.scene.scene import Scene

@@ -6,20 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside
+from touched import AREA, DAMPING, DENSITY, LENGTH, bar, block, pad_of
 
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import (
-    AREA,
-    DAMPING,
-    DENSITY,
-    LENGTH,
-    bar,
-    block,
-    impedance,
-    pad_of,
-)
 from validate.scene.scene import Scene
 from validate.solve.march import run_scheme
 from validate.solve.region_body import RegionBody
@@ -144,7 +136,9 @@ def test_three_regions_of_three_solvers_settle_at_the_static_limit() -> None:
 
 def test_the_whole_solve_has_the_impedance_of_the_continuous_bar() -> None:
     """Published values of an independent reconstruction; then ours by a finer bar."""
-    exact = 0.01 * impedance(E, KS, np.array([0.1, 0.5, 1.0]))
+    exact = 0.01 * beside("async_line", "continuous").impedance(
+        bar(E, 40), KS, np.array([0.1, 0.5, 1.0])
+    )
     assert exact == pytest.approx([1.66631, 1.65771, 1.63060], abs=5e-6)
     cells = 40
     settings = replace(WHOLE, pad=pad_of(cells))

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from touched import AREA, LENGTH, bar, block, pad_of
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import AREA, LENGTH, bar, block, pad_of
 from validate.papers.async_regions.runs import off, pushed
 from validate.solve.regions import AsyncRegions
 from validate.solve.touched_krylov import KrylovStepper, TouchedKrylov

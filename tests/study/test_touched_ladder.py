@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import experiment
+from touched import block
 
 from validate.errors import UsageError
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import block
 from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
 from validate.replay.ladder import RUNGS, Trial
 from validate.replay.ladder_default import body_of, trial_of
 from validate.replay.ladder_touched import Divided
@@ -26,8 +26,8 @@ from validate.study.trade_regions import pays, regions_exhibit
 
 
 @pytest.fixture(scope="module")
-def touched(project_root: Path) -> Experiment:
-    return load_file(project_root / "experiments" / "async_block.py")
+def touched() -> Experiment:
+    return experiment("async_block")
 
 
 @pytest.fixture(scope="module")
@@ -50,8 +50,8 @@ def test_a_touched_body_is_climbed_by_its_own_methods(trial: Trial) -> None:
 
 
 @pytest.mark.slow
-def test_a_bar_is_refined_as_one_body(project_root: Path) -> None:
-    trial = trial_of(load_file(project_root / "experiments" / "async_line.py"), quick=True)
+def test_a_bar_is_refined_as_one_body() -> None:
+    trial = trial_of(experiment("async_line"), quick=True)
     element, finest = trial.reference
     bodies = [trial.build(element, n, "linear") for n in (*trial.meshes[element], finest)]
     assert len({len(b.mesh.nodes) for b in bodies}) == len(bodies) >= 2

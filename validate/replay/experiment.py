@@ -29,7 +29,6 @@ from validate.replay.variation import Change as Change
 from validate.replay.variation import Shift, bound, change_of, shares, swept
 from validate.replay.variation import unchanged as unchanged
 from validate.scene.meshless import AnyScene
-from validate.scene.scene import Scene
 
 Progress = Callable[[str], None]
 
@@ -373,15 +372,15 @@ class Experiment:
     expected: tuple[Expected, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
     path: Path | None = field(default=None, compare=False)
-    scene: InitVar[Scene | None] = None
+    scene: InitVar[Any] = None
     settings: InitVar[Any] = None
     recording: InitVar[str] = ""
     variations: InitVar[tuple[Variation, ...]] = ()
 
     def __post_init__(
-        self, scene: Scene | None, settings: Any, recording: str, variations: tuple[Variation, ...]
+        self, scene: Any, settings: Any, recording: str, variations: tuple[Variation, ...]
     ) -> None:
-        if scene is not None:
+        if scene is not None or settings is not None:
             object.__setattr__(self, "parameters", Tree(recording, scene, settings))
         self._vary(variations)
         self._find_from(self.path.parent if self.path else Path())

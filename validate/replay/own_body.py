@@ -134,12 +134,10 @@ def with_law(scene: Scene, law: LawName) -> Scene:
 
 
 def _acted_on(scene: Scene) -> list[float]:
-    """Places m of tools' tips, and of the nodes at which drives act on a point."""
-    driven = [
-        scene.mesh.nodes[scene.mesh.nearest_node(np.array(d.point))]
-        for d in scene.drives if d.point is not None
-    ]  # fmt: skip
-    return [float(c) for place in (*(tool.tip for tool in scene.tools), *driven) for c in place]
+    """Places m of the nodes nearest to tools' tips, and to points at which drives act."""
+    points = [t.tip for t in scene.tools] + [d.point for d in scene.drives if d.point is not None]
+    nodes = [scene.mesh.nodes[scene.mesh.nearest_node(np.array(p))] for p in points]
+    return [float(x) for place in nodes for x in place]
 
 
 def _may_refine(p: Parameter) -> bool:

@@ -42,7 +42,8 @@ def _of_value(p: Parameter, stated: Mapping[str, float]) -> Iterator[str]:
     value = p.default
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
-    if p.unit == "m" and p.origin != "default" and abs(value) >= LENGTH:
+    # A plane body's thickness is no length of a specimen: 1 m stands for forces per metre.
+    if p.unit == "m" and p.path != "thickness" and p.origin != "default" and abs(value) >= LENGTH:
         yield f"{p.path} = {value:g} m is 1000 times {value:g} mm: check its unit"
     if p.unit == "Pa" and p.path.split(".")[-1].startswith("E"):
         yield from _outside(f"{p.path} ({p.origin})", value, MODULUS, "modulus")

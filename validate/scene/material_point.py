@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from validate.errors import SceneError
+from validate.parameters import quantity
 from validate.scene.material import Material
 from validate.scene.meshless import Meshless
 
@@ -20,7 +21,7 @@ class MaterialPoint(Meshless):
     """
 
     material: Material
-    mode: StretchMode
+    mode: StretchMode = quantity("uniaxial", "1", "how it is stretched")
 
     def __post_init__(self) -> None:
         if self.material.incompressible:

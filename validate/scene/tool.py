@@ -1,11 +1,13 @@
 """A point tool: the tip of a needle whose path is given, and the surface that it may touch."""
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 
 import numpy as np
 
 from validate.errors import SceneError
+from validate.parameters import quantity, take_units
 from validate.scene.mesh import Mesh
+from validate.scene.named_place import axis_of
 from validate.scene.select import Place, kind_of, nodes_of
 
 _UNIT = 1e-9
@@ -19,11 +21,14 @@ class Needle:
     """
 
     name: str
-    facets: Place
-    tip: tuple[float, ...]
-    axis: tuple[float, ...]
+    facets: Place = quantity(MISSING, "1", "what it may touch")
+    tip: tuple[float, ...] = quantity(MISSING, "m", "place of the tip at rest")
+    axis: tuple[float, ...] = quantity(MISSING, "1", "unit vector that it points along")
 
     def __post_init__(self) -> None:
+        if isinstance(self.axis, str):
+            object.__setattr__(self, "axis", axis_of(self.axis)[: len(self.tip)])
+        take_units(self)
         if not np.isfinite((*self.tip, *self.axis)).all():
             raise SceneError(
                 f"needle '{self.name}': tip {self.tip} m, axis {self.axis}: expected finite numbers"

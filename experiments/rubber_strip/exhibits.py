@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
-from validate.papers.rubber_strip.stretches import stretches
-from validate.papers.rubber_strip.strip import FIRST, LAST, Strip, recorded
-from validate.papers.rubber_strip.tracker import stage_exhibit
 from validate.recording.formats.npz_points import read_points
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import MAIN, Cases
+from validate.replay.tree import Tree
+
+from .stretches import stretches
+from .strip import FIRST, LAST, Strip, recorded
+from .tracker import stage_exhibit
 
 _UNKNOWN = (
     "No force was recorded, so no modulus is identified or used. No thickness was recorded: "
@@ -20,13 +22,13 @@ _UNKNOWN = (
 )
 
 
-def exhibits(p: Strip, cases: Cases, tell: Progress, *, folder: Path) -> Told:
-    """Contraction over stretch, the parts of the strip, the tracker against its stage; `folder` is
-    the experiment's."""
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+    """Contraction over stretch, the parts of the strip, the tracker against its stage."""
     tell("compares the tracker with its stage")
-    path = recorded(p, folder)
-    tracker = stage_exhibit(path.parent, p.stage)
-    shown = (_contraction(cases), _parts(p, path))
+    own: Strip = tree.settings
+    path = recorded(tree, Path(__file__).parent)
+    tracker = stage_exhibit(path.parent, own.stage)
+    shown = (_contraction(cases), _parts(own, path))
     return Told((*shown, *((tracker,) if tracker else ())))
 
 

@@ -8,15 +8,17 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, Heat, NumberTable
-from validate.papers.async_regions.bodies import bar, growing, impedance, pad_of
-from validate.papers.async_regions.claims import DEEP, HALF, HZ, STIFF, claims
-from validate.papers.async_regions.line import TouchedLine
+from validate.papers.async_regions.bodies import growing, pad_of
 from validate.papers.async_regions.methods import LINE
 from validate.papers.async_regions.runs import growth, off, peak, pushed
 from validate.papers.async_regions.tables import ENERGY, FORCE, energy_table, force_table
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
-from validate.solve.regions import AsyncRegions
+from validate.replay.tree import Tree
+
+from .claims import DEEP, HALF, HZ, STIFF, claims
+from .continuous import impedance
+from .line import bar, sets, whole_of, with_cells
 
 _SHORT, _NEAR = 10, 3  # free nodes and primary layers of the bar whose stability is mapped
 _RATIOS = (1, 2, 5, 10, 20, 50, 100, 200)
@@ -24,18 +26,18 @@ _RATIOS = (1, 2, 5, 10, 20, 50, 100, 200)
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Both tables, the oracle beside, energies of borders, and growth over the step ratio."""
-    p, main = cast(TouchedLine, parameters), cases[""]
-    middle = p.probe.seconds / 2
+    tree, main = cast(Tree, parameters), cases[""]
+    middle = tree.settings.probe.seconds / 2
     title = f"Table 1: peak force within {HALF:g} s of {middle:g} s, against the whole solve."
     first, numbers = force_table("table_1", title, main, middle, HALF)
     progress("growing push")
-    second, more = _table_2(p)
+    second, more = _table_2(tree)
     progress("the paper's sentences")
-    sentences = claims(p, numbers)
+    sentences = claims(tree, numbers)
     progress("energy of borders")
-    energy = _energies(p, main)
+    energy = _energies(tree, main)
     progress("stability")
-    maps = _stability(p)
+    maps = _stability(tree)
     words = (
         "Row labels of Table 1 are lost in the text; they follow from its sentences.",
         "A peak hides the phase and a mean hides slow ticks, so the tables also give rms and "
@@ -47,8 +49,8 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     bounds = Exhibit(
         "borders",
         "Effects of borders",
-        (*_BORDERS, *spring_words(p)),
-        (_impedances(p, main), energy),
+        (*_BORDERS, *spring_words(tree)),
+        (_impedances(tree, main), energy),
         heats=(maps,),
     )
     return Told((tables, bounds), {**numbers, **more, **sentences})
@@ -61,10 +63,10 @@ _BORDERS = (
 )
 
 
-def spring_words(p: TouchedLine) -> tuple[str, ...]:
+def spring_words(tree: Tree) -> tuple[str, ...]:
     """A warning where the probe's spring is too stiff for the whole solve: it oscillates."""
-    whole = AsyncRegions(p.dt, (), (), spring=p.probe.spring, pad=pad_of(p.body.cells))
-    grows = growth(bar(p.body.E, p.body.cells, p.body.damping), whole)
+    p = tree.settings
+    grows = growth(bar(tree), whole_of(tree))
     if grows <= 1:
         return ()
     return (
@@ -74,13 +76,11 @@ def spring_words(p: TouchedLine) -> tuple[str, ...]:
     )
 
 
-def _table_2(p: TouchedLine) -> tuple[NumberTable, dict[str, float]]:
+def _table_2(tree: Tree) -> tuple[NumberTable, dict[str, float]]:
     """A growing push on the stiff bar: whole, fixed and adaptable primary region."""
-    t: Floats = p.dt * np.arange(
-        1, round(9.25 / HZ / p.dt) + 1, dtype=np.float64
-    )  # ends on its tenth peak
-    depth, scene = growing(t, DEEP, HZ), bar(STIFF, p.body.cells, p.body.damping)
-    whole = AsyncRegions(p.dt, (), (), spring=p.probe.spring, pad=pad_of(p.body.cells))
+    dt = tree.settings.dt
+    t: Floats = dt * np.arange(1, round(9.25 / HZ / dt) + 1, dtype=np.float64)  # to its tenth peak
+    depth, scene, whole = growing(t, DEEP, HZ), bar(tree, {"material.E": STIFF}), whole_of(tree)
     fixed = replace(whole, layers=(10,), rates=(50.0,))
     kinds = {"whole": whole, "fixed": fixed, "adaptable": replace(fixed, adapt="linear", most=30)}
     reference = pushed(scene, whole, depth).force
@@ -99,11 +99,12 @@ def _table_2(p: TouchedLine) -> tuple[NumberTable, dict[str, float]]:
     return NumberTable("table_2", title, heads, tuple(rows)), numbers
 
 
-def _impedances(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
+def _impedances(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
     """Peak force by frequency of the chirp, against the continuous bar's impedance."""
+    p = tree.settings
     rise = (p.probe.highest - p.probe.lowest) / p.probe.seconds
     hz = p.probe.lowest + (p.probe.highest - p.probe.lowest) * np.array([0.3, 0.5, 0.7, 0.9])
-    exact = p.probe.depth * impedance(p.body.E, p.probe.spring, hz)
+    exact = p.probe.depth * impedance(bar(tree), p.probe.spring, hz)
     rows: list[tuple[Entry, ...]] = [("continuous bar, steady", *exact.tolist())]
     for f in main.values():
         if f.run.finished:
@@ -117,20 +118,20 @@ def _impedances(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
                        tuple(rows))  # fmt: skip
 
 
-def _energies(p: TouchedLine, main: Mapping[str, Followed]) -> NumberTable:
+def _energies(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
     """The first tenth of the chirp's time, at its highest frequency."""
+    p = tree.settings
     t: Floats = p.dt * np.arange(1, round(min(4.0, p.probe.seconds) / p.dt) + 1, dtype=np.float64)
     depth = p.probe.depth * np.sin(2 * np.pi * p.probe.highest * t)
-    given = {"dt": p.dt, "spring": p.probe.spring, "pad": pad_of(p.body.cells)}
+    given = sets(tree, main["whole"].registered[0])
     rivals = {main[n].label: LINE[n].given(given) for n in main if n in LINE}
-    scene = bar(p.body.E, p.body.cells, p.body.damping)
-    return energy_table(f"Energy at {p.probe.highest:g} Hz.", scene, rivals, depth)
+    return energy_table(f"Energy at {p.probe.highest:g} Hz.", bar(tree), rivals, depth)
 
 
-def _stability(p: TouchedLine) -> Heat:
+def _stability(tree: Tree) -> Heat:
     """Growth a tick over the step ratio, by border and solvers."""
-    scene = bar(p.body.E, _SHORT, p.body.damping)
-    base = AsyncRegions(p.dt, (_NEAR,), (50.0,), spring=p.probe.spring, pad=pad_of(_SHORT))
+    dt, scene = tree.settings.dt, with_cells(tree, _SHORT)
+    base = replace(whole_of(tree), layers=(_NEAR,), rates=(50.0,), pad=pad_of(scene))
     near = replace(base, beyond_limit="run")
     kinds = {
         "interpolated": base,
@@ -143,7 +144,7 @@ def _stability(p: TouchedLine) -> Heat:
         "all explicit, interpolated": replace(near, solvers=("explicit",)),
     }
     values = [
-        [growth(scene, replace(s, rates=(1 / (p.dt * ratio),))) for ratio in _RATIOS]
+        [growth(scene, replace(s, rates=(1 / (dt * ratio),))) for ratio in _RATIOS]
         for s in kinds.values()
     ]
     return Heat(

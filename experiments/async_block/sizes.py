@@ -9,8 +9,11 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, NumberTable
-from validate.papers.async_regions.bodies import block
+from validate.errors import SceneError
 from validate.papers.async_regions.runs import off, pushed
+from validate.replay.tree import Built, Tree
+from validate.scene.geometry import Box
+from validate.scene.scene import Support
 from validate.solve.regions import AsyncRegions
 from validate.solve.touched_krylov import TouchedKrylov
 
@@ -19,10 +22,27 @@ HEADS = ("dimensions", "nodes", "solver", "median tick / ms", "mean tick / ms",
          "worst tick / ms", "rms force error / %", "peak force error / %")  # fmt: skip
 
 
+def sized(tree: Tree, dimension: int, cells: int) -> Tree:
+    """The touched block as a square or a cube of so many cells a side. Raises `SceneError` for
+    fewer than two cells, or another dimension."""
+    if dimension not in (2, 3) or cells < 2:
+        raise SceneError(f"block of {cells} cells in {dimension} dimensions: at least 2, in 2 or 3")
+    side = tree.scene.body.size[0]
+    at = (side, *(side * (cells // 2) / cells,) * (dimension - 1))
+    (needle,), (end,) = tree.scene.tools, tree.scene.probes
+    return tree.with_scene(
+        body=Box((side,) * dimension, (cells,) * dimension),
+        supports=(Support("x0", tuple(range(dimension))),),
+        thickness=side if dimension == 2 else 1.0,
+        tools=(replace(needle, tip=at, axis=(-1.0, *(0.0,) * (dimension - 1))),),
+        probes=(replace(end, point=at),),
+    )
+
+
 def size_rows(
+    tree: Tree,
     sizes: tuple[tuple[int, int], ...],
     near: AsyncRegions,
-    E: float,
     depth: Floats,
     r: int,
     tell: Callable[[str], None],
@@ -31,7 +51,7 @@ def size_rows(
     `near`, r Krylov vectors a direction."""
     rows: list[tuple[Entry, ...]] = []
     for dimension, cells in sizes:
-        scene = block(E, cells, dimension)
+        scene = Built()(None, sized(tree, dimension, cells))
         nodes = len(scene.mesh.nodes)
         tell(f"{nodes} nodes in {dimension}-D")
         whole = pushed(scene, replace(near, layers=(), rates=(), solvers=near.solvers[:1]), depth)

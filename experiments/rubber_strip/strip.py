@@ -1,4 +1,4 @@
-"""A rubber strip pulled in steps: parameters, tracked points, scene and registration.
+"""A rubber strip pulled in steps: tracked points and registration; what its scene does not hold.
 
 No force and no thickness were recorded: moduli cannot be known, nor whether the strip contracts in
 thickness as it does in width; a law has one Poisson ratio for both.
@@ -6,26 +6,24 @@ thickness as it does in width; a law has one Poisson ratio for both.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from validate.datasets.home import found
 from validate.errors import RecordingError
-from validate.papers.rubber_strip.stretches import Seen, Stretches, stretches
-from validate.parameters import known, quantity
+from validate.parameters import quantity
 from validate.recording.formats.npz_points import read_points
 from validate.recording.types import Recording, Signal
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.scene.laws import Coefficients, VolumetricName
-from validate.scene.material import LawName, Material
+from validate.replay.tree import Tree
 from validate.scene.material_point import MaterialPoint
+
+from .stretches import Seen, Stretches, stretches
 
 FOLDER = "markers/rubber-strip"
 POINTS = "points3d_mm.npz"
 FIRST, LAST = "stretch.transverse.first", "stretch.transverse.last"
-_MODULUS = 1.0  # Pa: no force is compared, so that it moves nothing
 
 
 @dataclass(frozen=True)
@@ -44,34 +42,22 @@ class Strip:
     first: float = quantity(0.06, "1", "axial strain up to which steps calibrate")
     patches: int = quantity(8, "1", "parts of the strip, along it, that the mean is over")
     unit: str | None = quantity(None, "1", "of the points; none: the end of the file's name")
-    recording: str | None = quantity(None, "1", "tracked points, .npz; none: VALIDATE_SHARED_DATA")
     stage: str = quantity(
         "rbm_cam*_px.npz", "1", "files of the stage test in the folder of the recording"
     )
 
 
-@dataclass(frozen=True)
-class StripLaw:
-    """What a method's scene is built with."""
-
-    nu: Literal["svk", "neo_split", "neo_coupled", "incompressible"] = quantity(
-        "neo_split", "1", "whose Poisson ratio"
-    )
-    law: LawName = quantity("neo_hooke", "1", "law of the material")
-    volumetric: VolumetricName = quantity("split", "1", "its volumetric form")
-
-
-def load(parameters: Strip, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """Mean stretches of the strip at every state."""
-    path = recorded(parameters, folder)
-    points = read_points(path, parameters.unit)
-    seen = stretches(points.marker("points").x, parameters.patches)
-    return (_reduced(points, seen, parameters),)
+    own: Strip = tree.settings
+    points = read_points(recorded(tree, folder), own.unit)
+    seen = stretches(points.marker("points").x, own.patches)
+    return (_reduced(points, seen, own),)
 
 
-def recorded(parameters: Strip, folder: Path) -> Path:
-    """The file of the tracked points."""
-    return found(FOLDER, POINTS, folder, parameters.recording)
+def recorded(tree: Tree, folder: Path) -> Path:
+    """The file of the tracked points; where none is named that of VALIDATE_SHARED_DATA."""
+    return found(FOLDER, POINTS, folder, tree.recording or None)
 
 
 def _reduced(points: Recording, seen: Stretches, p: Strip) -> Recording:
@@ -106,13 +92,7 @@ def _apart(seen: Stretches, early: Seen) -> float:
     return float(error * np.log(seen.axial[-1].mean()) * seen.across[-1].mean())
 
 
-def build(recording: Recording, parameters: Strip, model: StripLaw) -> MaterialPoint:
-    nu = known(getattr(parameters.nu, model.nu), f"nu.{model.nu}")
-    c = Coefficients(volumetric=model.volumetric).known_to(model.law)
-    return MaterialPoint(Material(_MODULUS, nu, model.law, coefficients=c), "uniaxial")
-
-
-def place(recording: Recording, parameters: Strip, scene: MaterialPoint) -> Registered:
+def place(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
     """The axial stretch drives; across, the first states calibrate and the last one validates."""
     across, said = recording.signal("across", "1"), recording.record("stretches")
     early = [int(k) for k in said["states that calibrate"].split()]

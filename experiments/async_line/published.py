@@ -6,7 +6,8 @@ and 7 show (30, 500) and (5, 5); no other order of N and f gives these peaks.
 """
 
 from validate.compare.published import Figure, Values
-from validate.papers.async_regions.stated import STATED
+
+from .stated import STATED
 
 _TABLE_1, _TABLE_2 = "section 6, Table 1", "section 6, Table 2"
 _MACHINE = "another machine and language; the report has our ticks, mean and worst, in one run"

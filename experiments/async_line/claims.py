@@ -12,46 +12,50 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.critical import lanczos_step
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import DENSITY, LENGTH, bar, chirp, growing, pad_of
-from validate.papers.async_regions.line import TouchedLine
+from validate.papers.async_regions.bodies import chirp, growing
 from validate.papers.async_regions.runs import peak, pushed
+from validate.replay.tree import Tree
 from validate.solve.regions import AsyncRegions
+
+from .line import bar, whole_of
 
 STIFF, HZ, DEEP = 25e3, 0.3, 0.05  # Pa, Hz, m: Table 2
 HALF = 1.0  # s around the middle in which the paper's "approximately 20th second" is read
 
 
-def claims(p: TouchedLine, errors: Mapping[str, float]) -> dict[str, float]:
+def claims(tree: Tree, errors: Mapping[str, float]) -> dict[str, float]:
     """Numbers by name; `errors` are Table 1's, in %."""
-    whole = AsyncRegions(p.dt, (), (), spring=p.probe.spring, pad=pad_of(p.body.cells))
-    top, far = _stiffer(p, whole)
+    whole = whole_of(tree)
+    top, far = _stiffer(tree, whole)
     return {
         "stiff.whole": top,
         "stiff.error": far,
         "stiff.over.soft": far / errors["error.n5_f5"],
         "size.over.rate": errors["error.n5_f500"] / errors["error.n30_f50"],
-        "error.by.size": _by_size(p, whole),
-        "eq4": _step_by_eq_4(p),
+        "error.by.size": _by_size(tree, whole),
+        "eq4": _step_by_eq_4(tree),
     }
 
 
-def _stiffer(p: TouchedLine, whole: AsyncRegions) -> tuple[float, float]:
+def _stiffer(tree: Tree, whole: AsyncRegions) -> tuple[float, float]:
     """Peak N of the whole solve near the middle of the chirp, and the error of (5, 5) in %, both of
     the stiff bar (figure 7b and d)."""
+    p = tree.settings
     t: Floats = p.dt * np.arange(1, round(p.probe.seconds / p.dt) + 1, dtype=np.float64)
     middle = p.probe.seconds / 2
     seen = t <= middle + HALF
     depth = chirp(t, p.probe.depth, p.probe.lowest, p.probe.highest)[seen]
-    scene = bar(STIFF, p.body.cells, p.body.damping)
+    scene = bar(tree, {"material.E": STIFF})
     far = replace(whole, layers=(5,), rates=(5.0,))
     one, other = (peak(pushed(scene, s, depth).force, t[seen], middle, HALF) for s in (whole, far))
     return one, 100 * (other / one - 1)
 
 
-def _by_size(p: TouchedLine, whole: AsyncRegions) -> float:
+def _by_size(tree: Tree, whole: AsyncRegions) -> float:
     """Relative error of a fixed region's peak under a push, over that under half of it."""
-    t: Floats = p.dt * np.arange(1, round(1 / HZ / p.dt) + 1, dtype=np.float64)
-    scene = bar(STIFF, p.body.cells, p.body.damping)
+    dt = tree.settings.dt
+    t: Floats = dt * np.arange(1, round(1 / HZ / dt) + 1, dtype=np.float64)
+    scene = bar(tree, {"material.E": STIFF})
     fixed = replace(whole, layers=(10,), rates=(50.0,))
     off = []
     for depth in (0.5 * DEEP, DEEP):
@@ -62,9 +66,11 @@ def _by_size(p: TouchedLine, whole: AsyncRegions) -> float:
     return off[1] / off[0]
 
 
-def _step_by_eq_4(p: TouchedLine) -> float:
+def _step_by_eq_4(tree: Tree) -> float:
     """l sqrt(rho/E) over the exact critical step of the bar with lumped masses."""
-    system = build(bar(p.body.E, p.body.cells, p.body.damping))
+    body, material = tree.scene.body, tree.scene.material
+    system = build(bar(tree))
     K = system.K[system.free][:, system.free]
     exact = lanczos_step(lambda x: K @ x, system.masses[system.free], products=60).limit
-    return LENGTH / p.body.cells * float(np.sqrt(DENSITY / p.body.E)) / exact
+    edge: float = body.size[0] / body.cells[0]
+    return edge * float(np.sqrt((material.rho or 0.0) / material.E)) / exact

@@ -5,47 +5,48 @@ A bar of 40 free nodes (0.1 m, 40 cm2, 5 kPa) pushed and pulled by a probe behin
 bar in the frequency domain, so that the whole solve is judged, too.
 """
 
-from pathlib import Path
-
 from validate.compare.verdict import Accept
-from validate.papers.async_regions.bodies import LENGTH
-from validate.papers.async_regions.figures import FIGURES
-from validate.papers.async_regions.line import TouchedLine, build, place, record, sets
-from validate.papers.async_regions.line_exhibits import tell
+from validate.papers.async_regions.bodies import Touched
 from validate.papers.async_regions.methods import LINE
-from validate.replay.cards import shipped
+from validate.papers.async_regions.touched import place
 from validate.replay.experiment import Experiment, MeshLadder, StepLadder, Twin, Uncertainty
+from validate.replay.tree import CellSize
 
-RECORDING = Path(__file__).parents[1] / "recordings" / "async_line.mcap"
-PARAMETERS = TouchedLine(recording=str(RECORDING))
+from .exhibits import tell
+from .line import record, sets
+from .published import FIGURES
+from .scene import SCENE
+
+# Rows of square cells, all of one body: of 40 cm2.
+COARSER = (
+    {"body.cells": (10, 1), "body.size": ("10 cm", "10 mm"), "thickness": "0.4 m"},
+    {"body.cells": (20, 1), "body.size": ("10 cm", "5 mm"), "thickness": "0.8 m"},
+)
 
 EXPERIMENT = Experiment(
     name="async_line",
     title="Asynchronous regions on a touched bar",
     source="paper 004 (asynchronous regions), section 6, Tables 1 and 2",
-    parameters=PARAMETERS,
+    recording="../../recordings/async_line.mcap",
+    scene=SCENE,
+    settings=Touched(),
     methods=LINE,
     accepted=("whole",),
     accept=(Accept("force", 0.08, "a twentieth of the largest force"),),
-    load=shipped,
-    build=build,
     place=place,
     sets=sets,
     axis="x",
     reference="whole",
-    uncertainty=Uncertainty(
-        MeshLadder(({"body.cells": 10}, {"body.cells": 20}), lambda p: LENGTH / p.body.cells),
-        steps=StepLadder(1.0),
-    ),
+    uncertainty=Uncertainty(MeshLadder(COARSER, CellSize()), steps=StepLadder(1.0)),
     exhibits=tell,
     published=FIGURES,
     frames=40,
     quick={"probe.seconds": 10.0},
     twin=Twin(
         record,
-        remake=("twin.", "probe.", "body.", "dt"),
+        remake=("twin.", "probe.", "body.", "material.", "dt"),
         kind="same law, finer mesh",
-        seed=PARAMETERS.twin.seed,
+        seed=Touched().twin.seed,
         notice="The recording is a twin: a continuous bar in the frequency domain, exact.",
     ),
 )

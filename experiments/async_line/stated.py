@@ -1,13 +1,14 @@
 """Numbers that paper 004 states, sets or cites, its sentences as numbers, and its 1-D pictures."""
 
 from validate.compare.published import Figure, Values
-from validate.papers.async_regions.bodies import AREA, DENSITY, LENGTH
-from validate.papers.async_regions.claims import DEEP, STIFF
-from validate.papers.async_regions.line import TouchedLine
+from validate.papers.async_regions.bodies import Touched
 from validate.papers.stated import CITED, drawn, said, taken
 from validate.solve.regions import AsyncRegions
 
-_P = TouchedLine()
+from .claims import DEEP, STIFF
+from .scene import SCENE
+
+_P, _BODY, _MATERIAL = Touched(), SCENE.body, SCENE.material
 _SHOWN = "a curve without numbers: the report draws the force of every method"
 _SET = "section 6"
 
@@ -41,14 +42,14 @@ STATED = (
          "a sketch; Table 2's adaptable row follows it"),
     *(said(f"modulus of soft tissue in other work, number {i}", E, "Pa", _SET, CITED)
       for i, E in enumerate((5e3, 35e3, 6e3, 11e3, 0.0, 3.5e3, 9.3e3), 1)),
-    taken("softest bar", 5e3, _P.body.E, "Pa", _SET),
+    taken("softest bar", 5e3, _MATERIAL.E, "Pa", _SET),
     taken("stiffest bar", 25e3, STIFF, "Pa", _SET),
-    taken("area of the bar", 40e-4, AREA, "m^2", _SET),
-    taken("length of the bar", 0.1, LENGTH, "m", _SET),
-    taken("density", 1000.0, DENSITY, "kg/m^3", _SET),
-    taken("damping", 6.5, _P.body.damping, "1/s", _SET,
+    taken("area of the bar", 40e-4, SCENE.thickness * _BODY.size[1], "m^2", _SET),
+    taken("length of the bar", 0.1, _BODY.size[0], "m", _SET),
+    taken("density", 1000.0, _MATERIAL.rho, "kg/m^3", _SET),
+    taken("damping", 6.5, _MATERIAL.mass_damping, "1/s", _SET,
           "an input without unit: read as C = 6.5 M, which gives the whole solve's peaks"),
-    taken("nodes of the bar", 40.0, float(_P.body.cells), "1", _SET, "an input; free nodes"),
+    taken("nodes of the bar", 40.0, float(_BODY.cells[0]), "1", _SET, "an input; free nodes"),
     taken("magnitude of the chirp", 0.01, _P.probe.depth, "m", _SET),
     taken("lowest frequency of the chirp", 0.1, _P.probe.lowest, "Hz", _SET),
     taken("highest frequency of the chirp", 1.0, _P.probe.highest, "Hz", _SET),
