@@ -1,19 +1,33 @@
 """Laws identified in one mode and judged in others: exact curves, a plane, natural rubber."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside
 
 from validate.errors import RecordingError, UsageError
 from validate.fem.stretch_response import response
-from validate.papers.multimode.curves import Multimode, load, mode_of, point
-from validate.papers.multimode.laws import MooneyRivlin, OgdenTerms, material
-from validate.papers.multimode.ranking import LawError, RankedLaw, better_fit_worse_prediction
+from validate.recording.types import Recording
 from validate.replay import load as load_experiment
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Tree
 from validate.scene.material_point import StretchMode
+
+curves_module, laws = beside("multimode", "curves"), beside("multimode", "laws")
+ranking = beside("multimode", "ranking")
+Multimode, mode_of, point = curves_module.Multimode, curves_module.mode_of, curves_module.point
+MooneyRivlin, OgdenTerms, material = laws.MooneyRivlin, laws.OgdenTerms, laws.material
+LawError, RankedLaw = ranking.LawError, ranking.RankedLaw
+better_fit_worse_prediction = ranking.better_fit_worse_prediction
+
+
+def load(settings: Any, folder: Path) -> tuple[Recording, ...]:
+    found: tuple[Recording, ...] = curves_module.load(Tree(settings=settings), folder)
+    return found
+
 
 C10, C01 = 150e3, 30e3
 TRUE = Multimode(mooney_rivlin=MooneyRivlin(C10, C01))

@@ -5,21 +5,24 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 from sequences import sequence
 
 from validate.arrays import Floats, rms
 from validate.errors import RecordingError, RegistrationError, UsageError, ValidateError
-from validate.papers.stylus import phantom as phantom_module
-from validate.papers.stylus import plus, shown
-from validate.papers.stylus.phantom import StylusPhantom, digitised, load, stated
-from validate.papers.stylus.shown import apart, mean_error
 from validate.parameters import with_values
 from validate.register.digitised import Digitised
 from validate.register.transform import Similarity
 from validate.replay import compare
-from validate.replay import load as experiment
 from validate.replay.options import Options
 from validate.replay.road import compare as road
+from validate.replay.tree import Tree
+
+phantom_module, plus = beside("stylus_phantom", "phantom"), beside("stylus_phantom", "plus")
+shown = beside("stylus_phantom", "shown")
+digitised, load, stated = phantom_module.digitised, phantom_module.load, phantom_module.stated
+apart, mean_error = shown.apart, shown.mean_error
+TREE: Tree = experiment("stylus_phantom").parameters
 
 DEVICES = "markers/stylus/PlusDeviceSet_fCal_Sim_RecordPhantomLandmarks.xml"
 TIP = np.array([108.565, 7.77385, 2.5389])  # mm
@@ -45,7 +48,7 @@ def dwelling(places: Floats, noise: float, rate: float = 20.0, seed: int = 0) ->
     return sequence({"StylusToReference": T}, rate, lost=range(5, len(x), 37))
 
 
-def made(folder: Path, shared: Path, order: list[int], noise: float = 0.1) -> StylusPhantom:
+def made(folder: Path, shared: Path, order: list[int], noise: float = 0.1) -> Tree:
     """Landmarks in that order, parked before, between and after."""
     places = landmarks(shared / DEVICES) @ TURN.T + SHIFT
     parked = np.array([[-30.0, 200.0, 5.0], [150.0, 60.0, 90.0]])
@@ -54,13 +57,13 @@ def made(folder: Path, shared: Path, order: list[int], noise: float = 0.1) -> St
     file = folder / "other.igs.mha"
     file.write_bytes(dwelling(path, noise))
     values = {"recording": str(file), "landmarks": str(shared / DEVICES)}
-    return with_values(StylusPhantom(), values)
+    return with_values(TREE, values)
 
 
-def found(p: StylusPhantom) -> Digitised:
+def found(p: Tree) -> Digitised:
     (recording,) = load(p, Path("experiments"))
     values = {path: repr(value) for path, value in stated(recording).items()}
-    return digitised(recording, with_values(p, values))
+    return digitised(recording, with_values(p, values).settings)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +91,7 @@ def test_a_landmark_touched_twice_counts_once(tmp_path: Path, shared_data: Path)
 
 def test_the_eight_landmarks_of_the_data_set(shared_data: Path) -> None:
     """The transform is that of a second program, which detects landmarks as PLUS does."""
-    got = found(StylusPhantom())
+    got = found(TREE)
     assert (len(got.dwells), got.match.known.tolist()) == (10, list(range(8)))
     assert mean_error(got) == pytest.approx(0.173e-3, abs=2e-6)
     assert rms(got.left_out) == pytest.approx(0.250e-3, abs=2e-6)

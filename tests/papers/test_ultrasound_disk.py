@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import beside
 from numpy.typing import NDArray
 from scipy.io import savemat
 from scipy.ndimage import gaussian_filter
@@ -12,8 +13,10 @@ from sequences import tracked
 
 from validate.compare.result import Result
 from validate.errors import RecordingError, UsageError
-from validate.papers.disk import disk as disk_module
 from validate.replay import compare, load
+from validate.replay.tree import Tree
+
+disk_module = beside("ultrasound_disk", "disk")
 
 DISK = "ultrasound/disk/bmode_PWI_disk.mat"
 
@@ -117,7 +120,7 @@ def test_images_in_which_few_disks_are_found_report_what_was_searched(
         match=r"found in 1 of 5 images; first refusal: no wall in call 0; the disk was "
         "assumed to be bright: --set image.bright=False",
     ):
-        disk_module.load(disk_module.ImagedDisk(), tmp_path)
+        disk_module.load(Tree(settings=disk_module.ImagedDisk()), tmp_path)
 
 
 def test_images_without_a_scale_name_the_setting_of_a_run(

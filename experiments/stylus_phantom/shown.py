@@ -10,8 +10,6 @@ from validate.arrays import Floats, rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture, TableCell
 from validate.compare.score import Score
 from validate.errors import RegistrationError
-from validate.papers.stylus.phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of
-from validate.papers.stylus.plus import by_plus
 from validate.recording.types import Recording
 from validate.register.digitised import Digitised, TouchedLandmarks
 from validate.register.dwell import Dwell
@@ -19,7 +17,11 @@ from validate.register.transform import Similarity
 from validate.replay.experiment import Experiment, Identified, Progress, Told
 from validate.replay.followed import MAIN, Cases
 from validate.replay.method import Method
+from validate.replay.tree import Tree
 from validate.report.points import Place, points_picture
+
+from .phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of
+from .plus import by_plus
 
 Part = Literal["touch", "whole"]
 PARTS: Mapping[Part, str] = {"touch": "first touch", "whole": "whole dwell"}
@@ -55,9 +57,10 @@ def mean_error(d: Digitised) -> float:
 
 
 def identified(
-    recordings: Sequence[Recording], p: StylusPhantom, methods: Mapping[str, Method]
+    recordings: Sequence[Recording], tree: Tree, methods: Mapping[str, Method]
 ) -> Identified:
     """The pose on all landmarks: fitted, and no evidence."""
+    p: StylusPhantom = tree.settings
     recording = recordings[0]
     both = {part: digitised(recording, p, part) for part in PARTS}
     mine = both[p.dwell.part]
@@ -88,7 +91,7 @@ def identified(
         f"distance; predicted: each landmark from the {count - 1} others, "
         f"{_MM * rms(mine.left_out):.2f} mm rms"
     )
-    return Identified(p, (*scores, *_plus_scores(recording, p, mine)), tuple(notes), headline)
+    return Identified(tree, (*scores, *_plus_scores(recording, p, mine)), tuple(notes), headline)
 
 
 def _touched(d: Digitised) -> str:
@@ -161,7 +164,7 @@ def _plus_scores(recording: Recording, p: StylusPhantom, mine: Digitised) -> tup
     return (Score("plus.error", plus[1], "m", len(mine.known), "touched", words),)
 
 
-def exhibits(p: StylusPhantom, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
     """Landmark by landmark, the transform, the dwells, and the picture in space."""
     (touched,) = next(iter(cases[MAIN].values())).seen.of(TouchedLandmarks)
     d = touched.digitised
@@ -250,9 +253,7 @@ def _picture(d: Digitised) -> Picture:
     )
 
 
-def follows(
-    experiment: Experiment, recordings: Sequence[Recording], p: StylusPhantom
-) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """Another recording has its own title, and no printed figure."""
     (recording,) = recordings
     if recording.name == SEQUENCE.partition(".")[0] and PUBLISHED in recording.metadata:

@@ -24,6 +24,7 @@ from validate.register.dwell import dwells, sd_of_mean, tip_path
 from validate.register.landmarks import match_landmarks
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
+from validate.replay.tree import Tree
 from validate.scene.rigid_body import RigidBody
 
 FOLDER = "markers/stylus"
@@ -85,34 +86,34 @@ class DwellRule:
 
 @dataclass(frozen=True)
 class StylusPhantom:
-    """`recording` is a sequence that any reader takes, `landmarks` a device set of PLUS."""
+    """The recording is a sequence that any reader takes, `landmarks` a device set of PLUS."""
 
     tools: Tools = Tools()
     tip: TipOffset = TipOffset()
     dwell: DwellRule = DwellRule()
-    recording: str | None = quantity(None, "1", "the sequence; none: the data set's")
     landmarks: str | None = quantity(None, "1", "the device set (XML); none: the data set's")
     published: str | None = quantity(None, "1", "results (XML) of PLUS; none: the data set's")
 
 
-def load(parameters: StylusPhantom, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The sequence, with the landmarks and the tip's offset of the device set as its records."""
-    p = parameters
-    path = found(FOLDER, SEQUENCE, folder, p.recording)
+    p: StylusPhantom = tree.settings
+    path = found(FOLDER, SEQUENCE, folder, tree.recording or None)
     devices = read_device_set(found(FOLDER, DEVICES, folder, p.landmarks, "landmarks"))
     recording = recognised(path).read(path, _options(path))
     records = {**recording.metadata, LANDMARKS: _landmarks(devices), TIP: _tip(devices, p.tools)}
-    if results := _results(p, folder):
+    if results := _results(tree, folder):
         records[PUBLISHED] = _published(read_device_set(results), p.tools)
     return (replace(recording, metadata=records),)
 
 
-def _results(p: StylusPhantom, folder: Path) -> Path | None:
+def _results(tree: Tree, folder: Path) -> Path | None:
     """Results of PLUS that the user names, else the data set's own where its sequence is judged and
     they are here: no command brings them."""
-    if p.published:
-        return found(FOLDER, RESULTS, folder, p.published, "published")
-    return None if p.recording or p.landmarks else sought(FOLDER, RESULTS, folder)
+    own: StylusPhantom = tree.settings
+    if own.published:
+        return found(FOLDER, RESULTS, folder, own.published, "published")
+    return None if tree.recording or own.landmarks else sought(FOLDER, RESULTS, folder)
 
 
 def _options(path: Path) -> Mapping[str, str]:
@@ -154,13 +155,14 @@ def known(recording: Recording) -> tuple[tuple[str, ...], Floats]:
     return tuple(record), np.array(places)
 
 
-def build(recording: Recording, parameters: StylusPhantom, model: None) -> RigidBody:
+def build(recording: Recording, tree: Tree, model: None) -> RigidBody:
     return RigidBody(*known(recording))
 
 
-def place(recording: Recording, parameters: StylusPhantom, scene: RigidBody) -> Registered:
+def place(recording: Recording, tree: Tree, scene: RigidBody) -> Registered:
     """Each landmark that was touched, at its own instant, with the pose of all the others."""
-    seen = digitised(recording, parameters)
+    p: StylusPhantom = tree.settings
+    seen = digitised(recording, p)
     order = np.argsort([seen.parts[i].t.mean() for i in seen.match.seen])
     match = replace(seen.match, known=seen.match.known[order], seen=seen.match.seen[order])
     seen = replace(seen, match=match)

@@ -7,10 +7,15 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.stretch_response import response
-from validate.papers.multimode.calibrating import words_of
-from validate.papers.multimode.curves import Multimode, point
-from validate.papers.multimode.laws import as_card
-from validate.papers.multimode.ranking import (
+from validate.register.registered import Registered
+from validate.replay.experiment import Progress, Told
+from validate.replay.followed import MAIN, Cases, Followed
+from validate.replay.tree import Tree
+
+from .calibrating import words_of
+from .curves import Multimode, point
+from .laws import as_card
+from .ranking import (
     LawError,
     RankedLaw,
     better_fit_worse_prediction,
@@ -18,9 +23,6 @@ from validate.papers.multimode.ranking import (
     ranked,
     stress_of,
 )
-from validate.register.registered import Registered
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import MAIN, Cases, Followed
 
 _FINE = 200  # stretches of a drawn line
 _BEYOND = 1.3  # of the largest measured stress: a line ends there
@@ -28,8 +30,9 @@ _PAIRS = 4  # of laws, in sentences
 _MEGA = 1e5  # Pa: stresses from here on are shown in MPa
 
 
-def exhibits(p: Multimode, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
     """Ranking, its sentences, and every mode with all laws."""
+    p: Multimode = tree.settings
     tell("ranks the laws by prediction")
     runs = cases[MAIN]
     seen = next(iter(runs.values())).registered

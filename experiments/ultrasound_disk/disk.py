@@ -20,6 +20,7 @@ from validate.recording.types import Contours, Frames, Recording
 from validate.register.registered import Registered
 from validate.register.round_outlines import ENDS, RoundOutlines
 from validate.register.signals import SignalObservation
+from validate.replay.tree import Tree
 from validate.scene.rigid_body import RigidBody
 
 FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
@@ -61,21 +62,20 @@ class DiskRanges(Ranges):
 
 @dataclass(frozen=True)
 class ImagedDisk:
-    """`recording` is any file of images that a reader takes; none: the data set's."""
+    """The recording: any file of images that a reader takes; where none is named the data set's."""
 
     disk: Disk = Disk()
     image: ImageCard = ImageCard()
     ranges: DiskRanges = DiskRanges()
-    recording: str | None = quantity(None, "1", "the images; none: the data set's")
 
 
-def load(parameters: ImagedDisk, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The images with the outline found in each; those without one are named in its records.
 
     Raises `RecordingError` where fewer than half of the images show a disk.
     """
-    p = parameters
-    path = found(FOLDER, FILE, folder, p.recording)
+    p: ImagedDisk = tree.settings
+    path = found(FOLDER, FILE, folder, tree.recording or None)
     recording = _read(path, p.image)
     topic = _topic(recording, p.image.topic)
     frames = recording.frame(topic)
@@ -140,15 +140,17 @@ def _outlines(frames: Frames, bright: bool) -> tuple[dict[int, Outline], dict[in
     return outlines, refused
 
 
-def build(recording: Recording, parameters: ImagedDisk, model: None) -> RigidBody:
+def build(recording: Recording, tree: Tree, model: None) -> RigidBody:
     """Two points of the disk, a diameter apart; it does not deform."""
-    radius = parameters.disk.diameter / 2
+    p: ImagedDisk = tree.settings
+    radius = p.disk.diameter / 2
     return RigidBody(ENDS, np.array([[-radius, 0.0, 0.0], [radius, 0.0, 0.0]]))
 
 
-def place(recording: Recording, parameters: ImagedDisk, scene: RigidBody) -> Registered:
+def place(recording: Recording, tree: Tree, scene: RigidBody) -> Registered:
     """The disk's centre is that of the circle through every outline; its diameter is predicted."""
-    seen = outlined(recording, parameters)
+    p: ImagedDisk = tree.settings
+    seen = outlined(recording, p)
     centres: Floats = np.array([[*c.centre, 0.0] for c in seen.circles])
     none = np.zeros(centres.shape)
     drives = (

@@ -7,12 +7,13 @@ diagonal. Others of the same kind: `--set data=FOLDER --set material=NAME` of fi
 """
 
 from validate.compare.expected import Expected
-from validate.papers.multimode.calibrating import accepted, calibrations, follows
-from validate.papers.multimode.curves import Multimode, build, load, material_of, place
-from validate.papers.multimode.exhibits import exhibits
 from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.stretch_test import StretchTest
+
+from .calibrating import accepted, calibrations, follows
+from .curves import Multimode, build, load, material_of, place
+from .exhibits import exhibits
 
 METHODS = {
     "svk": Method("St. Venant-Kirchhoff", StretchTest(), "svk"),
@@ -30,7 +31,7 @@ EXPERIMENT = Experiment(
     needs="multimode",
     title="treloar: identified in uniaxial tension, predicted in equibiaxial tension, pure shear",
     source="HyperData.jl 66f5b45, Hyperelastics.jl 0fbfeb3 (MIT)",
-    parameters=Multimode(),
+    settings=Multimode(),
     methods=METHODS,
     accepted=tuple(name for name in METHODS if name != "svk"),
     accept=(accepted("equibiaxial"), accepted("pure_shear")),

@@ -9,11 +9,12 @@ from typing import Any
 
 from validate.compare.published import Figure
 from validate.compare.verdict import Accept
-from validate.papers.stylus.phantom import StylusPhantom, build, load, place, stated
-from validate.papers.stylus.shown import exhibits, follows, identified
 from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.rigid_motion import RigidMotion
+
+from .phantom import StylusPhantom, build, load, place, stated
+from .shown import exhibits, follows, identified
 
 
 def _tip(axis: str) -> Any:
@@ -50,7 +51,7 @@ EXPERIMENT = Experiment(
     needs="stylus",
     title="Landmarks of a phantom touched with a tracked stylus",
     source="PlusToolkit/PlusLibData 51dcbb7 (BSD-3)",
-    parameters=StylusPhantom(),
+    settings=StylusPhantom(),
     methods={"rigid": Method("rigid body, each landmark from the others", RigidMotion())},
     accepted=("rigid",),
     accept=(Accept("landmark", 1e-3, "1 mm, rms over the landmarks", statistic="rms"),),

@@ -7,18 +7,15 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.fem.stretch_response import response
-from validate.papers.multimode.curves import (
-    Multimode,
-    material_of,
-    mode_of,
-    principal,
-)
-from validate.papers.multimode.laws import LawCard
 from validate.recording.types import Recording
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment
+from validate.replay.tree import Tree
 from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint, StretchMode
+
+from .curves import Multimode, material_of, mode_of, principal
+from .laws import LawCard
 
 LIMIT = 0.1  # of the measured stress
 _WIDE = 100.0  # a modulus lies within so many times the one that neo-Hooke shows
@@ -27,8 +24,9 @@ _POWERS = (0.3, 30.0)  # of Ogden's terms
 _HELPS = "a curve in a second mode, equibiaxial best"
 
 
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: Multimode) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """The experiment for these curves: the first calibrates, all others are predicted."""
+    p: Multimode = tree.settings
     fitted, *others = (mode_of(r) for r in recordings)
     shown = ", ".join(words_of(m) for m in others) or "nothing else"
     title = f"{material_of(recordings[0])}: identified in {words_of(fitted)}, predicted in {shown}"

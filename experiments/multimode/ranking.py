@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.papers.multimode.curves import Multimode, as_mode, point, principal
-from validate.papers.multimode.laws import LawCard
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.stresses import StressObservation
@@ -22,6 +20,9 @@ from validate.scene.laws import law_kind
 from validate.scene.material_point import StretchMode
 from validate.scene.stability import Lost, lost_stability
 from validate.solve.stretch_test import StretchTest
+
+from .curves import Multimode, as_mode, point, principal
+from .laws import LawCard
 
 _DRAWS = 1000
 _SEED = 1

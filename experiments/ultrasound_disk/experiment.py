@@ -5,11 +5,12 @@ place. Other images of the kind: `--set recording=FILE --set disk.diameter=15mm`
 """
 
 from validate.compare.verdict import Accept
-from validate.papers.disk.disk import ImagedDisk, build, load, place
-from validate.papers.disk.shown import exhibits, follows, identified
 from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.rigid_motion import RigidMotion
+
+from .disk import ImagedDisk, build, load, place
+from .shown import exhibits, follows, identified
 
 UNCERTAINTY = Uncertainty(
     inputs=(
@@ -26,7 +27,7 @@ EXPERIMENT = Experiment(
     needs="ultrasound-disk",
     title="Disk of 20 mm in B-mode images",
     source="creatis-ULTIM/PyMUST c605195 (LGPL-3)",
-    parameters=ImagedDisk(),
+    settings=ImagedDisk(),
     methods={"rigid": Method("rigid disk of nominal diameter", RigidMotion())},
     accepted=("rigid",),
     accept=(

@@ -7,24 +7,27 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Picture, Series, TableCell
 from validate.compare.score import Score
-from validate.papers.disk.disk import FILE, FOUND, OUTLINES, ImagedDisk, outlined
 from validate.recording.images.image import ellipse_through
 from validate.recording.types import Recording
 from validate.register.round_outlines import RoundOutlines
 from validate.replay.experiment import Experiment, Identified, Progress, Told
 from validate.replay.followed import MAIN, Cases
 from validate.replay.method import Method
+from validate.replay.tree import Tree
 from validate.report.observed import Held
 from validate.report.outline_images import outlines_over
+
+from .disk import FILE, FOUND, OUTLINES, ImagedDisk, outlined
 
 _MM = 1e3
 _SHOWN = 6  # images of the picture
 
 
 def identified(
-    recordings: Sequence[Recording], p: ImagedDisk, methods: Mapping[str, Method]
+    recordings: Sequence[Recording], tree: Tree, methods: Mapping[str, Method]
 ) -> Identified:
     """Circles through the outlines, and the scale that the nominal diameter asks for."""
+    p: ImagedDisk = tree.settings
     seen = outlined(recordings[0], p)
     mean, count = float(seen.diameters.mean()), len(seen.t)
     sd_mean = float(np.hypot(seen.wall, seen.scatter / np.sqrt(count)))
@@ -54,10 +57,11 @@ def identified(
         + "".join(f"; {k}: {v}" for k, v in list(refused.items())[:5])
         + ".",
     )
-    return Identified(p, scores, notes, headline)
+    return Identified(tree, scores, notes, headline)
 
 
-def exhibits(p: ImagedDisk, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+    p: ImagedDisk = tree.settings
     (seen,) = next(iter(cases[MAIN].values())).seen.of(RoundOutlines)
     tell("outlines over the images")
     return Told((
@@ -121,7 +125,7 @@ def _chart(seen: RoundOutlines, p: ImagedDisk) -> Chart:
     )
 
 
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: ImagedDisk) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """Other images have their own title."""
     (recording,) = recordings
     if recording.source.path == FILE:

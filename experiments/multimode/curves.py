@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.datasets.home import found
 from validate.errors import RecordingError, UsageError
-from validate.papers.multimode.laws import (
+from validate.parameters import Ranges, quantity
+from validate.recording.exports.stretch import Curve, read_stretch_stress, signals_of
+from validate.recording.types import Recording
+from validate.register.registered import Registered
+from validate.register.signals import driving
+from validate.register.stresses import StressObservation
+from validate.replay.tree import Tree
+from validate.scene.material_point import MaterialPoint, StretchMode
+
+from .laws import (
     LawCard,
     MooneyRivlin,
     OgdenTerm,
@@ -20,13 +29,6 @@ from validate.papers.multimode.laws import (
     Yeoh,
     material,
 )
-from validate.parameters import Ranges, quantity
-from validate.recording.exports.stretch import Curve, read_stretch_stress, signals_of
-from validate.recording.types import Recording
-from validate.register.registered import Registered
-from validate.register.signals import driving
-from validate.register.stresses import StressObservation
-from validate.scene.material_point import MaterialPoint, StretchMode
 
 FOLDER = "force/multimode"
 MODES: tuple[StretchMode, ...] = get_args(StretchMode)
@@ -66,16 +68,17 @@ class Multimode:
     ranges: CurveRanges = CurveRanges()
 
 
-def load(parameters: Multimode, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """A recording for every mode of the material, the one that calibrates first."""
-    where = found(FOLDER, None, folder, parameters.data)
+    p: Multimode = tree.settings
+    where = found(FOLDER, None, folder, p.data)
     files = _files(where)
-    name = _material(parameters, files, where)
-    recordings = [r for path in files[name] for r in _by_mode(path, name, parameters.unit)]
+    name = _material(p, files, where)
+    recordings = [r for path in files[name] for r in _by_mode(path, name, p.unit)]
     modes = [mode_of(r) for r in recordings]
     if len(set(modes)) != len(modes):
         raise RecordingError(f"{where}: '{name}' has {sorted(modes)}; one curve a mode")
-    fitted = _fitted(parameters, recordings)
+    fitted = _fitted(p, recordings)
     recordings.sort(key=lambda r: (mode_of(r) != fitted, MODES.index(mode_of(r))))
     return tuple(
         _with_role(r, "validates" if k else "calibrates") for k, r in enumerate(recordings)
@@ -184,8 +187,9 @@ def _line(mode: StretchMode, l: Floats, P: Floats) -> Curve:
     return Curve(driven, P[:, :1] if mode in ("uniaxial", "equibiaxial") else P)
 
 
-def build(recording: Recording, parameters: Multimode, model: LawCard) -> MaterialPoint:
-    return point(parameters, model, mode_of(recording))
+def build(recording: Recording, tree: Tree, model: LawCard) -> MaterialPoint:
+    p: Multimode = tree.settings
+    return point(p, model, mode_of(recording))
 
 
 def point(p: Multimode, law: LawCard, mode: StretchMode) -> MaterialPoint:
@@ -202,10 +206,11 @@ def principal(mode: StretchMode, stretches: Floats) -> Floats:
     return np.stack([first, second, 1 / (first * second)], axis=1)
 
 
-def place(recording: Recording, parameters: Multimode, scene: MaterialPoint) -> Registered:
+def place(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
     """What a figure's axis is off by scales the moduli that are identified on it, not the fit; a
     predicted figure is off by its own axis and by that one."""
-    stress, ranges = recording.signal("stress", "Pa"), parameters.ranges
+    p: Multimode = tree.settings
+    stress, ranges = recording.signal("stress", "Pa"), p.ranges
     fitted = recording.record("test")["role"] == "calibrates"
     seen = StressObservation(
         "stress", "validates", stress.t, stress.y, ranges.reading,

@@ -1,1 +1,0 @@
-"""A disk of known diameter in B-mode images."""

@@ -1,1 +1,0 @@
-"""Rubbers and gels pulled in several modes: stress against stretch, digitised from publications."""
