@@ -12,7 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
-from validate.papers.async_regions.bodies import HapticProbe, LoadCell, Touched, chirp
+from validate.papers.async_regions.bodies import HapticProbe, HapticTest, LoadCell, chirp
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import pushed
 from validate.papers.async_regions.tables import ENERGY, energy_table, force_table
@@ -36,13 +36,15 @@ _TICK_WORDS = (
     "the tick in which the far region is solved, once in its period.",
 )
 _BUILT = Built()
-PUSHED = Touched(HapticProbe(depth=5e-3, lowest=0.5, highest=1.5, seconds=4.0), LoadCell(every=20))
+PUSHED = HapticTest(
+    HapticProbe(depth=5e-3, lowest=0.5, highest=1.5, seconds=4.0), LoadCell(every=20)
+)
 
 
 def record(tree: Tree, progress: Progress) -> Recording:
     """Signals "probe" (m, every direction) at every tick and "force" (N, on the hand)."""
     progress("simulate")
-    p: Touched = tree.settings
+    p: HapticTest = tree.settings
     scene = _BUILT(None, tree)
     t: Floats = p.dt * np.arange(round(p.probe.seconds / p.dt) + 1, dtype=np.float64)
     depth = chirp(t, p.probe.depth, p.probe.lowest, p.probe.highest)
@@ -55,14 +57,14 @@ def record(tree: Tree, progress: Progress) -> Recording:
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
-    own: Touched = tree.settings
+    own: HapticTest = tree.settings
     return {"dt": own.dt, "spring": own.probe.spring}
 
 
 def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     """Force, phase and ticks of every method, and at which size regions pay."""
     tree, main = cast(Tree, parameters), cases[""]
-    p: Touched = tree.settings
+    p: HapticTest = tree.settings
     forces, numbers = force_table(
         "force", "Largest force of the whole run, against the whole solve.", main,
         p.probe.seconds / 2, p.probe.seconds / 2,

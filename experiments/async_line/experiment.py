@@ -6,7 +6,7 @@ bar in the frequency domain, so that the whole solve is judged, too.
 """
 
 from validate.compare.verdict import Accept
-from validate.papers.async_regions.bodies import Touched
+from validate.papers.async_regions.bodies import HapticTest
 from validate.papers.async_regions.methods import LINE
 from validate.papers.async_regions.touched import place
 from validate.replay.experiment import Experiment, MeshLadder, StepLadder, Twin, Uncertainty
@@ -29,7 +29,7 @@ EXPERIMENT = Experiment(
     source="paper 004 (asynchronous regions), section 6, Tables 1 and 2",
     recording="../../recordings/async_line.mcap",
     scene=SCENE,
-    settings=Touched(),
+    settings=HapticTest(),
     methods=LINE,
     accepted=("whole",),
     accept=(Accept("force", 0.08, "a twentieth of the largest force"),),
@@ -46,7 +46,7 @@ EXPERIMENT = Experiment(
         record,
         remake=("twin.", "probe.", "body.", "material.", "dt"),
         kind="same law, finer mesh",
-        seed=Touched().twin.seed,
+        seed=HapticTest().twin.seed,
         notice="The recording is a twin: a continuous bar in the frequency domain, exact.",
     ),
 )

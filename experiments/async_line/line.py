@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.papers.async_regions.bodies import Touched, chirp, pad_of
+from validate.papers.async_regions.bodies import HapticTest, chirp, pad_of
 from validate.papers.async_regions.touched import probed
 from validate.parameters import with_given
 from validate.recording.types import Recording
@@ -41,7 +41,7 @@ def with_cells(tree: Tree, cells: int) -> Scene:
 def record(tree: Tree, progress: Progress) -> Recording:
     """Signals "probe" (m, along x and y) at every tick and "force" (N, on the hand)."""
     progress("simulate")
-    own: Touched = tree.settings
+    own: HapticTest = tree.settings
     t: Floats = own.dt * np.arange(round(own.probe.seconds / own.dt) + 1, dtype=np.float64)
     depth = chirp(t, own.probe.depth, own.probe.lowest, own.probe.highest)
     force = exact_force(bar(tree), own.probe.spring, t, depth)
@@ -51,11 +51,11 @@ def record(tree: Tree, progress: Progress) -> Recording:
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
-    own: Touched = tree.settings
+    own: HapticTest = tree.settings
     return {"dt": own.dt, "spring": own.probe.spring, "pad": pad_of(bar(tree))}
 
 
 def whole_of(tree: Tree) -> AsyncRegions:
     """The whole solve at every tick, as the experiment sets it."""
-    own: Touched = tree.settings
+    own: HapticTest = tree.settings
     return AsyncRegions(own.dt, (), (), spring=own.probe.spring, pad=pad_of(bar(tree)))

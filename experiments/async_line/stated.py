@@ -1,14 +1,14 @@
 """Numbers that paper 004 states, sets or cites, its sentences as numbers, and its 1-D pictures."""
 
 from validate.compare.published import Figure, Values
-from validate.papers.async_regions.bodies import Touched
+from validate.papers.async_regions.bodies import HapticTest
 from validate.papers.stated import CITED, drawn, said, taken
 from validate.solve.regions import AsyncRegions
 
 from .claims import DEEP, STIFF
 from .scene import SCENE
 
-_P, _BODY, _MATERIAL = Touched(), SCENE.body, SCENE.material
+_P, _BODY, _MATERIAL = HapticTest(), SCENE.body, SCENE.material
 _SHOWN = "a curve without numbers: the report draws the force of every method"
 _SET = "section 6"
 

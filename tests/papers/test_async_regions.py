@@ -9,7 +9,7 @@ from touched import AREA, LENGTH, bar, block, block_tree, pad_of
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.async_regions.bodies import HapticProbe, LoadCell, Touched, chirp, growing
+from validate.papers.async_regions.bodies import HapticProbe, HapticTest, LoadCell, chirp, growing
 from validate.papers.async_regions.methods import BLOCK
 from validate.papers.async_regions.runs import growth, off, peak, pushed
 from validate.papers.async_regions.touched import place
@@ -23,7 +23,7 @@ CONTINUOUS, TOUCHED_BLOCK = beside("async_line", "continuous"), beside("async_bl
 
 def line_with(probe: HapticProbe, twin: LoadCell | None = None) -> Tree:
     tree: Tree = experiment("async_line").parameters
-    return replace(tree, settings=Touched(probe, twin or LoadCell()))
+    return replace(tree, settings=HapticTest(probe, twin or LoadCell()))
 
 
 WHOLE = AsyncRegions(H, (), (), pad=pad_of(10))
@@ -130,7 +130,7 @@ def test_a_block_in_no_dimension_is_refused() -> None:
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_blocks_recording_is_its_whole_solve_and_says_so(dimension: int) -> None:
     tree = block_tree(E, 2, dimension)
-    p = replace(tree, settings=Touched(HapticProbe(seconds=0.2), LoadCell()))
+    p = replace(tree, settings=HapticTest(HapticProbe(seconds=0.2), LoadCell()))
     recording = TOUCHED_BLOCK.record(p, lambda _: None)
     assert recording.metadata["provenance"]["same_model"] == "true"
     scene = Built()(recording, p)

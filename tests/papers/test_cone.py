@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.papers.ekf_nfem.cone_mesh import quarter_cone
+from validate.scene.cone import quarter_cone
 from validate.scene.cylinder import quarter_cylinder
 from validate.scene.mesh import boundary_facets, cell_volumes, quadratic
 

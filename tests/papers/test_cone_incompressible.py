@@ -1,24 +1,22 @@
 """Paper 003's cone at its printed nu = .5: the limit of the same cells, and who refuses it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from beside import experiment
 
 from validate.errors import SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build as assembled
-from validate.papers.ekf_nfem.cone import ConeMesh, ConeModel, PressedCone, ShearCard, build
-from validate.recording.types import Recording, Source
+from validate.parameters import with_given
+from validate.replay.tree import Built
 from validate.scene.scene import Scene
 from validate.solve.newton import StaticNewton
 
-EMPTY = Recording("none", Source("none", "", 0, ""), 0)
 
-
-def quarter(nu: float, element: str = "p2_mixed") -> Scene:
-    parameters = replace(PressedCone(), material=ShearCard(nu=nu), mesh=ConeMesh(2, 3))
-    return build(EMPTY, parameters, ConeModel(True, element, "neo_hooke"))  # type: ignore[arg-type]
+def quarter(nu: float, method: str = "plate_mixed") -> Scene:
+    cone = experiment("ekf_cone")
+    tree = with_given(cone.parameters, {"material.nu": nu, "body.cells": (2, 3)})
+    return Built()(None, tree, cone.methods[method].scene)
 
 
 def test_its_force_is_the_limit_and_every_cell_keeps_its_volume() -> None:
@@ -37,7 +35,7 @@ def test_its_force_is_the_limit_and_every_cell_keeps_its_volume() -> None:
     assert volumes == pytest.approx(1.0, abs=1e-8)
 
 
-@pytest.mark.parametrize("element", ["p1", "p1_mean", "p2"])
-def test_other_elements_name_the_method_to_choose(element: str) -> None:
-    with pytest.raises(SceneError, match=rf"nu = 0.5 with element '{element}'.*plate_mixed"):
-        quarter(0.5, element)
+@pytest.mark.parametrize("method", ["plate_p1", "plate_mean", "plate_p2"])
+def test_other_elements_say_which_can(method: str) -> None:
+    with pytest.raises(SceneError, match=r"nu = 0.5 in tet.*use mixed cells"):
+        quarter(0.5, method)

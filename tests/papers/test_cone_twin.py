@@ -2,44 +2,42 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
 from validate.fem.hyperelastic import Body
 from validate.fem.system import build, responses
-from validate.papers.ekf_nfem.cone_mesh import quarter_cone
-from validate.papers.ekf_nfem.cone_twin import (
-    ConeTwin,
-    LoadTable,
-    cone_scene,
-    crosshead,
-    load_table,
-    marker_places,
-    record_cone,
-)
 from validate.recording.digest import digest
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.register.markers import placed_markers
+from validate.scene.cone import quarter_cone
+from validate.scene.geometry import Cone
 from validate.scene.mesh_file import read_mesh
 from validate.solve.newton import StaticNewton
 
+TWIN = beside("ekf_cone", "twin")
+CONE: Cone = experiment("ekf_cone").parameters.scene.body
+
 MESH = read_mesh(Path(__file__).resolve().parents[2] / "experiments" / "meshes" / "cone.npz")
-COARSE = ConeTwin(radial=2, axial=4, loads=4)
+COARSE = TWIN.ConeTwin(radial=2, axial=4, loads=4)
 QUIET = replace(COARSE, sd_force=0.0, sd_stage=0.0, sd_marker=0.0, missing=0.0)
 
 
-def made(settings: ConeTwin) -> Recording:
-    return record_cone(settings, lambda _: None)
+def made(settings: Any) -> Recording:
+    recording: Recording = TWIN.record_cone(CONE, settings, lambda _: None)
+    return recording
 
 
-def table(settings: ConeTwin) -> LoadTable:
-    places = np.array(list(marker_places(settings).values()))
-    return load_table(cone_scene(settings), places, settings.force, settings.loads)
+def table(settings: Any, cone: Cone = CONE) -> Any:
+    places = np.array(list(TWIN.marker_places(cone).values()))
+    return TWIN.load_table(TWIN.cone_scene(cone, settings), places, settings.force, settings.loads)
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +63,8 @@ def test_a_small_load_meets_another_element() -> None:
     """
     small = replace(COARSE, force=0.15, radial=3)
     ours = float(table(small).at(np.array([0.15]))[0][0])
-    scene = cone_scene(small)
-    mesh = quarter_cone(small.bottom, small.top, small.height, 6, 8, small.grading)
+    scene = TWIN.cone_scene(CONE, small)
+    mesh = quarter_cone(CONE.bottom, CONE.top, CONE.height, 6, 8, small.grading)
     linear = replace(scene, body=mesh, material=replace(scene.material, law="linear"))
     softer = replace(linear, dilatation="nodal_mean")
     mean, pointwise = (0.15 / responses(build(s)).reactions[0, 0] for s in (softer, linear))
@@ -76,15 +74,15 @@ def test_a_small_load_meets_another_element() -> None:
 
 def test_the_cylinder_is_bracketed_by_free_plates_and_gent() -> None:
     """Bonded plates stiffen; Gent's disc, 1 + 2 S^2, is low for a squat cylinder."""
-    s = replace(COARSE, top=0.068, force=0.1, radial=3)
-    compression = float(table(s).at(np.array([0.1]))[0][0])
-    apparent = 0.1 / (np.pi * 0.034**2) / (compression / s.height) / s.material.E
+    s, upright = replace(COARSE, force=0.1, radial=3), replace(CONE, top=0.068)
+    compression = float(table(s, upright).at(np.array([0.1]))[0][0])
+    apparent = 0.1 / (np.pi * 0.034**2) / (compression / CONE.height) / s.material.E
     gent = 1 + 2 * (0.068 / (4 * 0.028)) ** 2
     assert gent < apparent < 1.15 * gent
 
 
 def test_both_plates_bear_the_force() -> None:
-    scene = cone_scene(COARSE)
+    scene = TWIN.cone_scene(CONE, COARSE)
     stepper = StaticNewton().prepare(build(scene))
     state = stepper.step(stepper.rest(), np.array([1e-3]))
     inner = Body(scene).force(stepper.field(state).ravel()).reshape(-1, 3)
@@ -125,7 +123,7 @@ def test_compliance_and_toe_are_what_the_crosshead_adds(quiet: Recording) -> Non
     assert toe == pytest.approx(COARSE.toe, rel=1e-3)
     seated = 1 - (extra - force / COARSE.machine)[5] / COARSE.toe  # at the toe's own force
     assert seated == pytest.approx(np.exp(-1), rel=1e-6)
-    assert crosshead(COARSE, np.zeros(1), np.zeros(1)) == 0
+    assert TWIN.crosshead(COARSE, np.zeros(1), np.zeros(1)) == 0
 
 
 def test_sensors_read_with_their_declared_noise(twin: Recording, quiet: Recording) -> None:
@@ -212,7 +210,7 @@ def test_the_papers_load_is_within_the_noise(project_root: Path) -> None:
 @pytest.mark.timeout(900)
 def test_the_shipped_recording_is_made_again(project_root: Path) -> None:
     read = read_recording(project_root / "recordings" / "ekf_cone.mcap")
-    again = made(ConeTwin())
+    again = made(TWIN.ConeTwin())
     for topic in ("stage", "load_cell"):
         assert again.signals[topic].y == pytest.approx(read.signals[topic].y, abs=1e-9)
     there, here = read.markers["markers"].x, again.markers["markers"].x

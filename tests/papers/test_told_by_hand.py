@@ -4,9 +4,9 @@ from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
+from beside import beside
 
 from validate.papers.accuracy import rod_exhibits
-from validate.papers.ekf_nfem.cone_exhibits import _motion
 
 
 def test_a_tip_that_hangs_is_a_positive_sag(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,6 +30,6 @@ def test_a_tip_that_hangs_is_a_positive_sag(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_recording_without_markers_has_no_noise() -> None:
     truth = Made(probes={"node_A": np.array([[0.0, 0.0, 0.0], [3e-3, 0.0, 4e-3]])})
     followed = Made(truth=truth, seen=Made(of=lambda kind: ()))
-    assert _motion(followed, "node_A") == (pytest.approx(5e-3), 0.0)
+    assert beside("ekf_cone", "exhibits")._motion(followed, "node_A") == (pytest.approx(5e-3), 0.0)
     seen = Made(of=lambda kind: (Made(sd=2e-5),))
-    assert _motion(Made(truth=truth, seen=seen), "node_A")[1] == 2e-5
+    assert beside("ekf_cone", "exhibits")._motion(Made(truth=truth, seen=seen), "node_A")[1] == 2e-5

@@ -11,27 +11,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside
+from beside import experiment as shipped
 
 from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
-from validate.papers.ekf_nfem import cone_exhibits
-from validate.papers.ekf_nfem.cone_twin import record_cone
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.register.signals import SignalObservation
-from validate.replay import compare, load
+from validate.replay import compare
 from validate.replay.experiment import Experiment
 from validate.replay.remade import stamped
 
 pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
 
+cone_exhibits, SEEN = beside("ekf_cone", "exhibits"), beside("ekf_cone", "seen")
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
-COARSE = {"twin.radial": "3", "twin.axial": "3", "mesh.radial": "3", "mesh.axial": "3"}
+COARSE = {"twin.radial": "3", "twin.axial": "3", "body.cells": "3,3"}
 
 
 @pytest.fixture(scope="module")
-def cone(project_root) -> Experiment:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "ekf_cone.py"))
+def cone() -> Experiment:
+    return shipped("ekf_cone")
 
 
 def dear(scene: Any, *arguments: Any) -> NumberTable:
@@ -44,7 +45,7 @@ def coarse(cone: Experiment) -> Iterator[Experiment]:
     """Recordings made in memory by a coarse twin that is its models' equal; five methods."""
 
     def made(parameters: Any, folder: Path) -> tuple[Recording, ...]:
-        return (stamped(record_cone(parameters.twin, lambda step: None), parameters),)
+        return (stamped(SEEN.record(parameters, lambda step: None), parameters),)
 
     assert cone.twin is not None
     with pytest.MonkeyPatch.context() as patch:
@@ -171,7 +172,7 @@ def test_a_path_and_a_ramp_are_fitted_through_the_recorded_samples(cone: Experim
 def test_the_recordings_are_what_the_twin_records(cone: Experiment) -> None:
     assert cone.twin is not None
     for parameters in (cone.parameters, cone.cases[0].change(cone.parameters)):
-        shipped = cone.load(parameters, Path())[0]
+        shipped = cone.load(parameters, cone.path.parent)[0]
         anew = cone.twin.record(parameters, print)
         one, two = shipped.marker("markers"), anew.marker("markers")
         assert one.names == two.names

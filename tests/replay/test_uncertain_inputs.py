@@ -11,7 +11,6 @@ import pytest
 from validate.compare.residual import Residual
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
-from validate.papers.ekf_nfem.cone import PressedCone
 from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
 from validate.replay.cards import rubbed
 from validate.replay.checks import joint_inputs
@@ -63,9 +62,11 @@ def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
 
 def test_an_inputs_standard_uncertainty_is_its_own_range() -> None:
     """Modulus and nu up by their ranges, whatever else stays."""
-    cone, gel = PressedCone(), Phantom()
-    by = {i.name: i for i in find("ekf_cone", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
-    assert by["modulus"].by(2.0)(cone).material.scale == pytest.approx(1.04 * cone.material.scale)
+    declared = find("ekf_cone", Path(__file__))
+    cone, gel = declared.parameters, Phantom()
+    by = {i.name: i for i in declared.uncertainty.inputs}  # type: ignore[union-attr]
+    moved = by["modulus"].by(2.0)(cone).scene.material
+    assert pytest.approx(1.04 * cone.scene.material.E) == moved.E
     by = {i.name: i for i in find("fluid_phantom", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
     assert pytest.approx(1.1 * gel.material.E) == by["modulus"].by(2.0)(gel).material.E
     assert by["Poisson ratio"].by(2.0)(gel).material.nu == pytest.approx(gel.material.nu + 0.01)

@@ -11,10 +11,11 @@ from typing import Any
 
 from validate.errors import ComparisonError
 from validate.files import modified
-from validate.parameters import known, part, quantity, value_at, with_given
+from validate.parameters import part, quantity
 from validate.recording.types import Recording
 from validate.register.as_declared import as_declared
 from validate.register.registered import Registered
+from validate.replay.variation import change_of
 from validate.scene.geometry import Geometry, cell_size
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import Meshless
@@ -54,7 +55,7 @@ def placed_by_names(recording: Recording, tree: Tree, scene: Scene) -> Registere
 class Built:
     """Makes the scene of a method, with its changes by path, on the mesh of its body.
 
-    Mesh files are found from the `folder`. A change "as nu.svk" takes another parameter's value.
+    Mesh files are found from the `folder`. See `replay.variation`.
     """
 
     folder: Path = field(default=Path(), compare=False)
@@ -62,22 +63,12 @@ class Built:
     def __call__(
         self, recording: Recording | None, tree: Tree, changes: Mapping[str, Any] | None = None
     ) -> Scene:
-        changed = with_given(tree, _followed(tree, changes)) if changes else tree
+        changed = change_of(changes)(tree) if changes else tree
         scene: Any = changed.scene
         if not isinstance(scene, Meshless):
             scene = scene.resolved(mesh_of(recording, changed, self.folder))
         built: Scene = scene
         return built
-
-
-def _followed(tree: Tree, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Raises `UsageError` where a change follows a value that stands open."""
-    return {path: _other(tree, given[3:]) if str(given).startswith("as ") else given
-            for path, given in changes.items()}  # fmt: skip
-
-
-def _other(tree: Tree, path: str) -> Any:
-    return known(value_at(tree, path)[0], path)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
     {"twin.stiffness": 0.8, "membrane.thickness": "0.1 mm"}   values, of a case or an effect
     {"material.E": "x 1.1", "mesh.cells": "+ 1"}              a factor, a step
+    {"material.nu": "as nu.svk"}                              what another parameter has
     vary("material.E", "relative 3 %")                        one standard uncertainty of an input
     vary("material.nu", "absolute 0.005, below 0.5")          the same, with a bound
     vary("material.E", "relative ranges.E")                   ... as large as another parameter says
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from validate.errors import UsageError
-from validate.parameters import value_at, with_given
+from validate.parameters import known, value_at, with_given
 from validate.units import in_si, si_of, split
 
 #: Relative distance to a bound that is not reached: of nu below .5 the largest value is .4999.
@@ -37,6 +38,9 @@ class Values:
 
     @staticmethod
     def _value(parameters: Any, path: str, given: Any) -> Any:
+        if str(given).startswith("as "):
+            other = str(given).removeprefix("as ")
+            return known(value_at(parameters, other)[0], other)
         if not (isinstance(given, str) and given[:2] in ("x ", "+ ", "- ")):
             return given
         value, unit = value_at(parameters, path)

@@ -3,6 +3,7 @@
     Box(("4 mm", "4 mm", "7 mm"), cells=(4, 4, 7))                 a block from the origin
     Box(..., element="hex27", symmetry=("x", "y"), grading=3.0)    a quarter of it
     Cylinder("30 mm", "20 mm", cells=(4, 6), element="hex27")      about z, from the origin up
+    Cone("60 mm", "40 mm", "20 mm", cells=(4, 6))          a quarter, about z
     MeshFile("liver.vtk", unit="mm")                               beside the experiment's file
     SurfaceFile("liver.stl", unit="mm", edge="4 mm")               filled with tetrahedra
 
@@ -21,6 +22,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
 from validate.scene.box import box, grid
+from validate.scene.cone import quarter_cone
 from validate.scene.cylinder import hexahedral_cylinder, quarter_cylinder, whole_cylinder
 from validate.scene.filled import filled
 from validate.scene.material import Material
@@ -154,6 +156,40 @@ class Cylinder:
     @property
     def copies(self) -> int:
         return 4 if self.part == "quarter" else 1
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A quarter of an upright truncated cone about z, x and y >= 0, from the origin up.
+
+    Sets bottom, top, side; symmetry_x and symmetry_y are held.
+    """
+
+    bottom: float = quantity(0.0, "m", "diameter at z = 0")
+    top: float = quantity(0.0, "m", "diameter of the upper face")
+    height: float = quantity(0.0, "m", "height")
+    cells: tuple[int, int] = quantity((4, 4), "1", "cells along the radius and the height")
+    element: Literal["tet4", "tet10"] = quantity("tet4", "1", "element")
+    grading: float = quantity(1.0, "1", "above 1: smaller cells towards side and faces")
+
+    def __post_init__(self) -> None:
+        take_units(self)
+
+    def resolved(self, folder: Path) -> Mesh:
+        mesh = quarter_cone(self.bottom, self.top, self.height, *self.cells, self.grading)
+        return _of_order(mesh, self.element)
+
+    def scaled(self, share: float) -> "Cone":
+        radial, axial = member(self.cells, share)
+        return replace(self, cells=(radial, axial))
+
+    @property
+    def held(self) -> tuple[Support, ...]:
+        return Support("symmetry_x", (0,)), Support("symmetry_y", (1,))
+
+    @property
+    def copies(self) -> int:
+        return 4
 
 
 @dataclass(frozen=True)

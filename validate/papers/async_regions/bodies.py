@@ -32,7 +32,7 @@ class LoadCell:
 
 
 @dataclass(frozen=True)
-class Touched:
+class HapticTest:
     """What the scene of a touched body does not hold."""
 
     probe: HapticProbe = HapticProbe()

@@ -12,6 +12,7 @@ Its 0.15 N compress this cone by a few hundredths of a millimetre at most: `forc
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -20,11 +21,11 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.locate import barycentric_rows
 from validate.fem.system import build
-from validate.papers.ekf_nfem.cone_mesh import quarter_cone
 from validate.parameters import quantity
 from validate.recording.types import Record, Recording
+from validate.scene.geometry import Cone
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.newton import StaticNewton
 from validate.solve.types import Stepper
@@ -37,11 +38,8 @@ _SIDES = {"node_B": (1, 0), "node_C": (0, 1), "node_D": (-1, 0), "node_E": (0, -
 
 @dataclass(frozen=True)
 class ConeTwin:
-    """Specimen, mesh, loading, machine and sensors of the cone's recording."""
+    """Material, mesh, loading, machine and sensors of the cone's recording."""
 
-    bottom: float = quantity(0.068, "m", "diameter of the held face")
-    top: float = quantity(0.058, "m", "diameter of the loaded face")
-    height: float = quantity(0.028, "m", "height")
     shear_modulus: float = quantity(22_081.0, "Pa", "of Ecoflex 00-30, paper 003")
     nu: float = quantity(0.4995, "1", "Poisson ratio, nearly incompressible silicone")
     rho: float = quantity(1060.0, "kg/m3", "density, paper 003")
@@ -85,14 +83,14 @@ class LoadTable:
         return np.asarray(q), np.asarray(u)
 
 
-def record_cone(settings: ConeTwin, progress: Callable[[str], None]) -> Recording:
+def record_cone(cone: Cone, settings: ConeTwin, progress: Callable[[str], None]) -> Recording:
     """The recording: "markers", "stage" m (crosshead), "load_cell" N; records beside the tracker's:
     "specimen" and "machine". Its displacements stand in a camera's frame: `register.placed`.
 
     Raises `SceneError` where the cone has no static solution up to `force`.
     """
     progress("mesh")
-    scene, markers = cone_scene(settings), marker_places(settings)
+    scene, markers = cone_scene(cone, settings), marker_places(cone)
     progress(f"solve {scene.mesh.nodes.size} unknowns at {settings.loads} loads")
     table = load_table(scene, np.array(list(markers.values())), settings.force, settings.loads)
     progress("measure")
@@ -102,45 +100,41 @@ def record_cone(settings: ConeTwin, progress: Callable[[str], None]) -> Recordin
     recording = record_tracked(
         Origin("ekf_cone", settings.seed, False, _declared(settings, scene.mesh)),
         Points(t, tuple(markers), np.array(list(markers.values())), u),
-        fiducial_places(settings),
+        fiducial_places(cone),
         Camera(settings.sd_marker, missing=settings.missing),
         {
             "stage": Reading(crosshead(settings, compression, force), "m", settings.sd_stage),
             "load_cell": Reading(force, "N", settings.sd_force),
         },
     )
-    return replace(recording, metadata={**recording.metadata, **_records(settings)})
+    return replace(recording, metadata={**recording.metadata, **_records(cone, settings)})
 
 
-def cone_scene(settings: ConeTwin) -> Scene:
-    """The quarter between bonded plates, driven from its top."""
-    s = settings
-    mesh = quadratic(quarter_cone(s.bottom, s.top, s.height, s.radial, s.axial, s.grading))
-    return Scene(
-        mesh,
-        s.material,
-        (
-            Support("bottom", (0, 1, 2)),
-            Support("top", (0, 1)),
-            Support("symmetry_x", (0,)),
-            Support("symmetry_y", (1,)),
-        ),
-        drives=(Drive("stage", "top", (0.0, 0.0, -1.0)),),
-        copies=4,
+def cone_scene(cone: Cone, settings: ConeTwin) -> Scene:
+    """The twin's own mesh of the quarter between bonded plates, driven from its top."""
+    own = replace(
+        cone, cells=(settings.radial, settings.axial), grading=settings.grading, element="tet10"
     )
+    declared = Scene(
+        own,
+        settings.material,
+        (Support("bottom", (0, 1, 2)), Support("top", (0, 1))),
+        drives=(Drive("stage", "top", (0.0, 0.0, -1.0)),),
+    )
+    return declared.resolved(own.resolved(Path()))
 
 
-def marker_places(settings: ConeTwin) -> dict[str, Floats]:
+def marker_places(cone: Cone) -> dict[str, Floats]:
     """node_A at the top's centre, on the plate; others around the side at half height (3,) m."""
-    r, z = (settings.bottom + settings.top) / 4, settings.height / 2
+    r, z = (cone.bottom + cone.top) / 4, cone.height / 2
     sides = {name: np.array([r * x, r * y, z]) for name, (x, y) in _SIDES.items()}
-    return {"node_A": np.array([0.0, 0.0, settings.height]), **sides}
+    return {"node_A": np.array([0.0, 0.0, cone.height]), **sides}
 
 
-def fiducial_places(settings: ConeTwin) -> dict[str, Floats]:
+def fiducial_places(cone: Cone) -> dict[str, Floats]:
     """Three marks at the foot of the cone, where it is held (3,) m; a fourth would make the set
     symmetric, and labels turned by a quarter would pass."""
-    r = settings.bottom / 2
+    r = cone.bottom / 2
     return {
         f"base{i + 1}": np.array([r * x, r * y, 0.0])
         for i, (x, y) in enumerate(list(_SIDES.values())[:3])
@@ -197,13 +191,13 @@ def _declared(settings: ConeTwin, mesh: Mesh) -> Record:
     }
 
 
-def _records(settings: ConeTwin) -> dict[str, Record]:
+def _records(cone: Cone, settings: ConeTwin) -> dict[str, Record]:
     s = settings
     return {
         "specimen": {
-            "bottom_diameter_m": repr(s.bottom),
-            "top_diameter_m": repr(s.top),
-            "height_m": repr(s.height),
+            "bottom_diameter_m": repr(cone.bottom),
+            "top_diameter_m": repr(cone.top),
+            "height_m": repr(cone.height),
         },
         "machine": {
             "control": f"force, linear from 0 to {s.force:g} N in {s.duration:g} s",

@@ -1,11 +1,10 @@
 """The cone of paper 003 beside ours: what its 0.15 N can show, and elements."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from validate.arrays import rms
+from validate.arrays import Floats, rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
 from validate.papers.ekf_nfem.tables import (
     fields_apart,
@@ -18,6 +17,7 @@ from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.replay.standard_exhibits import error_at
+from validate.replay.tree import Tree
 
 _MM = 1e3
 _PRINTED_FORCE, _PRINTED_STEP = 0.15, 1e-4  # N, s
@@ -27,7 +27,7 @@ _KINETIC = 0.01  # of the strain energy, after the first tenth of the ramp
 _NU = (0.45, 0.49, 0.499, 0.4995)
 
 
-def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> Told:
     """Signal against noise, ranking where there is one, elements, inertia, force readings."""
     main = cases[""]
     explicit = main["nfem"]
@@ -45,7 +45,7 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
     }
     if share is not None:
         numbers["kinetic_share"] = share
-    ranked = (_ranking(main, parameters.twin.force),) if _seen(explicit, "node_A") else ()
+    ranked = (_ranking(main, tree.settings.twin.force),) if _seen(explicit, "node_A") else ()
     signals = Exhibit(
         "signal",
         "Motion of the markers against noise",
@@ -55,8 +55,8 @@ def tell_cone(parameters: Any, cases: Cases, progress: Progress) -> Told:
     elements = Exhibit(
         "elements",
         "Element, material and force",
-        (_inertia_words(parameters.clock.scale, share),),
-        (_forces(main), locked, readings, limits, _cards(parameters, main)),
+        (_inertia_words(tree.settings.clock.scale, share),),
+        (_forces(main), locked, readings, limits, _cards(tree, main)),
     )
     return Told((signals, elements), numbers)
 
@@ -161,31 +161,37 @@ def _forces(main: Mapping[str, Followed]) -> NumberTable:
     )
 
 
-def _end(t: Any, y: Any) -> float:
+def _end(t: Floats, y: Floats) -> float:
     """Last value of the straight line through the samples: one sample is mostly noise."""
     slope, offset = np.polyfit(t, y, 1)
     return float(slope * t[-1] + offset)
 
 
-def _cards(parameters: Any, main: Mapping[str, Followed]) -> NumberTable:
+def _cards(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
     """The force of the accepted element for every material card: proportional to the modulus."""
     shear = {
         "paper": (22_081.0, "printed, paper 003"),
         "cylinders_slip": (31_200.0, "real Ecoflex 00-30 cylinders, if their plates slipped"),
         "cylinders_bonded": (18_500.0, "the same, if their plates were bonded"),
     }
-    followed, used = main["plate_p2"], parameters.material
+    followed, used = main["plate_p2"], tree.scene.material
     end = float(followed.run.traces["plate.force"].y[-1]) if followed.whole else None
-    base = used.scale * shear[used.card][0]
+    base = used.shear_modulus
     rows = tuple(
-        (card, mu / 1e3, end * mu / base if end else None, words)
+        (card, mu / 1e3, 2 * (1 + used.nu) * mu / 1e3, end * mu / base if end else None, words)
         for card, (mu, words) in shear.items()
     )
     return NumberTable(
         "cards",
         "Material parameters: shear modulus and the force that quadratic elements predict "
         "with it at the same compression.",
-        ("card", "shear modulus / kPa", "force at the end / N", "where it comes from"),
+        (
+            "card",
+            "shear modulus / kPa",
+            "material.E / kPa",
+            "force at the end / N",
+            "where it comes from",
+        ),
         rows,
-        "Choose one with --set material.card=NAME.",
+        "Choose one with --set material.E=VALUE.",
     )
