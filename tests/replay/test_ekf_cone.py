@@ -151,7 +151,7 @@ def test_linear_elements_lock_where_a_mean_dilatation_does_not(cone: Experiment)
 def test_a_path_and_a_ramp_are_fitted_through_the_recorded_samples(cone: Experiment) -> None:
     """The plate's path within the noise of its fit; the force's slope 1 N/s, 30 times as fast."""
     p = cone.parameters
-    recording = cone.load(p, Path())[0]
+    recording = cone.load(p, cone.path.parent)[0]
     plate, pushed = cone.methods["plate_p1"], cone.methods["nfem"]
     scene = cone.build(recording, p, plate.scene)
     seen = cone.place(recording, p, scene)

@@ -32,6 +32,8 @@ from validate.replay.run_estimate import RunEstimate, estimated
 
 KINDS = (PLATES, INCLUSION, BODY)
 _LARGEST = 20_000  # bytes of such a file
+_FIRST = 60.0  # s, estimated: a first answer that would take longer is given on a coarser mesh
+_COARSER = ("-1", "-2")
 
 
 def new(
@@ -63,16 +65,32 @@ def new(
     terminal, folder = answers is None and on_a_terminal(), answers and answers.parent
     found = answered(asks, given, terminal=terminal, folder=folder)
     kind = _chosen(kinds, found)
-    text = written(name, recording, beside(source, path), path.parent, kind, found)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, text)
+
+    def written_with(answers: Answers) -> RunEstimate | None:
+        text = written(name, recording, beside(source, path), path.parent, kind, answers)
+        write_whole(path, text)
+        return estimated(path)
+
+    expected = written_with(found)
+    for halvings in _COARSER if kind.halvings and found.get("body.file") else ():
+        if expected is None or expected.seconds <= _FIRST:
+            break
+        found = {**found, kind.halvings: halvings}
+        expected = written_with(found)
     for line in kind.assumed(recording, found):
         complain(line)
     for topic in _unused(recording, kind.used(recording, found)):
         complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
-    if expected := estimated(path):
+    if expected:
         say(f"first answer: {_about(expected)}", indent="  ")
+    if found.get(kind.halvings):
+        say(
+            f"its mesh is coarser: {found['body.file']} filled anew with larger cells; "
+            f"validate run {_called(name, path)} --refine takes the file's own",
+            indent="  ",
+        )
 
 
 def _about(expected: RunEstimate) -> str:

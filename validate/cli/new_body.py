@@ -414,4 +414,5 @@ BODY = NewKind(
     _fields,
     _used,
     _assumed,
+    halvings="body.halvings",
 )

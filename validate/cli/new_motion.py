@@ -96,6 +96,8 @@ def _topic(recording: Recording, p: MeasuredBody) -> str | None:
 
 def _first(recording: Recording, p: MeasuredBody, folder: Path) -> float | None:
     try:
+        if p.body.file is not None and unknowns_of(p, 1, folder) > _QUADRATIC:
+            p = replace(p, body=replace(p.body, halvings=-1))
         order = 2 if unknowns_of(p, 2, folder) <= _QUADRATIC else 1
         return first_frequencies(_scene(recording, p, folder, order), 1)[0]
     except (ValidateError, np.linalg.LinAlgError):

@@ -17,6 +17,7 @@ from validate.files import modified
 from validate.replay.measured_cards import MeasuredBody, Solid
 from validate.replay.measured_contact import pressed_mesh, spans_of
 from validate.scene.box import box, grid
+from validate.scene.coarser import coarser
 from validate.scene.cylinder import hexahedral_cylinder, whole_cylinder
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
@@ -68,6 +69,8 @@ def _meshed(card: Solid, folder: Path, places: tuple[str, ...], bricks: bool, ch
     if card.file is not None:
         whole = linear(read_mesh(folder / card.file, card.unit))
         scene = Scene(_with_places(whole, places), Material(1.0, 0.3))
+        if card.halvings < 0:
+            return coarser(scene.mesh, -card.halvings)
         for _ in range(card.halvings):
             scene = refined(scene)
         return scene.mesh

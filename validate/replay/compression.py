@@ -8,7 +8,7 @@ the modulus where none is given, the second predicts.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -17,6 +17,7 @@ import numpy as np
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
+from validate.files import modified
 from validate.identify.modulus import MIN_SAMPLES, fit_modulus
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
@@ -42,6 +43,7 @@ from validate.replay.pressed_outline import (
     with_outline,
     with_surface,
 )
+from validate.scene.coarser import coarser, size_against
 from validate.scene.cylinder import quarter_cylinder, whole_cylinder
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes
@@ -128,6 +130,7 @@ def _affordable(
     scene = _build(recordings[0], p, first)
     finer = [8 * scene.mesh.nodes.size, 64 * scene.mesh.nodes.size]
     levels = affordable((_level(None, 1), _level(None, 2)), finer, budget=p.mesh.budget)
+    levels = levels or (_level(None, -1),)
     ladder = replace(_MESHES, levels=levels)
     return replace(
         experiment,
@@ -165,12 +168,22 @@ def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
 def _body(p: Compression) -> Mesh:
     """The body of the mesh file, or a quarter of the cylinder; all of it where images show it."""
     if p.specimen.mesh is not None:
-        return with_surface(read_mesh(Path(p.specimen.mesh), p.specimen.mesh_unit))
+        return with_surface(_of_file(Path(p.specimen.mesh), p.specimen.mesh_unit, p.mesh.halvings))
     size, grid = p.specimen.size, p.mesh
     if p.outline.topic is not None:
         whole = whole_cylinder(size.diameter, size.height, grid.radial, grid.axial)
         return with_surface(whole)
     return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
+
+
+def _of_file(path: Path, unit: str | None, halvings: int) -> Mesh:
+    """The mesh of a file, or a coarser filling of it."""
+    return _coarse(path, unit, modified(path)) if halvings < 0 else read_mesh(path, unit)
+
+
+@lru_cache(maxsize=2)
+def _coarse(path: Path, unit: str | None, changed: int) -> Mesh:
+    return coarser(read_mesh(path, unit))
 
 
 def between(contact: Contact) -> tuple[Support, ...]:
@@ -237,7 +250,9 @@ def _cell(p: Compression) -> float:
     if p.specimen.mesh is None:
         cells: int = p.mesh.radial**2 * p.mesh.axial
         return float(p.specimen.size.height / cells ** (1 / 3))
-    return float(np.cbrt(cell_volumes(_body(p)).mean()) / 2**p.mesh.halvings)
+    own = _body(replace(p, mesh=replace(p.mesh, halvings=0)))
+    size = float(np.cbrt(cell_volumes(own).mean()))
+    return size * size_against(own, _body(p)) if p.mesh.halvings < 0 else size / 2**p.mesh.halvings
 
 
 # A mesh file has no coarser ones. The corners of bonded plates limit the order.

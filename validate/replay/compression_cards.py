@@ -95,7 +95,9 @@ class CylinderGrid:
     radial: int = quantity(4, "1", "elements from axis to rim")
     axial: int = quantity(4, "1", "elements along the axis")
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
-    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+    halvings: int = quantity(
+        0, "1", "of a mesh file: times its cells' edges are cut in half; -1: filled anew, coarser"
+    )
     budget: bool = quantity(
         True, "1", "of a mesh file: keep a first answer to about 30 s; false: as --refine"
     )

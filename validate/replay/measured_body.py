@@ -56,6 +56,7 @@ from validate.replay.measured_drive import NOTED, drive_kind, prescribed
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.moving_body import doubting, following, in_motion
+from validate.scene.coarser import size_against
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.named_place import axis_of, place_of
@@ -131,7 +132,7 @@ def _in_motion_as_set(
     experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
 ) -> Experiment:
     order = experiment.methods[experiment.accepted[0]].scene.order
-    made = _with_levels(experiment, _levels(p, unknowns_of(p, order, folder)))
+    made = _with_levels(experiment, _levels(p, order, folder)[0])
     return following(made, recordings, p)
 
 
@@ -272,6 +273,7 @@ def _fits(body: Solid, cells: tuple[int, ...]) -> bool:
 
 _SHARES = (_level(0.5, None), _level(0.75, None), _level(None, None))
 _HALVINGS = (_level(None, 1), _level(None, 2))
+_COARSER = (_level(None, -1),)
 
 
 def _affordable(experiment: Experiment, p: MeasuredBody, folder: Path) -> Experiment:
@@ -280,13 +282,12 @@ def _affordable(experiment: Experiment, p: MeasuredBody, folder: Path) -> Experi
     Where they are too slow at large strain, the linear method of the same element stands in; where
     the surrogate is slow, inputs are moved one by one only.
     """
-    N = unknowns_of(p, experiment.methods[experiment.accepted[0]].scene.order, folder)
-    levels = _levels(p, N)
+    order = experiment.methods[experiment.accepted[0]].scene.order
+    N, (levels, finest) = unknowns_of(p, order, folder), _levels(p, order, folder)
     experiment = _with_levels(experiment, levels)
     uncertainty = experiment.uncertainty
     assert uncertainty is not None
     if p.body.budget and not p.indenter.there:
-        finest = N * (8 ** len(levels) if p.body.file else p.body.finer**3)
         if p.seen.states * newton_seconds(finest) > MESHES:
             uncertainty = replace(uncertainty, stand_in=_linear_of(experiment))
         if (1 + len(uncertainty.inputs) + uncertainty.draws) * linear_seconds(N) > INPUTS:
@@ -302,19 +303,31 @@ def _with_levels(experiment: Experiment, levels: tuple[Change, ...]) -> Experime
     return replace(experiment, uncertainty=replace(declared, mesh=mesh))
 
 
-def _levels(p: MeasuredBody, unknowns: float) -> tuple[Change, ...]:
-    """The meshes of u_num: similar grids, or halvings of a mesh file that fit."""
+def _levels(p: MeasuredBody, order: int, folder: Path) -> tuple[tuple[Change, ...], float]:
+    """The meshes of u_num, and the unknowns of the finest: similar grids; or meshes of the file,
+    halved as far as they fit; or, where none does, a coarser one."""
+    N = unknowns_of(p, order, folder)
     if p.body.file is None:
-        return _SHARES
-    return affordable(_HALVINGS, [8 * unknowns, 64 * unknowns], budget=p.body.budget)
+        return _SHARES, N * p.body.finer**3
+    if p.body.halvings < 0:
+        finer = [replace(p, body=replace(p.body, halvings=p.body.halvings + k)) for k in (1, 2)
+                 if p.body.halvings + k <= 0]  # fmt: skip
+        sizes = [unknowns_of(one, order, folder) for one in finer]
+    else:
+        sizes = [8 * N, 64 * N]
+    found = affordable(_HALVINGS[: len(sizes)], sizes, budget=p.body.budget)
+    return (found, sizes[len(found) - 1]) if found else (_COARSER, N)
 
 
 def _finer_settings(
     p: MeasuredBody, folder: Path, *, methods: Mapping[str, Method]
 ) -> Mapping[str, str]:
-    """What --refine sets: no time limit, 30 load steps, quadratic cells of a mesh file as far as
-    they fit into the memory."""
+    """What --refine sets: no time limit, 30 load steps, a file's own mesh, with quadratic cells
+    as far as they fit into the memory."""
     found = {"body.budget": "false"}
+    if p.body.halvings < 0:
+        found["body.halvings"] = "0"
+        p = replace(p, body=replace(p.body, halvings=0))
     if p.motion.how == "static":
         found["seen.states"] = str(max(p.seen.states, SeenOf().states))
     if p.body.file is None or body_of(p.body, folder=folder, places=named_places(p)).bricks:
@@ -346,8 +359,12 @@ def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, 
 
 
 def _cell(p: MeasuredBody, *, body: Any) -> float:
-    """The edge m of a cube as large as a mean cell."""
-    return float(np.cbrt(cell_volumes(mesh_of(p, body)).mean()))
+    """The edge m of a cube as large as a mean cell; of a coarser filling by its nodes' distance."""
+    mesh = mesh_of(p, body)
+    if p.body.file and p.body.halvings < 0:
+        own = mesh_of(replace(p, body=replace(p.body, halvings=0)), body)
+        return size_against(own, mesh) * float(np.cbrt(cell_volumes(own).mean()))
+    return float(np.cbrt(cell_volumes(mesh).mean()))
 
 
 _INPUTS = (

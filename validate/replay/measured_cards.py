@@ -28,7 +28,9 @@ class Solid:
         (), "1", "cells along x, y, z of a block; radius, height of a cylinder; none: by cells"
     )
     finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
-    halvings: int = quantity(0, "1", "of a mesh file: times its cells' edges are cut in half")
+    halvings: int = quantity(
+        0, "1", "of a mesh file: times its cells' edges are cut in half; -1: filled anew, coarser"
+    )
     budget: bool = quantity(
         True, "1", "keep a first answer to about 30 s by fewer meshes; false: as --refine"
     )

@@ -110,7 +110,9 @@ class Refined:
                 return "no second mesh fits into the time of a first answer; add --refine"
             return "fewer than two different sizes compare the same points"
         by = f" by {self._stands_in} in its place" if part == "mesh" and self._stands_in else ""
-        return found.words + by
+        # A mesh file that is too large to be halved is filled anew with larger cells.
+        only = found.conduct == "two sizes" and found.finest == 1 and part == "mesh"
+        return found.words + by + (", one of them coarser" if only else "")
 
     def _deciding(self, part: str, found: GridConvergence, limit: float) -> str:
         share = found.deciding(limit)

@@ -15,11 +15,11 @@ _SECONDS = 300  # of meshing
 _TURN = [0, 2, 1, 3]
 
 
-def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
+def filled(path: Path, unit: str, edge: float = 0.0, within: float = 1e-3) -> ForeignBody:
     """The body inside a surface with lengths in `unit`, of edges of about `edge` m (0: a twentieth
     of its diagonal).
 
-    Its surface lies within a thousandth of the diagonal of the given one; both volumes are told,
+    Its surface lies `within` that share of the diagonal of the given one; both volumes are told,
     and how many triangles were the wrong way round. Two fillings of one surface are two meshes.
     Raises `SceneError` for a surface that is open, cuts itself, is damaged or too large,
     `UsageError` without the library.
@@ -29,7 +29,12 @@ def filled(path: Path, unit: str, edge: float = 0.0) -> ForeignBody:
         raise SceneError(f"{path.name}: edges of {edge:g} m; 0 or above")
     require_readable(path)
     try:
-        found = decoded("validate.scene.surface_arrays", path, {"edge": edge / factor}, _SECONDS)
+        found = decoded(
+            "validate.scene.surface_arrays",
+            path,
+            {"edge": edge / factor, "within": within},
+            _SECONDS,
+        )
     except RecordingError as error:
         raise SceneError(str(error)) from None
     try:

@@ -22,6 +22,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
 from validate.scene.box import box, grid
+from validate.scene.coarser import coarser
 from validate.scene.cone import quarter_cone
 from validate.scene.cylinder import hexahedral_cylinder, quarter_cylinder, whole_cylinder
 from validate.scene.filled import filled
@@ -198,13 +199,17 @@ class MeshFile:
 
     file: str = quantity("", "1", "mesh file")
     unit: str | None = quantity(None, "1", "unit of lengths in a file other than npz")
-    halvings: int = quantity(0, "1", "times the cells' edges are cut in half")
+    halvings: int = quantity(
+        0, "1", "times the cells' edges are cut in half; -1: filled anew, coarser"
+    )
     element: Literal["as in the file", "linear", "quadratic"] = quantity(
         "as in the file", "1", "element order"
     )
 
     def resolved(self, folder: Path) -> Mesh:
         mesh = read_mesh(folder / self.file, self.unit)
+        if self.halvings < 0:
+            mesh = coarser(mesh, -self.halvings)
         for _ in range(self.halvings):
             mesh = refined(Scene(linear(mesh), Material(1.0, 0.3))).mesh
         if self.element == "linear":

@@ -15,13 +15,15 @@ from validate.errors import SceneError
 LIBRARIES = ("pytetwild.pytetwild", "trimesh")
 _SAME = 1e-7  # of the body's size: corners of triangles that are one point
 _MOST = 2_000_000  # triangles
-_ENVELOPE = 1e-3  # of the diagonal: how far the filled body's surface may lie off
+ENVELOPE = 1e-3  # of the diagonal: how far the filled body's surface may lie off
 _SECONDS = 4  # for reading, and one more for each MB
 
 
-def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
+def arrays(path: Path, edge: float = 0.0, within: float = ENVELOPE) -> dict[str, NDArray[Any]]:
     """Points (n, 3) and cells (e, 4) of edges of about `edge` (0: a twentieth of the body's
     diagonal), in the surface's own unit; `open` and `triangles` of the surface.
+
+    The filled body's surface lies `within` that share of the diagonal.
 
     Raises `SceneError` for a surface that is not closed: what is inside is then anybody's guess.
     """
@@ -37,8 +39,8 @@ def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
     triangles, turned = _oriented(points, triangles)
     with TemporaryDirectory(prefix="validate-") as folder, chdir(folder):  # it leaves files there
         nodes, cells = tetrahedralize(
-            points, triangles.astype(np.int32), edge_length_abs=edge or None, num_threads=1,
-            quiet=True,
+            points, triangles.astype(np.int32), edge_length_abs=edge or None, epsilon=within,
+            num_threads=1, quiet=True,
         )  # fmt: skip
     return {
         "points": np.asarray(nodes, dtype=np.float64),
@@ -46,7 +48,7 @@ def arrays(path: Path, edge: float = 0.0) -> dict[str, NDArray[Any]]:
         "triangles": np.array(len(triangles)),
         "turned": np.array(turned),
         "enclosed": np.array(_signed_volume(points, triangles)),
-        "may_differ": np.array(_area(points, triangles) * _ENVELOPE * _diagonal(points)),
+        "may_differ": np.array(_area(points, triangles) * within * _diagonal(points)),
     }
 
 

@@ -1,0 +1,99 @@
+"""A coarser mesh of a body whose own mesh is the finest that fits: filled anew from its surface.
+
+Where no finer mesh can be solved, an answer on this one bounds the numerical error of the own mesh.
+The two are not similar, so that no order can be observed: two sizes, a factor of safety of three.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from validate.arrays import Ints
+from validate.errors import SceneError
+from validate.scene.filled import filled
+from validate.scene.mesh import Mesh, cell_volumes
+
+_EDGE = 2.04  # of the cube root of its volume: the edge of a regular tetrahedron
+_LARGE = 5_000  # nodes: filling takes some 8 s at 27 000, with edges twice as long 17 s
+_FEW = 100
+_WITHIN = 0.05  # of the coarse edge: how far the surface may lie off
+
+
+def coarser(mesh: Mesh, times: int = 1) -> Mesh:
+    """The body in linear tetrahedra with edges about twice as long, of a large mesh thrice; twice
+    as long again for each further one of `times`.
+
+    A facet set is of the facets next to those of the set on the own mesh; one that lies inside the
+    body is left out. Raises `SceneError` for a mesh that is not 3-D, and what `filled` does.
+    """
+    if mesh.dimension != 3:
+        raise SceneError(f"cells of {mesh.kind}: only bodies in 3-D are filled anew")
+    if len(mesh.nodes) < _FEW:
+        raise SceneError(f"{len(mesh.nodes)} nodes: too few for a mesh with fewer")
+    by = (3.0 if len(mesh.nodes) > _LARGE else 2.0) * 2.0 ** (times - 1)
+    triangles = _triangles(mesh.surface, mesh.bricks)
+    edge = _EDGE * float(np.cbrt(np.abs(cell_volumes(mesh)).mean()))
+    if mesh.bricks:
+        edge /= _EDGE
+    diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    within = max(1e-3, _WITHIN * by * edge / diagonal)
+    used, numbers = np.unique(triangles, return_inverse=True)
+    points, corners = mesh.nodes[used].tobytes(), numbers.astype(np.int64).tobytes()
+    try:
+        coarse = _filling(points, corners, by * edge, within)
+    except SceneError as error:
+        words = f"its surface cannot be filled with edges of {1e3 * by * edge:.3g} mm"
+        raise SceneError(f"{words}: {error}") from error
+    if len(coarse.nodes) >= len(mesh.nodes):
+        raise SceneError(
+            f"a filling with edges of {1e3 * by * edge:.3g} mm has {len(coarse.nodes)} nodes, the "
+            f"mesh {len(mesh.nodes)}: its surface has details that need small cells"
+        )
+    return Mesh(coarse.nodes, coarse.cells, coarse.kind, _sets(mesh, coarse))
+
+
+def size_against(own: Mesh, coarse: Mesh) -> float:
+    """How many times as far apart the nodes of the coarse mesh are; cells of two shapes have no
+    common size."""
+    return float(np.cbrt(len(own.nodes) / len(coarse.nodes)))
+
+
+def _triangles(facets: Ints, bricks: bool) -> Ints:
+    """Triangles (t, 3) of a surface; a brick's face is two."""
+    if not bricks:
+        return facets[:, :3]
+    return np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
+
+
+@lru_cache(maxsize=4)
+def _filling(points: bytes, triangles: bytes, edge: float, within: float) -> Mesh:
+    """The filling of a surface of points (n, 3) m and triangles (t, 3)."""
+    with TemporaryDirectory(prefix="validate-") as folder:
+        path = Path(folder) / "surface.obj"
+        with path.open("w", encoding="ascii") as file:
+            np.savetxt(file, np.frombuffer(points).reshape(-1, 3), "v %.17g %.17g %.17g")
+            np.savetxt(file, np.frombuffer(triangles, np.int64).reshape(-1, 3) + 1, "f %d %d %d")
+        return filled(path, "m", edge, within).mesh
+
+
+def _sets(fine: Mesh, coarse: Mesh) -> dict[str, Ints]:
+    """The facet sets of the coarse mesh's surface by their nearest facets on the fine one."""
+    corners = 4 if fine.bricks else 3
+    own, new = fine.surface[:, :corners], coarse.surface
+    middles = fine.nodes[own].mean(axis=1)
+    _, nearest = KDTree(middles).query(coarse.nodes[new].mean(axis=1))
+    keys = {tuple(sorted(facet)): i for i, facet in enumerate(own.tolist())}
+    found = {}
+    for name, facets in fine.facets.items():
+        rows = [keys.get(tuple(sorted(facet))) for facet in facets[:, :corners].tolist()]
+        inside = np.zeros(len(own), dtype=bool)
+        inside[[row for row in rows if row is not None]] = True
+        if inside.any():
+            chosen = inside[nearest]
+            if not chosen.any():  # smaller than a facet here
+                chosen[KDTree(coarse.nodes[new].mean(axis=1)).query(middles[inside])[1]] = True
+            found[name] = new[chosen]
+    return found
