@@ -223,7 +223,11 @@ class Membrane:
 
 @dataclass(frozen=True)
 class Cavity:
-    """A closed facet set filled with fluid at one gauge pressure Pa."""
+    """A closed facet set filled with fluid at one gauge pressure Pa.
+
+    Declared, "hole*" is every facet set whose name begins so, each with a fluid of its own: of the
+    cavity "hole" they are "hole0", "hole1".
+    """
 
     name: str
     facets: str
@@ -295,6 +299,7 @@ class Scene:
             membranes=placed(self.membranes),
             loads=placed(self.loads),
             masses=placed(self.masses),
+            cavities=tuple(one for c in self.cavities for one in _each(c, mesh)),
             contacts=placed(self.contacts),
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
             copies=self.copies * getattr(self.body, "copies", 1),
@@ -430,6 +435,20 @@ def _placed(part: P, mesh: Mesh) -> P:
     if not isinstance(facets, str) or facets in mesh.facets:
         return part
     return replace(part, facets=place_of(facets, mesh))  # type: ignore[type-var]
+
+
+def _each(cavity: Cavity, mesh: Mesh) -> tuple[Cavity, ...]:
+    """The cavities of a declared one, by facet set."""
+    if not cavity.facets.endswith("*"):
+        return (cavity,)
+    start = cavity.facets[:-1]
+    names = sorted(name for name in mesh.facets if name.startswith(start))
+    if not names:
+        raise SceneError(
+            f"cavity '{cavity.name}': no facet set begins with '{start}'; the body has "
+            f"{', '.join(sorted(mesh.facets)) or 'none'}"
+        )
+    return tuple(Cavity(cavity.name + name[len(start) :], name) for name in names)
 
 
 def _chosen(region: Region, mesh: Mesh, own: Material) -> Region:

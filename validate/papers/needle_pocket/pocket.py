@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from validate.papers.fluid_block.block import Cavities, PlaneBlock, block_mesh
 from validate.papers.needle_pocket.recorded import walkable
 from validate.parameters import Ranges, quantity
 from validate.recording.readers import read_recording
@@ -20,6 +19,7 @@ from validate.recording.types import Recording
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating
+from validate.scene.hollow_block import Cavities, HollowBlock
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
@@ -132,7 +132,7 @@ def body_mesh(body: PocketBody, plane: int, solid: int, order: int) -> Mesh:
 
 def _plane(body: PocketBody, squares: int) -> Mesh:
     cavity = Cavities(1, body.pocket, body.pocket)
-    mesh = block_mesh(PlaneBlock(body.side, body.side), cavity, squares)
+    mesh = HollowBlock(body.side, body.side, squares, cavities=cavity).resolved(Path())
     facets = {k: mesh.facets[k] for k in ("bottom", "top")} | {POCKET: mesh.facets["cavity0"]}
     return Mesh(mesh.nodes, mesh.cells, mesh.kind, facets)
 
