@@ -14,6 +14,7 @@ import sys
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy loads its BLAS
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from dataclasses import replace
 from multiprocessing import get_context
 from time import perf_counter
 
@@ -22,12 +23,12 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.papers.needle_pocket.hand import Hand
-from validate.papers.needle_pocket.pocket import PocketBody, body_mesh, pocket_scene
 from validate.replay import load
 from validate.replay.live import Lived, RecordedPath, live, prepared, realtime
 from validate.replay.live.clock import quiet
 from validate.replay.options import Options
-from validate.scene.material import Material
+from validate.replay.tree import Built
+from validate.scene.tool import Needle
 from validate.solve.haptic import DEVICE_HZ, QUANTILES, TickTimes
 from validate.solve.needle import NeedleLoop, NeedleStepper
 
@@ -84,9 +85,10 @@ def beside_a_busy_core(seconds: float) -> None:
 
 
 def large() -> NeedleStepper:
-    mesh = body_mesh(PocketBody("solid"), 0, CELLS, 1)
-    scene = pocket_scene(mesh, Material(34e3, 0.35), (0.0031, 0.003, 0.002))
-    stepper = NeedleLoop(grip=0.05).prepare(build(scene))
+    body = {"body.space": "solid", "body.solid": CELLS}
+    scene = Built()(None, load("needle_pocket").parameters, body)
+    needle = Needle("needle", "top", (0.0031, 0.003, 0.002), (0.0, -1.0, 0.0))
+    stepper = NeedleLoop(grip=0.05).prepare(build(replace(scene, tools=(needle,))))
     assert isinstance(stepper, NeedleStepper)
     return stepper
 

@@ -158,8 +158,8 @@ def test_a_stiffness_is_not_assembled_without_room() -> None:
 
 def test_the_next_step_is_a_mesh_that_fits(phantom: Experiment) -> None:
     told = coarser("fluid_phantom", phantom.parameters, 1 / 16)
-    assert told == "such as --set mesh.nodes_x=4 --set mesh.nodes_y=4 --set mesh.nodes_z=6"
-    assert coarser("own", phantom.parameters.material, 0.5) == "see `validate list own`"
+    assert told == "such as --set body.cells=3,4,6"
+    assert coarser("own", phantom.parameters.scene.material, 0.5) == "see `validate list own`"
 
 
 def test_a_method_whose_finest_mesh_does_not_fit_is_refused_before_anything_is_solved(
@@ -172,4 +172,4 @@ def test_a_method_whose_finest_mesh_does_not_fit_is_refused_before_anything_is_s
         compare(phantom, Options({}, ("p1_fluid", "p2_fluid")))
     said = str(caught.value)
     assert "p2_fluid with up to 5.06e+04 unknowns in 3-D: about 0.658 GB" in said
-    assert "take a coarser mesh, such as --set mesh.nodes_x=" in said
+    assert "take a coarser mesh, such as --set body.cells=" in said

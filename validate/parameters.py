@@ -121,9 +121,19 @@ def _default(settings: Any, name: str, library: Any) -> Any:
 def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
     """Not names of parts, arrays, and parts of which there are none."""
     if isinstance(value, tuple) and get_origin(hint) is tuple:
-        return "unit" in meta and not any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
+        return "unit" in meta and not _is_of_parts(hint)
     plain = value is None or isinstance(value, str | int | float | tuple)
     return plain and ("unit" in meta or isinstance(hint, type))
+
+
+def _is_of_parts(hint: Any) -> bool:
+    """Whether a tuple's type is that of several parts."""
+    return any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
+
+
+def _has_no_parts(value: Any, hint: Any) -> bool:
+    empty = isinstance(value, tuple) and not value
+    return empty and get_origin(hint) is tuple and _is_of_parts(hint)
 
 
 def _kinds(hint: Any) -> tuple[Any, ...]:
@@ -242,10 +252,11 @@ def _resolved(settings: Any, names: list[str], whole: bool = False) -> list[str]
     if not _branches(settings):
         return None
     members = {name: (value, meta) for name, value, _, meta in _members(settings)}
+    absent = {name for name, value, hint, _ in _members(settings) if _has_no_parts(value, hint)}
     head, rest = names[0], names[1:]
     if head in members:
         value = members[head][0]
-        if not rest and (whole or not _branches(value)):
+        if not rest and (whole or not (_branches(value) or head in absent)):
             return [head]
         inner = _resolved(value, rest, whole) if rest else None
         if inner:

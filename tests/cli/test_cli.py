@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 from types import SimpleNamespace
 
 import numpy as np
@@ -38,7 +39,7 @@ from validate.scene.box import box
 from validate.scene.foreign_mesh import ForeignBody
 
 COARSE = [
-    "--set", "mesh.nodes_x=7", "--set", "mesh.nodes_y=8", "--set", "mesh.nodes_z=11",
+    "--set", "body.cells=6,7,10",
 ]  # fmt: skip
 
 
@@ -116,9 +117,9 @@ def test_usage_errors_are_one_line_with_the_nearest_name() -> None:
         ("material.nu=0.5", "nu = 0.5"),
         ("material.nu=-1", "nu = -1"),
         ("material.E=-15200", "E = -15200"),
-        ("inclusion.centre_x=0.006", "x = 0"),
-        ("inclusion.radius=0.0005", "smaller than an element"),
-        ("loads=0.004", "0 matched samples"),
+        ("body.inclusion.centre_x=0.006", "x = 0"),
+        ("body.inclusion.radius=0.0005", "smaller than an element"),
+        ("positions=0.004", "0 matched samples"),
         ("recording=nowhere.mcap", "nowhere.mcap"),
     ],
 )
@@ -164,19 +165,20 @@ def test_json_on_standard_output_is_one_document(tmp_path: Path) -> None:
 def test_an_experiment_file_anywhere_and_from_any_folder(
     tmp_path: Path, project_root: Path
 ) -> None:
-    source = (project_root / "experiments" / "fluid_phantom.py").read_text("utf-8")
-    mine = tmp_path / "mine.py"
-    mine.write_text(source.replace('name="fluid_phantom"', 'name="mine"'), "utf-8")
+    folder = tmp_path / "mine"
+    copytree(project_root / "experiments" / "fluid_phantom", folder)
+    source = (folder / "experiment.py").read_text("utf-8")
+    mine = source.replace('name="fluid_phantom"', 'name="mine"')
+    (folder / "experiment.py").write_text(mine, "utf-8")
     recording = project_root / "recordings" / "fluid_phantom.mcap"
     done = called(
-        "run", "mine.py", "--methods", "p1_dry", "--set", f"recording={recording}", *COARSE,
-        cwd=tmp_path,
+        "run", "mine/experiment.py", "--methods", "p1_dry", *COARSE,
+        "--set", f"recording={recording}", cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 1, done.stderr  # nothing accepted was run
     assert len(list((tmp_path / "reports").glob("mine+methods+*/report.html"))) == 1
-    renamed = tmp_path / "other.py"
-    renamed.write_text(source, "utf-8")
-    assert "not the file's name" in refused("run", "other.py", cwd=tmp_path)
+    (folder / "experiment.py").write_text(source, "utf-8")
+    assert "not the folder's name" in refused("run", "mine/experiment.py", cwd=tmp_path)
 
 
 def test_list_names_every_parameter_with_path_type_unit_and_default(project_root: Path) -> None:
@@ -190,7 +192,13 @@ def test_list_names_every_parameter_with_path_type_unit_and_default(project_root
         "path": "material.E", "type": "float", "unit": "Pa", "default": 15200.0,
         "doc": paths["material.E"]["doc"],
     }  # fmt: skip
-    wanted = {"mesh.nodes_x", "mesh.order", "inclusion.radius", "methods.p1_fluid.plates", "loads"}
+    wanted = {
+        "body.cells",
+        "body.element",
+        "body.inclusion.radius",
+        "foundations.plates.contact",
+        "positions",
+    }
     assert wanted <= set(paths)
     assert all(p["unit"] and p["doc"] for p in paths.values())
     assert {m["name"] for m in detail["methods"]} >= {"p1_fluid", "p2_fluid", "md_fluid"}

@@ -16,8 +16,8 @@ from validate.replay.options import Options, configure
     ("setting", "says"),
     [
         ("material.E=15mm", "material.E=15mm: expected Pa"),
-        ("inclusion.radius=8kPa", "inclusion.radius=8kPa: expected m"),
-        ("loads=3,6,9mm", "each with its unit"),
+        ("body.inclusion.radius=8kPa", "body.inclusion.radius=8kPa: expected m"),
+        ("positions=3,6,9mm", "each with its unit"),
         ("material.nu=0.4kPa", "without unit"),
         ("methods.p1_loop.tolerance=1kg", "tolerance=1kg: expected a number without unit"),
     ],
@@ -29,10 +29,11 @@ def test_a_wrong_dimension_is_one_line_with_the_unit_that_is_expected(
 
 
 def test_units_reach_parameters_and_lists(phantom: Experiment, project_root: Path) -> None:
-    given = {"material.E": "15kPa", "inclusion.radius": "8mm", "loads": "3mm,6mm,9mm"}
+    given = {"material.E": "15kPa", "body.inclusion.radius": "8mm", "positions": "3mm,6mm,9mm"}
     parameters = configure(phantom, Options(given))[0]
-    assert (parameters.material.E, parameters.inclusion.radius) == (15000.0, 0.008)
-    assert parameters.loads == phantom.parameters.loads
+    scene = parameters.scene
+    assert (scene.material.E, scene.body.inclusion.radius) == (15000.0, 0.008)
+    assert parameters.settings.positions == phantom.parameters.settings.positions
     block = find("kf_cube", project_root)
     parameters, methods = configure(block, Options({"clock.dt": "1ms", "methods.fem.dt": "1ms"}))
     assert (parameters.settings.clock.dt, methods["fem"].settings.dt) == (0.001, 0.001)

@@ -1,43 +1,43 @@
 """The planar block of paper 000, section 3.3: numbers computed apart, every set-up, refusals."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.errors import ComparisonError, SceneError, UsageError
-from validate.papers.fluid_block import block as block_module
-from validate.papers.fluid_block import curves, updates
-from validate.papers.fluid_block.block import (
-    Cavities,
-    FluidBlock,
-    FluidLaws,
-    PlaneBlock,
-    PlaneGrid,
-    block_mesh,
-    record,
-)
-from validate.papers.fluid_block.curves import condensed_block, curve_exhibit, curve_of
-from validate.papers.fluid_block.other_laws import laws_exhibit
-from validate.papers.fluid_block.updates import several_exhibit, updates_exhibit
+from validate.parameters import with_given
 from validate.recording.types import Recording, Source
-from validate.replay import load as experiment_named
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Tree
+from validate.scene.hollow_block import Cavities, HollowBlock
+from validate.scene.scene import Cavity
 from validate.solve.pressure_curve import RATIOS
 
-SMALL = replace(FluidBlock(), mesh=PlaneGrid(20), strains=(0.03, 0.15))
+NAME = "fluid_block"
+block, curves, updates = (beside(NAME, module) for module in ("block", "curves", "updates"))
+condensed_block, curve_exhibit, curve_of = (
+    curves.condensed_block, curves.curve_exhibit, curves.curve_of
+)  # fmt: skip
+laws_exhibit = beside(NAME, "other_laws").laws_exhibit
+several_exhibit, updates_exhibit = updates.several_exhibit, updates.updates_exhibit
+DECLARED: Tree = experiment(NAME).parameters
 
 
 def silent(_: str) -> None:
     pass
 
 
-def with_mesh(squares: int, order: Any = None, **cavities: Any) -> FluidBlock:
-    p = FluidBlock()
-    return replace(p, mesh=PlaneGrid(squares, order), cavities=replace(p.cavities, **cavities))
+def with_mesh(cells: int) -> Tree:
+    return with_given(DECLARED, {"body.cells": cells})
+
+
+SMALL = with_given(with_mesh(20), {"strains": (0.03, 0.15)})
 
 
 def test_the_curve_of_the_note() -> None:
@@ -68,7 +68,7 @@ def test_following_normals_are_the_fixed_ones_for_small_changes() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_cavities_stand_in_a_row(count: int) -> None:
-    mesh = block_mesh(PlaneBlock(), Cavities(count), 40)
+    mesh = HollowBlock(cavities=Cavities(count)).resolved(Path())
     middles = [mesh.nodes[mesh.facet_nodes(f"cavity{k}")].mean(axis=0) for k in range(count)]
     apart = 0.015 * (np.arange(count) - (count - 1) / 2)
     assert np.array(middles) == pytest.approx(
@@ -77,6 +77,13 @@ def test_cavities_stand_in_a_row(count: int) -> None:
     assert {len(mesh.facets[f"cavity{k}"]) for k in range(count)} == {32}
     assert len(mesh.facets["top"]) == 40
     assert len(mesh.facets["patch"]) == 8
+
+
+def test_every_cavity_has_a_fluid_of_its_own_and_none_is_refused() -> None:
+    scene = block.slab(with_given(DECLARED, {"body.cavities.count": 3}), None)
+    assert [(c.name, c.facets) for c in scene.cavities] == [(f"cavity{k}",) * 2 for k in range(3)]
+    with pytest.raises(SceneError, match="no facet set begins with 'hole'; the body has bottom, "):
+        block.slab(with_given(DECLARED, {"cavities": (Cavity("a", "hole*"),)}), None)
 
 
 @pytest.mark.parametrize(
@@ -94,24 +101,24 @@ def test_cavities_stand_in_a_row(count: int) -> None:
 )
 def test_cavities_without_sense_are_refused(cavities: Cavities, squares: int, words: str) -> None:
     with pytest.raises(SceneError, match=words):
-        block_mesh(PlaneBlock(), cavities, squares)
+        HollowBlock(cells=squares, cavities=cavities).resolved(Path())
 
 
 @pytest.mark.parametrize("strains", [(), (0.1, 0.05), (0.6,), (0.0, 0.1), (float("nan"),)])
 def test_strains_without_sense_are_refused(strains: tuple[float, ...]) -> None:
     with pytest.raises(UsageError, match=r"rising numbers between 0 and \.5"):
-        FluidBlock(strains=strains)
+        block.PressedBlock(strains=strains)
 
 
 SETUPS = (
     {"tool": "needle"},
     {"tool": "patch", "body.patch": "0.02"},
-    {"body.plane": "stress"},
-    {"body.plates": "bonded"},
-    {"cavities.count": "2"},
-    {"cavities.count": "3"},
-    {"cavities.width": "0.015", "cavities.height": "0.005"},
-    {"mesh.order": "2"},
+    {"plane": "stress"},
+    {"plates": "bonded"},
+    {"body.cavities.count": "2"},
+    {"body.cavities.count": "3"},
+    {"body.cavities.width": "0.015", "body.cavities.height": "0.005"},
+    {"body.element": "tri6"},
 )
 
 
@@ -119,14 +126,13 @@ SETUPS = (
 @pytest.mark.slow
 def test_every_set_up_is_reached_from_the_parameters(values: dict[str, str]) -> None:
     """The twin is made anew on another mesh; the model predicts its pressures within the limits."""
-    experiment = experiment_named("fluid_block")
-    few = {"strains": "0.01,0.1", "mesh.squares": "20", "twin.squares": "40"}
+    few = {"strains": "0.01,0.1", "body.cells": "20", "twin.squares": "40"}
     found = compare(
-        replace(experiment, uncertainty=None, accept=(), accepted=()),
+        replace(experiment(NAME), uncertainty=None, accept=(), accepted=()),
         Options({**few, **values}, ("p2_exact",), quick=True),
     )
     residuals = found.methods[0].residuals
-    cavities = int(values.get("cavities.count", "1"))
+    cavities = int(values.get("body.cavities.count", "1"))
     share = 0.2 if values.get("tool") == "needle" else 0.05  # a driven node has the mesh's size
     names = [f"pressure{k}@pressed" for k in range(cavities)] + ["force@pressed"]
     for name in names:
@@ -153,7 +159,7 @@ def test_the_printed_claim_by_tool() -> None:
 
 @pytest.mark.slow
 def test_scalar_gains_weaken_as_the_septum_thins() -> None:
-    shown, radii = several_exhibit(replace(SMALL, mesh=PlaneGrid(40)), silent)
+    shown, radii = several_exhibit(with_given(SMALL, {"body.cells": 40}), silent)
     own = [radii[f"2.{share}.own"] for share in ("2", "1", "0.5", "0.25")]
     assert own == sorted(own)
     assert radii["2.0.25.matrix"] < 0.5 * own[-1]
@@ -176,8 +182,8 @@ def test_substitution_diverges_beyond_the_slope_and_newton_does_not() -> None:
 
 def test_other_laws_are_those_that_are_set() -> None:
     """A soft pulse stays in range; a reservoir that feeds itself has no root, and that is a row."""
-    laws = FluidLaws(preset=100.0, stiffness=-5e4, pulse_low=500.0, pulse_high=1000.0)
-    shown = laws_exhibit(replace(SMALL, laws=laws))
+    laws = block.FluidLaws(preset=100.0, stiffness=-5e4, pulse_low=500.0, pulse_high=1000.0)
+    shown = laws_exhibit(with_given(SMALL, {"laws": laws}))
     assert "stays within 0.7 to 1.3" in shown.words[0]
     (own,) = (row for row in shown.tables[0].rows if "B = -5e+04 Pa" in str(row[0]))
     assert own[1:4] == (None, None, None)
@@ -197,7 +203,7 @@ def test_other_laws_are_those_that_are_set() -> None:
 )
 def test_other_laws_without_sense_are_refused(laws: dict[str, float], words: str) -> None:
     with pytest.raises(SceneError, match=words):
-        FluidLaws(**laws)
+        block.FluidLaws(**laws)
 
 
 @pytest.mark.slow
@@ -208,10 +214,10 @@ def test_a_curve_is_shown_with_its_units() -> None:
 
 
 def test_the_recording_is_seeded() -> None:
-    p = replace(SMALL, twin=replace(SMALL.twin, squares=20))
-    one, two = record(p, silent), record(p, silent)
+    p = with_given(SMALL, {"twin.squares": 20})
+    one, two = block.record(p, silent), block.record(p, silent)
     assert np.array_equal(one.signals["force"].y, two.signals["force"].y)
-    other = record(replace(p, twin=replace(p.twin, seed=4)), silent)
+    other = block.record(with_given(p, {"twin.seed": 4}), silent)
     assert not np.array_equal(one.signals["force"].y, other.signals["force"].y)
     assert one.metadata["provenance"]["plane"] == "strain"
 
@@ -222,9 +228,9 @@ def ended(*_: object) -> SimpleNamespace:
 
 
 def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(block_module, "march", ended)
+    monkeypatch.setattr(block, "march", ended)
     with pytest.raises(SceneError, match="the twin: diverged at step 3"):
-        block_module.record(FluidBlock(), lambda what: None)
+        block.record(DECLARED, lambda what: None)
 
 
 def test_a_volume_that_no_pressure_gives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,7 +256,7 @@ def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
 
     monkeypatch.setattr(updates, "pressed", thick_only)
     monkeypatch.setattr(updates, "_MOST", 3)
-    exhibit, _ = several_exhibit(FluidBlock(), lambda what: None)
+    exhibit, _ = several_exhibit(DECLARED, lambda what: None)
     table = next(t for t in exhibit.tables if any("cavities touch" in row for row in t.rows))
     refused = [row for row in table.rows if row[-1] == "cavities touch"]
     assert len(refused) == 2 * len(updates._SEPTA)
@@ -270,9 +276,9 @@ def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_re
     assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2
     recording = Recording("r", Source("r", "", 0, ""), 0)
     for name in ("driving", "validating"):
-        monkeypatch.setattr(block_module, name, lambda *_, **__: None)
+        monkeypatch.setattr(block, name, lambda *_, **__: None)
     scene = SimpleNamespace(cavities=(SimpleNamespace(name="cavity0"),))
     with pytest.raises(
         ComparisonError, match=r"r: no signal 'pressure0' for cavity 0 of 1; it has"
     ):
-        block_module.place(recording, FluidBlock(), scene)  # type: ignore[arg-type]
+        block.place(recording, DECLARED, scene)

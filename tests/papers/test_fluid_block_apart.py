@@ -4,12 +4,13 @@ Nothing of `fem` or `solve` is in these numbers: scikit-fem integrates stiffness
 solves, and volumes are areas of polygons or, to first order, the work of the pressure's load.
 """
 
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import skfem
+from beside import beside, experiment
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, sym_grad, trace
@@ -17,25 +18,27 @@ from skfem.helpers import ddot, sym_grad, trace
 from validate.arrays import Floats
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
-from validate.papers.fluid_block.block import FluidBlock, PlaneGrid, block_mesh, slab
-from validate.scene.material import Material
+from validate.parameters import with_given
+from validate.replay.tree import Tree, mesh_of
 from validate.solve.fluid import ExactPressure
 from validate.solve.pressure_curve import slopes, still
 
-COARSE = replace(FluidBlock(), mesh=PlaneGrid(20))
+slab = beside("fluid_block", "block").slab
+COARSE: Tree = with_given(experiment("fluid_block").parameters, {"body.cells": 20})
+ELEMENTS = {1: "tri3", 2: "tri6"}
 
 
 class Apart:
     """The block's stiffness and pressure loads by scikit-fem, on the same triangles."""
 
-    def __init__(self, p: FluidBlock, order: int) -> None:
-        made = block_mesh(p.body, p.cavities, p.mesh.squares)
+    def __init__(self, p: Tree, order: int) -> None:
+        made = mesh_of(None, p, Path())
         self.mesh, self.facets = skfem.MeshTri(made.nodes.T, made.cells.T), made.facets
         element = skfem.ElementTriP1() if order == 1 else skfem.ElementTriP2()
         self.basis = skfem.Basis(self.mesh, skfem.ElementVector(element), intorder=4)
-        E, nu = p.material.E, p.material.nu
+        E, nu = p.scene.material.E, p.scene.material.nu
         mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
-        if p.body.plane == "stress":
+        if p.scene.plane == "stress":
             lam = 2 * lam * mu / (lam + 2 * mu)
 
         @skfem.BilinearForm
@@ -85,21 +88,17 @@ class Apart:
 
 SETUPS = (
     {},
-    {"body.plane": "stress"},
-    {"cavities.width": 0.015, "cavities.height": 0.005},
-    {"cavities.width": 0.02, "cavities.height": 0.02},
-    {"cavities.count": 2},
-    {"cavities.count": 3},
-    {"body.plane": "stress", "cavities.count": 2},
+    {"plane": "stress"},
+    {"body.cavities.width": 0.015, "body.cavities.height": 0.005},
+    {"body.cavities.width": 0.02, "body.cavities.height": 0.02},
+    {"body.cavities.count": 2},
+    {"body.cavities.count": 3},
+    {"plane": "stress", "body.cavities.count": 2},
 )
 
 
-def set_up(values: dict[str, Any]) -> FluidBlock:
-    p = COARSE
-    for path, value in values.items():
-        part, name = path.split(".")
-        p = replace(p, **{part: replace(getattr(p, part), **{name: value})})
-    return p
+def set_up(values: dict[str, Any]) -> Tree:
+    return with_given(COARSE, values)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -109,12 +108,9 @@ def test_every_cavity_swells_as_computed_apart(values: dict[str, Any], order: in
     p = set_up(values)
     apart = Apart(p, order)
     moved = [apart.solve(f, apart.held, np.zeros(len(apart.held))) for f in apart.loads]
-    V0 = p.cavities.width * p.cavities.height
+    V0 = p.scene.body.cavities.width * p.scene.body.cavities.height
     theirs = np.array([[f @ u / V0 for u in moved] for f in apart.loads])
-    material = Material(p.material.E, p.material.nu)
-    ours = responses(build_system(
-        slab(p.body, p.cavities, p.mesh.squares, order, material, None)
-    ))  # fmt: skip
+    ours = responses(build_system(slab(p, None, {"body.element": ELEMENTS[order]})))
     assert slopes(ours, still(ours)) == pytest.approx(theirs, rel=1e-9, abs=1e-15)
 
 
@@ -125,8 +121,8 @@ def test_pressure_and_force_under_a_tool_are_those_computed_apart(
     tool: Any, plates: Any, plane: Any
 ) -> None:
     """The root by bisection on the polygon's area, the force as the reaction of scikit-fem's K."""
-    p = set_up({"body.plane": plane, "body.plates": plates})
-    apart, down = Apart(p, 1), 0.1 * p.body.height
+    p = set_up({"plane": plane, "plates": plates})
+    apart, down = Apart(p, 1), 0.1 * p.scene.body.height
     if tool == "needle":
         node = int(np.abs(apart.mesh.p.T - [0.0, 0.0]).sum(axis=1).argmin())
         pressed, aside = apart.basis.nodal_dofs[1:, node], apart.basis.nodal_dofs[:1, node]
@@ -141,8 +137,7 @@ def test_pressure_and_force_under_a_tool_are_those_computed_apart(
     P = float(brentq(lambda P: apart.area(0, dry + P * wet) - V0, 0, 1e5, xtol=1e-9))
     u = dry + P * wet
     force = -float((apart.K @ u - P * apart.loads[0])[pressed].sum())
-    material = Material(p.material.E, p.material.nu)
-    ours = responses(build_system(slab(p.body, p.cavities, 20, 1, material, tool)))
+    ours = responses(build_system(slab(p, tool)))
     stepper = ExactPressure().on(ours)
     state = stepper.step(stepper.rest(), np.array([down]))
     assert state.numbers["cavity0.pressure"] == pytest.approx(P, rel=1e-9)
@@ -155,15 +150,14 @@ def test_pressure_and_force_under_a_tool_are_those_computed_apart(
 )
 def test_slopes_of_the_note(squares: int, order: int, slope: float) -> None:
     """An earlier study, cavity of 10 mm, plane strain."""
-    p = replace(COARSE, mesh=PlaneGrid(squares))
-    material = Material(p.material.E, p.material.nu)
-    r = responses(build_system(slab(p.body, p.cavities, squares, order, material, None)))
+    changes = {"body.cells": squares, "body.element": ELEMENTS[order]}
+    r = responses(build_system(slab(COARSE, None, changes)))
     assert 1 / float(slopes(r, still(r))[0, 0]) == pytest.approx(slope, abs=0.06)
 
 
 def test_a_bonded_needle_holds_its_own_node_alone() -> None:
     """Of a block that is its own mirror image that node does not move aside anyway."""
-    p = set_up({"body.plates": "bonded"})
-    scene = slab(p.body, p.cavities, 20, 1, Material(p.material.E, p.material.nu), "needle")
+    p = set_up({"plates": "bonded"})
+    scene = slab(p, "needle")
     assert [(pin.point, pin.components) for pin in scene.pins] == [((0.0, 0.0), (0,))]
     assert [s.facets for s in scene.supports] == ["bottom"]

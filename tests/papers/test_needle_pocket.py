@@ -7,35 +7,29 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, SceneError, UsageError
-from validate.papers.needle_pocket import twin as twin_module
 from validate.papers.needle_pocket.hand import STOPS, Hand, closed, moved
-from validate.papers.needle_pocket.judged import follows
-from validate.papers.needle_pocket.loops import LAWS, around, turn_energy
-from validate.papers.needle_pocket.pocket import (
-    NeedlePocket,
-    PocketBody,
-    PocketGrid,
-    PocketModel,
-    PocketTwin,
-    body_mesh,
-    build,
-    place,
-)
-from validate.papers.needle_pocket.recorded import walkable
-from validate.papers.needle_pocket.told import half
-from validate.papers.needle_pocket.twin import record
+from validate.parameters import with_given
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.replay import load as experiment_named
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Tree, mesh_of
 from validate.scene.mesh import Mesh, cell_volumes
 
-COARSE = NeedlePocket(mesh=PocketGrid(10, 6), twin=PocketTwin(plane=10, solid=6))
+NAME = "needle_pocket"
+twin_module, loops, pocket = (beside(NAME, module) for module in ("twin", "loops", "pocket"))
+LAWS, around, turn_energy = loops.LAWS, loops.around, loops.turn_energy
+build, place, record = pocket.build, pocket.place, twin_module.record
+follows, half = beside(NAME, "judged").follows, beside(NAME, "told").half
+walkable = beside(NAME, "recorded").walkable
+DECLARED: Tree = experiment(NAME).parameters
+COARSE = with_given(DECLARED, {"body.plane": 10, "twin.plane": 10})
+SOLID = with_given(DECLARED, {"body.space": "solid", "body.solid": 6, "twin.solid": 6})
 SHIPPED = Path(__file__).parents[2] / "recordings" / "needle_pocket.mcap"
 
 
@@ -45,7 +39,7 @@ def silent(_: str) -> None:
 
 @cache
 def block() -> Mesh:
-    return body_mesh(COARSE.body, 10, 6, 1)
+    return mesh_of(None, COARSE, Path())
 
 
 def path_of(x: Floats, t: Floats | None = None) -> Recording:
@@ -113,7 +107,7 @@ def test_what_of_a_path_cannot_be_walked_is_counted() -> None:
 
 def test_a_path_out_of_reach_is_a_finding_and_a_run() -> None:
     recording = path_of(down(0.01, 0.02, 0.01))
-    scene = build(recording, COARSE, PocketModel())
+    scene = build(recording, COARSE)
     seen = place(recording, COARSE, scene)
     assert "nearest 10 mm" in "".join(seen.findings)
     assert seen.inputs[0].tolist() == [0, 0]
@@ -136,7 +130,7 @@ def test_a_path_of_no_use_is_one_line(recording: Recording, words: str) -> None:
 
 def test_a_pocket_that_the_mesh_cannot_hold_is_refused() -> None:
     with pytest.raises(SceneError, match="touch the outside"):
-        body_mesh(PocketBody(pocket=0.05), 10, 6, 1)
+        mesh_of(None, with_given(COARSE, {"body.pocket": 0.05}), Path())
 
 
 # --- energy -----------------------------------------------------------------------------------
@@ -145,7 +139,7 @@ def test_a_pocket_that_the_mesh_cannot_hold_is_refused() -> None:
 def test_over_a_closed_path_the_exact_law_is_passive_and_the_papers_is_not() -> None:
     """The device gives back no more than it took; the paper's dead band and force give more."""
     recording = path_of(down(0.003, 0.002))
-    scene = build(recording, COARSE, PocketModel())
+    scene = build(recording, COARSE)
     ways = {name: around(scene, law, 0.006) for name, law in LAWS.items()}
     turns = {name: turn_energy(way) / way.stored.max() for name, way in ways.items()}
     exact, _, paper, coarse = turns.values()
@@ -164,8 +158,7 @@ def test_over_a_closed_path_the_exact_law_is_passive_and_the_papers_is_not() -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("space", ["plane", "solid"])
 def test_the_twin_is_felt_and_its_seed_repeats_it(space: str) -> None:
-    body = replace(COARSE.body, space=space)  # type: ignore[arg-type]
-    p = replace(COARSE, body=body, twin=replace(COARSE.twin, rate=64.0))
+    p = with_given(COARSE if space == "plane" else SOLID, {"twin.rate": 64.0})
     made, again = record(p, silent), record(p, silent)
     up = made.signals["force.y"].y
     assert up.max() > 10 * made.signals["force.y"].sd
@@ -189,9 +182,8 @@ def test_the_shipped_recording_holds_what_section_5_2_needs() -> None:
 def test_a_path_of_ones_own_is_run_and_judged_by_what_it_has(tmp_path: Path) -> None:
     file = tmp_path / "own.mcap"
     write_recording(path_of(down(0.002, 0.001, -0.001, -0.002, -0.002, 0.004)), file)
-    experiment = experiment_named("needle_pocket")
-    values = {"recording": str(file), "mesh.plane": "10"}
-    result = compare(experiment, Options(values, ("p1_exact",)))
+    values = {"recording": str(file), "body.plane": "10"}
+    result = compare(experiment(NAME), Options(values, ("p1_exact",)))
     (method,) = result.methods
     assert method.runs[0].outcome.state == "finished"
     assert method.runs[0].traces["needle.contact"].y.tolist() == [0, 0, 1, 1, 1, 0]
@@ -201,26 +193,23 @@ def test_a_path_of_ones_own_is_run_and_judged_by_what_it_has(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_space_is_chosen_by_a_parameter_and_the_shipped_path_with_it() -> None:
-    experiment = experiment_named("needle_pocket")
-    values = {"body.space": "solid", "mesh.solid": "6"}
-    (method,) = compare(experiment, Options(values, ("paper",))).methods
+    values = {"body.space": "solid", "body.solid": "6"}
+    (method,) = compare(experiment(NAME), Options(values, ("paper",))).methods
     assert method.runs[0].outcome.state == "finished"
     assert method.runs[0].traces["needle.force.z"].y.any()
     assert np.abs(method.runs[0].traces["pocket.volume_ratio"].y - 1).max() <= 1e-3
 
 
 def test_limits_follow_the_space() -> None:
-    experiment = experiment_named("needle_pocket")
     made = read_recording(SHIPPED)
-    solid = replace(COARSE, body=replace(COARSE.body, space="solid"))
-    plane = {a.quantity: a.limit for a in follows(experiment, [made], COARSE).accept}
-    space = {a.quantity: a.limit for a in follows(experiment, [made], solid).accept}
+    plane = {a.quantity: a.limit for a in follows(experiment(NAME), [made], COARSE).accept}
+    space = {a.quantity: a.limit for a in follows(experiment(NAME), [made], SOLID).accept}
     assert plane["force.y"] == 25 * space["force.y"]
     assert plane["pressure"] == space["pressure"]
 
 
 def test_the_cube_is_drawn_cut_at_the_needle_and_turned_up() -> None:
-    mesh = body_mesh(replace(COARSE.body, space="solid"), 10, 6, 1)
+    mesh = mesh_of(None, SOLID, Path())
     moved_up = np.tile([0.0, 1e-3, 0.0], (len(mesh.nodes), 1))
     shown, u = half(mesh, moved_up, 0.0)
     assert len(shown.cells) < 0.6 * len(mesh.cells)
@@ -243,7 +232,7 @@ def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(twin_module, "NeedleLoop", lambda **_: loop)
     monkeypatch.setattr(twin_module, "build_system", lambda scene: None)
     with pytest.raises(SceneError, match="the twin: diverged at step 3"):
-        record(NeedlePocket(), lambda what: None)
+        record(DECLARED, lambda what: None)
 
 
 @pytest.mark.parametrize("bad", [{"depth": 0.0}, {"rate": 0.0}, {"tremor": -1e-3}])

@@ -85,6 +85,12 @@ def test_a_method_changes_its_scene_by_path_and_the_user_what_a_method_does() ->
         configure(both, Options({"methods.linear.material.e": "50kPa"}))
 
 
+def test_parts_of_which_there_are_none_are_no_parameter() -> None:
+    """`loads` of the scene is empty: a text would be no load."""
+    with pytest.raises(UsageError, match="unknown parameter 'loads'"):
+        configure(bar(), Options({"loads": "3mm"}))
+
+
 def test_what_names_cannot_register_is_one_line() -> None:
     scene = bar().build(log(), bar().parameters, None)
     strange = replace(log(), signals={"push": log().signals["stage"]})

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import validate.replay
+from validate.parameters import with_given
 from validate.replay.experiment import Experiment
 
 
@@ -24,11 +25,11 @@ def docstring() -> str:
 def small(phantom: Experiment) -> Experiment:
     """The fluid phantom with two cheap methods on a coarse mesh, one of them accepted."""
     methods = {name: phantom.methods[name] for name in ("p1_fluid", "md_fluid")}
-    grid = replace(phantom.parameters.mesh, nodes_x=7, nodes_y=8, nodes_z=11)
+    coarse = with_given(phantom.parameters, {"body.cells": (6, 7, 10)})
     assert phantom.uncertainty is not None
     return replace(
         phantom, methods=methods, accepted=("md_fluid",), effects=(), published=(),
-        parameters=replace(phantom.parameters, mesh=grid),
+        parameters=coarse,
         uncertainty=replace(phantom.uncertainty, surrogate="md_fluid"),
     )  # fmt: skip
 

@@ -16,10 +16,12 @@ from validate.replay.experiment import Experiment
 from validate.replay.options import Options
 from validate.replay.road import compare
 
-PH_1328 = {
-    "inclusion.centre_x": "0.03", "inclusion.centre_y": "0.0225", "inclusion.centre_z": "0.035",
-    "inclusion.radius": "0.0085", "inclusion.length": "0.028", "registration.wall": "facets",
-}  # fmt: skip
+_CAPSULE = {"centre_x": "0.03", "centre_y": "0.0225", "centre_z": "0.035", "radius": "0.0085",
+            "length": "0.028"}  # fmt: skip
+PH_1328 = {"registration.wall": "facets"} | {
+    f"body.inclusion.{name}": value for name, value in _CAPSULE.items()
+}
+BONDED = {"foundations.plates.contact": "bonded"}
 
 
 def scores(result: Result, method: str) -> dict[str, float]:
@@ -104,9 +106,9 @@ def test_the_1328_node_mesh_of_the_note_is_reached_by_set(phantom: Experiment) -
     for load, P in ((3, 480.14), (6, 1101.42), (9, 1865.36)):
         assert found[f"pressure.simulated@{load}mm"] == pytest.approx(P, rel=2e-3)
     assert found["force.plate.simulated@9mm"] == pytest.approx(6.992, rel=1e-3)
-    bonded = compare(phantom, Options({**PH_1328, "plates": "bonded"}, ("p1_fluid",)))
+    bonded = compare(phantom, Options({**PH_1328, **BONDED}, ("p1_fluid",)))
     assert scores(bonded, "p1_fluid")["force.plate.simulated@9mm"] == pytest.approx(11.51, rel=1e-3)
-    quadratic = compare(phantom, Options({**PH_1328, "mesh.order": "2"}, ("p1_fluid",)))
+    quadratic = compare(phantom, Options({**PH_1328, "body.element": "quadratic"}, ("p1_fluid",)))
     assert scores(quadratic, "p1_fluid")["pressure.simulated@9mm"] == pytest.approx(
         1232.7, rel=2e-3
     )
@@ -260,11 +262,12 @@ def test_bad_recordings_are_refused_in_one_line(
 @pytest.mark.parametrize(
     ("setting", "says"),
     [
-        ({"loads": "0.0,0.003"}, "above 0"),
-        ({"loads": "0.003,0.003"}, "occur once"),
-        ({"mesh.order": "3"}, "one of 1, 2"),
-        ({"methods.p2_fluid.order": "0"}, "one of 1, 2"),
-        ({"mesh.nodes_x": "100000"}, "expected at most 100000"),
+        ({"positions": "0.0,0.003"}, "above 0"),
+        ({"positions": "0.003,0.003"}, "occur once"),
+        ({"body.element": "cubic"}, "one of linear, quadratic"),
+        ({"methods.p2_fluid.body.element": "0"}, "one of linear, quadratic"),
+        ({"body.cells": "8,9"}, "expected three numbers of cells"),
+        ({"body.cells": "99999,9,14"}, "expected at most 100000"),
         ({"ranges.E": "-0.5"}, "ranges.E = -0.5"),
         ({"ranges.friction": "5"}, "ranges.friction = 5"),
     ],
@@ -273,23 +276,24 @@ def test_bad_recordings_are_refused_in_one_line(
 def test_settings_that_mean_nothing_are_refused(
     phantom: Experiment, setting: dict[str, str], says: str
 ) -> None:
-    quick = {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
+    quick = {"body.cells": "6,7,10"}
     with pytest.raises(ValidateError, match=says):
         compare(phantom, Options({**quick, **setting}, ("p2_fluid",)))
 
 
 @pytest.mark.slow
 def test_an_inclusion_meshed_elsewhere_is_told(phantom: Experiment) -> None:
-    result = compare(phantom, Options({"inclusion.centre_x": "0.030"}, ("p1_dry",)))
+    result = compare(phantom, Options({"body.inclusion.centre_x": "0.030"}, ("p1_dry",)))
     assert any("centre is 1.5" in note or "centre is 1.6" in note for note in result.notes)
     untouched = compare(phantom, Options({}, ("p1_dry",)))
     assert not any("meshed inclusion" in note for note in untouched.notes)
 
 
 @pytest.mark.slow
-def test_another_order_is_in_the_label(phantom: Experiment) -> None:
-    result = compare(phantom, Options({"mesh.order": "2"}, ("p1_dry",)))
-    assert result.methods[0].label == "P1 without fluid [order 2]"
+def test_an_element_is_set_for_one_method_or_for_all(phantom: Experiment) -> None:
+    for path in ("body.element", "methods.p1_dry.body.element"):
+        result = compare(phantom, Options({path: "quadratic"}, ("p1_dry",)))
+        assert result.methods[0].scene.mesh.order == 2
 
 
 @pytest.mark.slow

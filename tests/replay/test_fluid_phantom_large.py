@@ -11,7 +11,7 @@ from validate.replay.experiment import Experiment
 
 @pytest.fixture(scope="module")
 def experiment(project_root) -> Experiment:  # type: ignore[no-untyped-def]
-    return load(str(project_root / "experiments" / "fluid_phantom_large.py"))
+    return load(str(project_root / "experiments" / "fluid_phantom_large" / "experiment.py"))
 
 
 @pytest.fixture(scope="module")

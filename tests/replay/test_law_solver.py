@@ -1,15 +1,17 @@
 """A method's law decides its solver where a user sets another one."""
 
+from dataclasses import replace
+
 import pytest
 
-from validate.cli.listing import parameters_of
 from validate.errors import UsageError
 from validate.replay.compression import pressed
 from validate.replay.experiment import Experiment
-from validate.replay.law_solver import with_laws
+from validate.replay.law_solver import laws_of, with_laws
 from validate.replay.options import Options, all_methods
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
+from validate.solve.pressure_loop import PressureLoop
 from validate.solve.tabulated import Tabulated
 
 
@@ -28,8 +30,19 @@ def test_newton_where_no_other_method_solves_the_law() -> None:
 
 
 def test_a_scheme_of_one_law_lists_and_takes_no_other(phantom: Experiment) -> None:
-    listed = {p.path: p.type for p in parameters_of(phantom)}
-    assert listed["methods.p1_loop.law"] == "linear"
-    refusal = r"methods\.p1_loop\.law=svk: PressureLoop solves linear; "
+    loop = {"loop": replace(pressed("loop"), settings=PressureLoop())}
+    assert laws_of(loop["loop"]) == ("linear",)
+    with pytest.raises(UsageError, match=r"methods\.loop\.law=svk: PressureLoop solves linear; "):
+        with_laws(loop, {"loop.law": "svk"})
+    refusal = r"methods\.p1_loop\.material\.law=svk: PressureLoop solves linear; "
     with pytest.raises(UsageError, match=refusal):
-        all_methods(phantom, Options({"methods.p1_loop.law": "svk"}))
+        all_methods(phantom, Options({"methods.p1_loop.material.law": "svk"}))
+
+
+def test_a_method_of_a_declared_scene_takes_the_solver_of_its_law(phantom: Experiment) -> None:
+    path = "methods.md_fluid.material.law"
+    large = all_methods(phantom, Options({path: "neo_hooke"}))["md_fluid"]
+    assert large.scene["material.law"] == "neo_hooke"
+    assert isinstance(large.settings, StaticNewton)
+    same = all_methods(phantom, Options({path: "linear"}))["md_fluid"]
+    assert same.settings == phantom.methods["md_fluid"].settings

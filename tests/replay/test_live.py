@@ -51,7 +51,7 @@ from validate.replay.road import compare
 from validate.solve.needle import NeedleStepper
 from validate.solve.types import State
 
-COARSE = {"mesh.plane": "10"}
+COARSE = {"body.plane": "10"}
 REST = (0.0031, 0.001)
 
 
@@ -388,13 +388,13 @@ def test_what_it_did_replays_to_the_same_numbers(source: str, tmp_path: Path) ->
 @pytest.mark.slow
 def test_the_command_runs_against_the_real_clock(tmp_path: Path) -> None:
     file = tmp_path / "live.mcap"
-    given = ["live", "needle_pocket", "--set", "mesh.plane=10", "--method", "p1_exact",
+    given = ["live", "needle_pocket", "--set", "body.plane=10", "--method", "p1_exact",
              "--seconds", "0.3", "-o", str(file), "--json"]  # fmt: skip
     result = CliRunner().invoke(cli, given, standalone_mode=False)
     assert result.exception is None
     assert '"ticks": 154' in result.stdout
     assert len(read_recording(file).signals["tick.work"].t) == 154
-    assert "validate run needle_pocket --set mesh.plane=10 --set recording=" in result.stdout
+    assert "validate run needle_pocket --set body.plane=10 --set recording=" in result.stdout
 
 
 def test_an_experiment_without_a_needle_is_refused() -> None:

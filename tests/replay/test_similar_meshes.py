@@ -30,7 +30,7 @@ from validate.solve.quasi_static import QuasiStatic
 
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
 _COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
-           "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
+           "solid", "cells", "halvings", "divisions")  # fmt: skip
 OPEN = {"skin_pads": {"pads.width": "8mm"}}  # what only the data tell
 
 
@@ -139,8 +139,8 @@ def test_a_pad_s_cells_are_as_near_to_cubes_as_two_layers_allow() -> None:
 
 def counts(parameters: Any) -> Floats:
     """Numbers that say how many cells the grid in use has, from cards called mesh or body."""
-    space = getattr(getattr(parameters, "body", None), "space", "")
-    unused = {"plane": "solid", "solid": "plane"}.get(space)
+    body = getattr(getattr(parameters, "scene", parameters), "body", None)
+    unused = {"plane": "solid", "solid": "plane"}.get(getattr(body, "space", ""))
     found: list[float] = []
     for p in describe(parameters):
         card, _, name = p.path.rpartition(".")

@@ -6,30 +6,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import experiment
 from sweeps import LeaningCapsule, sweep_frames
 
 from validate.errors import UsageError, ValidateError
 from validate.fem.cavity import cavity_surface, volume_of
-from validate.papers.fluid_inclusion.effects import ALL
-from validate.papers.fluid_inclusion.phantom import (
-    InclusionCard,
-    Phantom,
-    PhantomModel,
-    build,
-    inclusion,
-    place,
-    read,
-)
+from validate.papers.fluid_inclusion.effects import INPUTS
+from validate.papers.fluid_inclusion.phantom import InclusionCard, inclusion, place, read
 from validate.papers.fluid_inclusion.swept import POSITION, SWEEP, swept
+from validate.parameters import with_given
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.sweep import stacked
+from validate.replay.tree import Built, Tree
 from validate.scene.inclusion import Capsule
 from validate.twin.ultrasound import Scanner
 
-SWEPT = Phantom(inclusion=InclusionCard(shape="sweep"))
+DECLARED: Tree = experiment("fluid_phantom").parameters
+SWEPT = with_given(DECLARED, {"body.inclusion.shape": "sweep"})
+build = Built()
 TRUE = Capsule((0.0284, 0.0225, 0.0356), 0.0085, 0.028)
-ROUNDER = next(i for i in ALL if i.name == "circular sections")
+ROUNDER = next(i for i in INPUTS if i.name == "circular sections")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +48,7 @@ def test_the_swept_inclusion_is_the_true_one_within_the_outlines_noise(recorded:
 
 
 def test_its_mesh_holds_the_cavity_and_the_wall_is_the_sweeps(recorded: Recording) -> None:
-    mesh = build(recorded, SWEPT, PhantomModel()).mesh
+    mesh = build(recorded, SWEPT).mesh
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(inclusion(recorded, SWEPT).distance(wall)).max() < 1e-12
     hole = volume_of(cavity_surface(mesh, "cyst", "cavity"), mesh.nodes)
@@ -61,7 +58,7 @@ def test_its_mesh_holds_the_cavity_and_the_wall_is_the_sweeps(recorded: Recordin
 def test_the_circular_assumption_is_an_input_of_the_sweep_alone(recorded: Recording) -> None:
     """Of an oval inclusion one standard uncertainty is all of its difference from circles."""
     assert ROUNDER.source.startswith("measured")
-    assert ROUNDER.by(1.0)(Phantom()) == Phantom()
+    assert ROUNDER.by(1.0)(DECLARED) == DECLARED
     oval = with_sweep(recorded, lambda s: replace(s, outlines=tuple(
         o.mean(axis=0) + (o - o.mean(axis=0)) * [1.1, 1 / 1.1] for o in s.outlines
     )))  # fmt: skip
@@ -72,11 +69,11 @@ def test_the_circular_assumption_is_an_input_of_the_sweep_alone(recorded: Record
 
 
 def test_the_report_says_what_the_circles_leave(recorded: Recording) -> None:
-    said = place(recorded, SWEPT, build(recorded, SWEPT, PhantomModel())).findings
+    said = place(recorded, SWEPT, build(recorded, SWEPT)).findings
     assert len(said) == 1
     assert "14 slices of a sweep: their outlines lie 0.147 mm rms off circles" in said[0]
-    moved = replace(SWEPT, inclusion=replace(SWEPT.inclusion, wider=0.001))
-    said = place(recorded, moved, build(recorded, moved, PhantomModel())).findings
+    moved = with_given(SWEPT, {"body.inclusion.wider": 0.001})
+    said = place(recorded, moved, build(recorded, moved)).findings
     assert "radius +1.00 mm off" in said[1]
 
 
@@ -113,7 +110,7 @@ def test_sweeps_that_mean_nothing_are_refused_in_one_line(
     recorded: Recording, spoil: Callable[[Recording], Recording], says: str
 ) -> None:
     with pytest.raises(ValidateError, match=says) as caught:
-        build(spoil(recorded), SWEPT, PhantomModel())
+        build(spoil(recorded), SWEPT)
     assert len(str(caught.value).splitlines()) == 1
 
 

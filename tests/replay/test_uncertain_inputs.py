@@ -11,12 +11,13 @@ import pytest
 from validate.compare.residual import Residual
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
-from validate.papers.fluid_inclusion.phantom import Phantom, PhantomRanges
+from validate.papers.fluid_inclusion.effects import rubbed as phantom_rubbed
+from validate.parameters import with_given
 from validate.replay.cards import rubbed
 from validate.replay.checks import joint_inputs
 from validate.replay.experiment import Input, Variant
 from validate.replay.find import find
-from validate.replay.inclusion import InclusionRanges
+from validate.replay.inclusion import BlockCard, GelCard, InclusionRanges, InclusionTest
 from validate.scene.plates import plates_of_share, rubbing_share
 
 
@@ -32,22 +33,29 @@ def test_a_range_without_a_source_is_refused() -> None:
         Input("modulus", rubbed, "E", " ")
 
 
+TEST = InclusionTest(block=BlockCard(0.060, 0.045, 0.070), material=GelCard(15_200.0))
+PHANTOM = find("fluid_phantom", Path(__file__)).parameters
+
+
 def test_plates_rub_by_the_models_own_share() -> None:
     """One standard uncertainty from slipping is the stiffness that friction is identified by, not a
     share of the response of bonded plates, which is 1.4 to 2.3 times less."""
-    p = Phantom(ranges=PhantomRanges(friction=0.03))
     k = 4 * 15_200 / 0.060 * 0.03 / 0.97
-    assert (rubbed(p, 1.0).plates, rubbed(p, 1.0).friction) == ("partial", pytest.approx(k))
-    assert rubbed(p, -1.0) == rubbed(p, 1.0)
+    assert (rubbed(TEST, 1.0).plates, rubbed(TEST, 1.0).friction) == ("partial", pytest.approx(k))
+    assert rubbed(TEST, -1.0) == rubbed(TEST, 1.0)
+    (plates,) = phantom_rubbed(PHANTOM, 1.0).scene.foundations
+    assert (plates.contact, plates.stiffness) == ("partial", pytest.approx(k))
+    assert phantom_rubbed(PHANTOM, -1.0) == phantom_rubbed(PHANTOM, 1.0)
 
 
 def test_bonded_and_partial_plates_are_uncertain_too() -> None:
-    bonded = rubbed(replace(Phantom(), plates="bonded"), 1.0)
-    assert rubbing_share("partial", bonded.friction, 15_200, 0.060) == pytest.approx(0.97)
-    contact, friction = plates_of_share(0.5, 15_200, 0.060)
-    half = replace(Phantom(), plates=contact, friction=friction)
-    more = rubbed(half, 1.0)
-    assert rubbing_share("partial", more.friction, 15_200, 0.060) == pytest.approx(0.53)
+    path, (contact, friction) = "foundations.plates.", plates_of_share(0.5, 15_200, 0.060)
+    half = {f"{path}contact": contact, f"{path}stiffness": friction}
+    for own, more in (({f"{path}contact": "bonded"}, 0.97), (half, 0.53)):
+        card = {"plates": own[f"{path}contact"], "friction": own.get(f"{path}stiffness", 0.0)}
+        (plates,) = phantom_rubbed(with_given(PHANTOM, own), 1.0).scene.foundations
+        for k in (plates.stiffness, rubbed(replace(TEST, **card), 1.0).friction):  # type: ignore[arg-type]
+            assert rubbing_share("partial", k, 15_200, 0.060) == pytest.approx(more)
 
 
 def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
@@ -55,7 +63,7 @@ def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
     template = files("validate.cli").joinpath("new_inclusion.py.txt").read_text("utf-8")
     assert "ranges=InclusionRanges(E=0.05, nu=0.005, friction=0.03)," in template
     assert InclusionRanges() == InclusionRanges(E=0.05, nu=0.005, friction=0.03)
-    assert rubbing_share("partial", rubbed(Phantom(), 1.0).friction, 15_200, 0.060) == (
+    assert rubbing_share("partial", rubbed(TEST, 1.0).friction, 15_200, 0.060) == (
         pytest.approx(0.03)
     )
 
@@ -63,13 +71,14 @@ def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
 def test_an_inputs_standard_uncertainty_is_its_own_range() -> None:
     """Modulus and nu up by their ranges, whatever else stays."""
     declared = find("ekf_cone", Path(__file__))
-    cone, gel = declared.parameters, Phantom()
+    cone, gel = declared.parameters, PHANTOM
     by = {i.name: i for i in declared.uncertainty.inputs}  # type: ignore[union-attr]
     moved = by["modulus"].by(2.0)(cone).scene.material
     assert pytest.approx(1.04 * cone.scene.material.E) == moved.E
     by = {i.name: i for i in find("fluid_phantom", Path(__file__)).uncertainty.inputs}  # type: ignore[union-attr]
-    assert pytest.approx(1.1 * gel.material.E) == by["modulus"].by(2.0)(gel).material.E
-    assert by["Poisson ratio"].by(2.0)(gel).material.nu == pytest.approx(gel.material.nu + 0.01)
+    assert pytest.approx(1.1 * gel.scene.material.E) == by["modulus"].by(2.0)(gel).scene.material.E
+    nu = by["Poisson ratio"].by(2.0)(gel).scene.material.nu
+    assert nu == pytest.approx(gel.scene.material.nu + 0.01)
 
 
 def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:

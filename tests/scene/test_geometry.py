@@ -2,18 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from validate.errors import SceneError, UsageError
+from validate.parameters import with_given
 from validate.scene.box import grid
 from validate.scene.geometry import Box, Cylinder, Geometry, MeshFile, SurfaceFile, cell_size
 from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import place_of
-from validate.scene.scene import Scene, Support
+from validate.scene.scene import Foundation, Membrane, Scene, Support
 from validate.scene.select import nodes_of
 
 HERE = Path()
@@ -80,3 +82,27 @@ def test_a_region_is_the_cells_in_a_box_of_the_bodys_own_material() -> None:
     (found,) = scene.resolved(BOX.resolved(HERE)).regions
     assert (found.material.E, found.material.nu) == (5e3, 0.3)
     assert len(found.cells) == 6 * 4 * 2 * 2
+
+
+def test_a_declared_foundation_slips_has_springs_or_holds_its_places() -> None:
+    """On every place that is joined by "+"; a sheet of no thickness is none."""
+    ground = Foundation("x0 + zmax", (1, 2), 1e5, "slip", "plates")
+    sheet = Membrane("z0", 0.0, Material(1e6, 0.3), "wall")
+    block = Box((1.0, 1.0, 1.0), cells=(1, 1, 1))
+    declared = Scene(block, Material(1.0, 0.3), foundations=(ground,), membranes=(sheet,))
+    mesh = block.resolved(Path())
+
+    def made(**changes: Any) -> Scene:
+        return with_given(declared, changes).resolved(mesh)  # type: ignore[no-any-return]
+
+    slips = declared.resolved(mesh)
+    assert (slips.supports, slips.foundations, slips.membranes) == ((), (), ())
+    held = made(**{"foundations.plates.contact": "bonded"})
+    assert [s.components for s in held.supports] == [(1, 2)] * 2
+    assert nodes_of(mesh, held.supports[1].facets).tolist() == nodes_of(mesh, "z1").tolist()
+    springs = made(**{"foundations.plates.contact": "partial", "membranes.wall.thickness": "1 mm"})
+    assert springs.foundations[0].facets == "x0"
+    assert [f.stiffness for f in springs.foundations] == [1e5, 1e5]
+    assert [m.thickness for m in springs.membranes] == [1e-3]
+    with pytest.raises(SceneError, match="foundation 'plates': contact 'slip' is of a declared"):
+        replace(slips, foundations=(replace(ground, facets="x0"),))

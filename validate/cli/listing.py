@@ -40,13 +40,18 @@ def declare(name: str, named: tuple[Path, ...]) -> None:
 
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
     """Every settable path of an experiment, methods included; a method's law with those choices
-    alone that it can take."""
+    alone that it can take, and what it changes of a declared scene as the scene says it."""
     laws = {f"methods.{name}.law": laws_of(m) for name, m in experiment.methods.items()}
-    methods = (
-        replace(p, type="|".join(known)) if (known := laws.get(p.path)) else p
-        for p in describe(experiment.methods, "methods.")
-    )
-    return (*describe(experiment.parameters), *methods)
+    own = describe(experiment.parameters)
+    by_path = {p.path: p for p in own}
+
+    def told(p: Parameter) -> Parameter:
+        if known := laws.get(p.path):
+            return replace(p, type="|".join(known))
+        of = None if p.doc else by_path.get(p.path.split(".", 2)[2])
+        return replace(p, type=of.type, unit=of.unit, doc=of.doc) if of else p
+
+    return (*own, *map(told, describe(experiment.methods, "methods.")))
 
 
 def _summary(experiment: Experiment) -> dict[str, Any]:

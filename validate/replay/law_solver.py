@@ -48,6 +48,30 @@ def with_laws(
     return methods, rest
 
 
+def with_declared_law(
+    name: str, method: Method, law: str, declared: Mapping[str, Method]
+) -> Method:
+    """A method of a declared scene, of which a user sets the law, with a solver of that law.
+
+    Raises as `with_laws` does.
+    """
+    static = isinstance(method.settings, (*_LINEAR, *_LARGE))
+    handles: Handles | None = getattr(method.settings, "handles", None)
+    possible = get_args(LawName) if static or handles is None else handles.law
+    if law not in possible:
+        raise _not_solved(f"methods.{name}.material.law", law, method, possible)
+    if handles is None or law in handles.law:
+        return method
+    return replace(method, settings=_solver(law, declared))
+
+
+def _not_solved(path: str, law: str, method: Method, possible: tuple[str, ...]) -> UsageError:
+    return UsageError(
+        f"{path}={law}: {type(method.settings).__name__} solves {', '.join(possible)}; set the law "
+        "of another method"
+    )
+
+
 def _is_law(declared: Mapping[str, Method], path: str) -> bool:
     name, _, field = path.partition(".")
     named = field in ("law", "scene.law") and name in declared
@@ -57,17 +81,14 @@ def _is_law(declared: Mapping[str, Method], path: str) -> bool:
 def _solved(name: str, method: Method, declared: Mapping[str, Method]) -> Method:
     law, possible = method.scene.law, laws_of(declared[name]) or ()
     if law not in possible:
-        raise UsageError(
-            f"methods.{name}.law={law}: {type(method.settings).__name__} solves "
-            f"{', '.join(possible)}; set the law of another method"
-        )
+        raise _not_solved(f"methods.{name}.law", law, method, possible)
     handles: Handles | None = getattr(method.settings, "handles", None)
     if handles is None or law in handles.law:
         return method
     return replace(method, settings=_solver(law, declared))
 
 
-def _solver(law: LawName, declared: Mapping[str, Method]) -> Any:
+def _solver(law: str, declared: Mapping[str, Method]) -> Any:
     kinds = _LINEAR if law == "linear" else _LARGE
     own = [m.settings for m in declared.values() if isinstance(m.settings, kinds)]
     if own:

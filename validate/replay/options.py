@@ -10,7 +10,7 @@ from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, has_path, nearest_names, with_given, with_values
 from validate.replay.experiment import Case, Experiment
 from validate.replay.guests import added_guests
-from validate.replay.law_solver import with_laws
+from validate.replay.law_solver import with_declared_law, with_laws
 from validate.replay.method import Method
 from validate.replay.tree import Tree
 from validate.scene.abaqus_lines import files_named
@@ -81,7 +81,14 @@ def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
         scene = {**(changed[name].scene or {}), inner: text}
         with_given(experiment.parameters, scene)
         changed[name] = replace(changed[name], scene=scene)
+        if inner == "material.law":
+            changed[name] = with_declared_law(name, changed[name], text, experiment.methods)
     return changed
+
+
+def _changed(method: Method) -> Mapping[str, Any]:
+    """What it changes of a declared scene, by path."""
+    return method.scene if isinstance(method.scene, Mapping) else {}
 
 
 def _of_scenes(
@@ -93,7 +100,8 @@ def _of_scenes(
         for path, text in values.items():
             name, _, inner = path.partition(".")
             method = experiment.methods.get(name)
-            if method and not has_path(method, inner) and has_path(experiment.parameters, inner):
+            of_scene = method and (inner in _changed(method) or not has_path(method, inner))
+            if of_scene and has_path(experiment.parameters, inner):
                 theirs[path] = text
     return {k: v for k, v in values.items() if k not in theirs}, theirs
 

@@ -40,9 +40,10 @@ def require_room(
 
 def coarser(name: str, parameters: Any, share: float) -> str:
     """The `--set`s that bring memory down to `share` of what it is, as far as parameters called
-    mesh.* say how fine the mesh is: counts and lengths of cells."""
+    mesh.* or body.cells say how fine the mesh is: counts and lengths of cells."""
     by = _MARGIN * share**_POWER
-    mesh = [p for p in describe(parameters) if p.path.startswith("mesh.")]
+    found = describe(parameters)
+    mesh = [p for p in found if p.path.startswith("mesh.") or p.path == "body.cells"]
     sets = [f"--set {p.path}={value}" for p in mesh if (value := _coarsened(p, by))]
     return f"such as {' '.join(sets)}" if sets else f"see `validate list {name}`"
 
@@ -52,6 +53,8 @@ def _coarsened(parameter: Parameter, by: float) -> str:
     value, last = parameter.default, parameter.path.rpartition(".")[2]
     if isinstance(value, bool) or last in _NO_COUNTS:
         return ""
+    if parameter.type.startswith("tuple[int") and value:
+        return ",".join(str(max(1, int(by * n))) for n in value)
     if isinstance(value, int):
         return str(max(1, int(by * value)))
     if isinstance(value, float) and parameter.unit == "m" and value > 0:

@@ -78,7 +78,9 @@ class CellSize:
     folder: Path = field(default=Path(), compare=False)
 
     def __call__(self, tree: Tree) -> float:
-        return cell_size(mesh_of(None, tree, self.folder))
+        """A body whose mesh follows from a recording says its own."""
+        own: float | None = getattr(tree.scene.body, "cell_size", None)
+        return cell_size(mesh_of(None, tree, self.folder)) if own is None else own
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Variations: a path of the parameters and a rule that says how its value changes.
 
-    {"twin.stiffness": 0.8, "membrane.thickness": "0.1 mm"}   values, of a case or an effect
+    {"twin.stiffness": 0.8, "membranes.wall.thickness": "0.1 mm"}   values, of a case or an effect
     {"material.E": "x 1.1", "mesh.cells": "+ 1"}              a factor, a step
     {"material.nu": "as nu.svk"}                              what another parameter has
     vary("material.E", "relative 3 %")                        one standard uncertainty of an input

@@ -1,7 +1,6 @@
 """A block on a floor, compressed between two plates."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -17,8 +16,9 @@ from validate.scene.scene import (
     Scene,
     Support,
 )
-
-Contact = Literal["slip", "partial", "bonded"]
+from validate.scene.scene import (
+    Contact as Contact,
+)
 
 _HALF = 4.0  # of E over the plates' distance: the stiffness at a share of one half (ours)
 

@@ -25,6 +25,7 @@ from validate.units import SYMBOLIC
 
 Dilatation = Literal["pointwise", "nodal_mean", "mixed"]
 PlaneState = Literal["strain", "stress"]
+Contact = Literal["slip", "partial", "bonded"]
 
 
 @dataclass(frozen=True)
@@ -193,11 +194,15 @@ class Foundation:
     """Springs from a facet set to the ground along some components: stiffness N/m^3.
 
     Zero lets the facets slip, infinity would bond them; what lies between is partial friction.
+    Declared, its `contact` may be either end as well: what slips has no springs, what is bonded is
+    held.
     """
 
     facets: Place = quantity(MISSING, "1", "where the springs are")
     components: tuple[int, ...] = quantity(MISSING, "1", "0, 1, 2: springs along x, y, z")
-    stiffness: float = quantity(MISSING, "N/m^3", "of the springs")
+    stiffness: float = quantity(MISSING, "N/m^3", "of the springs, if partial")
+    contact: Contact = quantity("partial", "1", "slips, has springs, or is held")
+    name: str = ""
 
     def __post_init__(self) -> None:
         take_units(self)
@@ -209,24 +214,29 @@ class Foundation:
 
 @dataclass(frozen=True)
 class Membrane:
-    """A taut elastic sheet glued to a facet set: thickness m."""
+    """A taut elastic sheet glued to a facet set: thickness m. Declared, one of 0 is none."""
 
     facets: Place = quantity(MISSING, "1", "where it is glued to the body")
-    thickness: float = quantity(MISSING, "m", "thickness")
+    thickness: float = quantity(MISSING, "m", "thickness; 0: none")
     material: Material = quantity(MISSING, "1", "of the sheet")
+    name: str = ""
 
     def __post_init__(self) -> None:
         take_units(self)
-        if not (np.isfinite(self.thickness) and self.thickness > 0):
-            raise SceneError(f"membrane thickness {self.thickness:g} m: expected a number above 0")
+        if not (np.isfinite(self.thickness) and self.thickness >= 0):
+            raise SceneError(f"membrane thickness {self.thickness:g} m: expected a number >= 0")
 
 
 @dataclass(frozen=True)
 class Cavity:
-    """A closed facet set filled with fluid at one gauge pressure Pa."""
+    """A closed facet set filled with fluid at one gauge pressure Pa.
+
+    Declared, "hole*" is every facet set whose name begins so, each with a fluid of its own: of the
+    cavity "hole" they are "hole0", "hole1".
+    """
 
     name: str
-    facets: str
+    facets: str = quantity(MISSING, "1", "closed facet set of its wall")
 
 
 @dataclass(frozen=True)
@@ -282,6 +292,8 @@ class Scene:
     def resolved(self, mesh: Mesh) -> "Scene":
         """The scene on this mesh of its body: words become places, symmetry holds its planes."""
         held = tuple(getattr(self.body, "held", ()))
+        sides = tuple(side for f in self.foundations for side in _sides(f))
+        bonded = tuple(Support(f.facets, f.components) for f in sides if f.contact == "bonded")
 
         def placed(parts: tuple[P, ...]) -> tuple[P, ...]:
             return tuple(_placed(part, mesh) for part in parts)
@@ -289,12 +301,13 @@ class Scene:
         return replace(
             self,
             body=mesh,
-            supports=placed((*self.supports, *held)),
+            supports=placed((*self.supports, *held, *bonded)),
             drives=placed(self.drives),
-            foundations=placed(self.foundations),
-            membranes=placed(self.membranes),
+            foundations=placed(tuple(f for f in sides if f.contact == "partial")),
+            membranes=placed(tuple(m for m in self.membranes if m.thickness)),
             loads=placed(self.loads),
             masses=placed(self.masses),
+            cavities=tuple(one for c in self.cavities for one in _each(c, mesh)),
             contacts=placed(self.contacts),
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
             copies=self.copies * getattr(self.body, "copies", 1),
@@ -340,6 +353,12 @@ class Scene:
                 raise SceneError(
                     f"a foundation, membrane or pressure on {kind_of(place)}; it needs an "
                     "area: choose faces"
+                )
+        for ground in self.foundations:
+            if ground.contact != "partial":
+                raise SceneError(
+                    f"foundation '{ground.name or ground.facets}': contact '{ground.contact}' is "
+                    "of a declared scene; on a mesh use a support, or no foundation"
                 )
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)
@@ -424,12 +443,34 @@ class Scene:
 P = TypeVar("P")
 
 
+def _sides(foundation: Foundation) -> tuple[Foundation, ...]:
+    """One for every place that is joined by "+"."""
+    if not isinstance(foundation.facets, str):
+        return (foundation,)
+    places = foundation.facets.split("+")
+    return tuple(replace(foundation, facets=place.strip()) for place in places)
+
+
 def _placed(part: P, mesh: Mesh) -> P:
     """A part whose place is words, on the facets that they choose."""
     facets = getattr(part, "facets", None)
     if not isinstance(facets, str) or facets in mesh.facets:
         return part
     return replace(part, facets=place_of(facets, mesh))  # type: ignore[type-var]
+
+
+def _each(cavity: Cavity, mesh: Mesh) -> tuple[Cavity, ...]:
+    """The cavities of a declared one, by facet set."""
+    if not cavity.facets.endswith("*"):
+        return (cavity,)
+    start = cavity.facets[:-1]
+    names = sorted(name for name in mesh.facets if name.startswith(start))
+    if not names:
+        raise SceneError(
+            f"cavity '{cavity.name}': no facet set begins with '{start}'; the body has "
+            f"{', '.join(sorted(mesh.facets)) or 'none'}"
+        )
+    return tuple(Cavity(cavity.name + name[len(start) :], name) for name in names)
 
 
 def _chosen(region: Region, mesh: Mesh, own: Material) -> Region:

@@ -1,7 +1,6 @@
 """How much the plates of paper 000's phantom rub, from how far its markers rise."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,39 +8,41 @@ from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.identify.interval import SAFETY, Interval, profile_interval
-from validate.papers.fluid_inclusion.phantom import Phantom
+from validate.papers.fluid_inclusion.effects import FINEST, MESHES, rubbing
+from validate.parameters import with_given
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified
-from validate.replay.inclusion import BLOCK_MESHES, gridded
 from validate.replay.method import Method
 from validate.replay.solved import solve
-from validate.scene.plates import plates_of_share
+from validate.replay.tree import Tree
 
+_LINEAR = {"body.element": "linear"}  # of mean dilatation
 SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
 
 
-def _rubbing(p: Phantom, share: float) -> Phantom:
-    plates, friction = plates_of_share(share, p.material.E, p.block.size.size_x)
-    return replace(p, mesh=replace(p.mesh, order=None), plates=plates, friction=friction)
-
-
 def friction_from_rise(
-    experiment: Experiment, method: Method, recordings: Sequence[Recording], parameters: Phantom
+    experiment: Experiment, method: Method, recordings: Sequence[Recording], parameters: Tree
 ) -> Identified:
     """Plate friction from the vertical rise of the markers, by one method of the experiment."""
 
-    def rise(share: float, p: Phantom) -> list[Residual]:
-        found = solve(experiment, tuple(recordings), "friction", method, _rubbing(p, share))
+    def rise(share: float, p: Tree) -> list[Residual]:
+        found = solve(
+            experiment,
+            tuple(recordings),
+            "friction",
+            method,
+            with_given(rubbing(p, share), _LINEAR),
+        )
         return [r for r in found.residuals.values() if r.quantity == "marker.vertical"]
 
     risen = [rise(float(share), parameters) for share in SHARES]
     weighed = np.array([_weighed(found) for found in risen])
     chi_square = (weighed**2).sum(axis=1)
     best = int(np.argmin(chi_square))
-    refined = gridded(None)(parameters)
+    refined = FINEST(parameters)
     finer = _weighed(rise(float(SHARES[best]), refined))
-    ratio = BLOCK_MESHES.size(parameters) / BLOCK_MESHES.size(refined)
-    mesh = _mesh_share(weighed, best, finer, ratio**BLOCK_MESHES.order - 1)
+    ratio = parameters.scene.body.cell_size / refined.scene.body.cell_size
+    mesh = _mesh_share(weighed, best, finer, ratio**MESHES.order - 1)
     fit = profile_interval(SHARES, chi_square, sum(r.count for r in risen[-1]), mesh)
     return Identified(parameters, _scores(fit), (_said(fit),))
 

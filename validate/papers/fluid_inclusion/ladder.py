@@ -1,47 +1,43 @@
 """The ladder of paper 000's phantom: meshes near its 1328 nodes, loads to 9 mm."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.papers.fluid_inclusion.phantom import PhantomModel, build
 from validate.recording.types import Recording
 from validate.replay.ladder import Ladder, Trial, marker_noise
 from validate.replay.ladder_solvers import ORDERS, still_best, still_pair
+from validate.replay.tree import Built, Tree
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.candidates import StillBody
 from validate.solve.schemes import candidates
 
-GRIDS = {7: (7, 8, 11), 9: (9, 10, 15), 11: (11, 13, 19)}  # nodes along x, y, z by level
+GRIDS = {7: (6, 7, 10), 9: (8, 9, 14), 11: (10, 12, 18)}  # cells along x, y, z by level
 _DEEPEST = 0.009  # m, the last load of the experiment
 _TABLE = 0.0015  # m between the loads that large strain is solved at
 _ELEMENTS: Mapping[str, dict[str, Any]] = {
-    "P1": {"order": 1}, "MD": {"order": 1, "dilatation": "nodal_mean"}, "P2": {"order": 2},
+    "P1": {"body.element": "linear"}, "P2": {"body.element": "quadratic"},
+    "MD": {"body.element": "linear", "dilatation": "nodal_mean"},
 }  # fmt: skip
 
 
-def phantom_trial(
-    build: Callable[[Recording, Any, Any], Scene], method: Any, recording: Recording, p: Any,
-    quick: bool,
-) -> Trial:  # fmt: skip
-    """By the experiment's `build`; `method` has its `order`, `dilatation` and `law` changed."""
+def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
+    """A level is the number of nodes along x."""
 
     def scene(element: str, level: int, law: LawName) -> Scene:
-        x, y, z = GRIDS[level]
-        mesh = replace(p.mesh, nodes_x=x, nodes_y=y, nodes_z=z)
-        changed = replace(method, law=law, **_ELEMENTS[element])
-        return build(recording, replace(p, mesh=mesh), changed)
+        changes = {"body.cells": GRIDS[level], "material.law": law, **_ELEMENTS[element]}
+        return Built()(recording, tree, changes)
 
     rise = _DEEPEST / _fastest(recording)
     fine = (7, 9) if quick else (7, 9, 11)
     return Trial(
         build=scene,
-        size=lambda level: _cell_size(p, level),
+        size=lambda level: replace(tree.scene.body, cells=GRIDS[level]).cell_size,
         meshes={"P1": fine, "MD": fine, "P2": (7,) if quick else (7, 9)},
         orders=ORDERS,
         steps=(rise / 6, rise / 240),
@@ -60,12 +56,6 @@ def phantom_trial(
             "scheme with inertia runs here.",
         ),
     )
-
-
-def _cell_size(p: Any, level: int) -> float:
-    x, y, z = GRIDS[level]
-    volume = p.block.size.sizes.prod()
-    return float((volume / ((x - 1) * (y - 1) * (z - 1))) ** (1 / 3))
 
 
 def _points(mesh: Mesh) -> Floats:
@@ -88,8 +78,4 @@ def _fastest(recording: Recording) -> float:
     return float(np.abs(np.diff(y)).max())
 
 
-def _trial(recording: Recording, parameters: Any, quick: bool) -> Trial:
-    return phantom_trial(build, PhantomModel(), recording, parameters, quick)
-
-
-LADDER = Ladder(_trial)
+LADDER = Ladder(trial)

@@ -18,9 +18,8 @@ from validate.papers.fluid_inclusion.swept import (
     swept,
 )
 from validate.papers.fluid_inclusion.twin import PhantomTwin, record_phantom
-from validate.parameters import quantity
+from validate.parameters import quantity, take_units
 from validate.recording.images.outline import outlines_of
-from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.fitting import MarkerFit
 from validate.register.markers import Sampling, Together
@@ -32,21 +31,13 @@ from validate.register.sensing import ForceSensing, PressureSensing
 from validate.register.signals import SignalObservation
 from validate.register.sweep import Stack
 from validate.replay.experiment import Progress
-from validate.replay.inclusion import (
-    BlockCard,
-    BlockGrid,
-    GelCard,
-    InclusionRanges,
-    Streams,
-    measured_capsule,
-    placed,
-    pressed_block,
-)
-from validate.scene.inclusion import Capsule, block_with_inclusion
+from validate.replay.inclusion import InclusionRanges, Streams, measured_capsule, placed
+from validate.replay.tree import Tree, beside
+from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.inclusion_shape import InclusionShape
-from validate.scene.material import LawName, Material
-from validate.scene.plates import Contact
-from validate.scene.scene import Dilatation, Membrane, Scene
+from validate.scene.mesh import Mesh, quadratic
+from validate.scene.scene import Scene
+from validate.scene.similar_grids import member
 
 
 @dataclass(frozen=True)
@@ -72,23 +63,46 @@ class InclusionCard:
         given = [name for name in own if getattr(self, name) is not None]
         if self.shape == "sweep" and given:
             raise UsageError(
-                f"inclusion.{given[0]} applies to a capsule; a sweep contains the place of its "
-                "inclusion: set inclusion.wider or inclusion.longer"
+                f"body.inclusion.{given[0]} applies to a capsule; a sweep contains the place "
+                "of its inclusion: set body.inclusion.wider or body.inclusion.longer"
             )
 
 
 @dataclass(frozen=True)
-class WallCard:
-    thickness: float = quantity(0.0, "m", "latex membrane on the wall of the cavity; 0: none")
-    E: float = quantity(1.2e6, "Pa", "modulus of latex, small strain")
-    nu: float = quantity(0.49, "1", "Poisson ratio of latex")
+class PhantomBody:
+    """The body of a scene: a block with an inclusion that the recording shows."""
 
-
-@dataclass(frozen=True)
-class PhantomGrid(BlockGrid):
-    order: Literal[1, 2] | None = quantity(
-        None, "1", "1 or 2 for every method; none: as each method declares"
+    x: float = quantity(0.060, "m", "distance from the fixed to the moving plate")
+    y: float = quantity(0.045, "m", "height")
+    z: float = quantity(0.070, "m", "lateral size")
+    cells: tuple[int, ...] = quantity(
+        (8, 9, 14), "1", "cells along x, y, z (8 x 9 x 14 has the 1328 nodes of paper 000)"
     )
+    element: Literal["linear", "quadratic"] = quantity("linear", "1", "element order")
+    inclusion: InclusionCard = InclusionCard()
+
+    def __post_init__(self) -> None:
+        take_units(self)
+        if len(self.cells) != 3:
+            raise UsageError(f"body.cells = {self.cells}: expected three numbers of cells")
+
+    @property
+    def block(self) -> Block:
+        return Block(self.x, self.y, self.z)
+
+    @property
+    def cell_size(self) -> float:
+        """The edge m of a cube as large as a mean cell of the block without its inclusion."""
+        return float(np.cbrt(self.block.sizes.prod() / np.prod(self.cells)))
+
+    def scaled(self, share: float) -> "PhantomBody":
+        return replace(self, cells=member(self.cells, share))
+
+    def __call__(self, recording: Recording, tree: Tree) -> Mesh:
+        x, y, z = self.cells
+        grid = (x + 1, y + 1, z + 1)
+        mesh = block_with_inclusion(self.block, grid, inclusion(recording, tree))
+        return quadratic(mesh) if self.element == "quadratic" else mesh
 
 
 @dataclass(frozen=True)
@@ -121,90 +135,52 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Phantom:
-    """Everything that can be set; `recording` is a path."""
+    """What no scene holds."""
 
-    material: GelCard = GelCard(15_200.0, 0.485)
-    block: BlockCard = BlockCard(0.060, 0.045, 0.070)
-    inclusion: InclusionCard = InclusionCard()
-    membrane: WallCard = WallCard()
-    mesh: PhantomGrid = PhantomGrid()
     registration: Placing = Placing()
     sensors: Sensors = field(default_factory=Sensors)
     ranges: PhantomRanges = PhantomRanges()
     twin: PhantomTwin = PhantomTwin()
-    plates: Literal["as_method", "slip", "partial", "bonded"] = quantity(
-        "as_method", "1", "contact of both plates, for every method"
-    )
-    friction: float = quantity(1e5, "N/m3", "tangential stiffness of the plates, if partial")
-    loads: tuple[float, ...] = quantity((0.003, 0.006, 0.009), "m", "stage positions compared")
+    positions: tuple[float, ...] = quantity((0.003, 0.006, 0.009), "m", "stage positions compared")
     outlines: Literal["recorded", "images"] = quantity(
         "recorded", "1", "outlines as recorded, or extracted from the B-mode images"
     )
-    recording: str | None = quantity(None, "1", "MCAP file; none: the shipped one")
 
 
-@dataclass(frozen=True)
-class PhantomModel:
-    """What a method's scene is built with."""
-
-    order: Literal[1, 2] = quantity(1, "1", "element order")
-    dilatation: Dilatation = quantity("pointwise", "1", "volume strain per cell or nodal mean")
-    law: LawName = quantity("linear", "1", "linear, or at large strain svk or neo_hooke")
-    plates: Contact = quantity("slip", "1", "contact of both plates")
+def record(tree: Tree, progress: Progress) -> Recording:
+    twin, scene = tree.settings.twin, tree.scene
+    material = replace(scene.material, law=twin.law)
+    return record_phantom(twin, scene.body.block, material, progress)
 
 
-def record(parameters: Phantom, progress: Progress) -> Recording:
-    p = parameters
-    material = Material(p.material.E, p.material.nu, p.twin.law)
-    return record_phantom(p.twin, p.block.size, material, progress)
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return tuple(read(recording, tree) for recording in beside(tree, folder))
 
 
-def load(parameters: Phantom, folder: Path) -> tuple[Recording, ...]:
-    named = parameters.recording
-    path = Path(named) if named else folder.parent / "recordings" / "fluid_phantom.mcap"
-    return (read(read_recording(path), parameters),)
-
-
-def read(recording: Recording, parameters: Phantom) -> Recording:
+def read(recording: Recording, tree: Tree) -> Recording:
     """The recording with the outlines that are to be used."""
-    if parameters.inclusion.shape == "sweep":
+    if tree.scene.body.inclusion.shape == "sweep":
         recording = outlined_sweep(recording)
-    if parameters.outlines == "recorded":
+    if tree.settings.outlines == "recorded":
         return recording
     outlines = outlines_of(recording.frame(IMAGES), images=IMAGES)
     return replace(recording, contours={**recording.contours, "outline": outlines})
 
 
-def build(recording: Recording, parameters: Phantom, model: PhantomModel) -> Scene:
-    p = parameters
-    mesh = block_with_inclusion(p.block.size, p.mesh.nodes, inclusion(recording, p))
-    material = Material(p.material.E, p.material.nu, model.law)
-    contact = model.plates if p.plates == "as_method" else p.plates
-    return pressed_block(
-        mesh, material, contact, p.mesh.order or model.order, model.dilatation,
-        friction=p.friction, membrane=_membrane(p.membrane),
-    )  # fmt: skip
-
-
-def _membrane(wall: WallCard) -> tuple[Membrane, ...]:
-    if wall.thickness == 0:
-        return ()
-    return (Membrane("cavity", wall.thickness, Material(wall.E, wall.nu)),)
-
-
-def place(recording: Recording, parameters: Phantom, scene: Scene) -> Registered:
-    p = parameters
-    contours = _shifted(recording.contour("outline"), p)
-    found, how = measured_inclusion(recording, p), p.registration
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+    p: Phantom = tree.settings
+    contours = _shifted(recording.contour("outline"), tree)
+    found, how = measured_inclusion(recording, tree), p.registration
     shape = None if how.wall == "facets" else found
     wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
     seen = placed(
-        recording, contours, scene, wall, STREAMS, SIGNALS, p.loads, TOP_FACE,
+        recording, contours, scene, wall, STREAMS, SIGNALS, p.positions, TOP_FACE,
         corners=(TOP_LEFT,), how=how, sampling=how.sampling,
     )  # fmt: skip
-    told = (off_circles(_stack(recording, p)),) if p.inclusion.shape == "sweep" else ()
+    swept_one = tree.scene.body.inclusion.shape == "sweep"
+    told = (off_circles(_stack(recording, tree)),) if swept_one else ()
     observations = tuple(map(p.sensors.of, seen.observations))
-    misplaced = _misplaced(found, inclusion(recording, p))
+    misplaced = _misplaced(found, inclusion(recording, tree))
     return replace(seen, observations=observations, findings=(*told, *misplaced))
 
 
@@ -238,12 +214,12 @@ def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, .
     )
 
 
-def inclusion(recording: Recording, parameters: Phantom) -> InclusionShape:
+def inclusion(recording: Recording, tree: Tree) -> InclusionShape:
     """The inclusion that is meshed: what the user set, else what was measured."""
-    mine = parameters.inclusion
+    mine: InclusionCard = tree.scene.body.inclusion
     if mine.shape == "sweep":
-        return swept(_stack(recording, parameters), mine.free, mine.wider, mine.longer)
-    measured = _outlined(recording, parameters)
+        return swept(_stack(recording, tree), mine.free, mine.wider, mine.longer)
+    measured = _outlined(recording, tree)
     own = (mine.centre_x, mine.centre_y, mine.centre_z)
     x, y, z = (m if o is None else o for o, m in zip(own, measured.centre, strict=True))
     return Capsule(
@@ -253,27 +229,29 @@ def inclusion(recording: Recording, parameters: Phantom) -> InclusionShape:
     )
 
 
-def measured_inclusion(recording: Recording, parameters: Phantom) -> InclusionShape:
+def measured_inclusion(recording: Recording, tree: Tree) -> InclusionShape:
     """The inclusion as measured: by the rest outline and the declared sweep, or by the sweep."""
-    capsule = _outlined(recording, parameters)  # which refuses a mirrored image
-    if parameters.inclusion.shape == "capsule":
+    capsule = _outlined(recording, tree)  # which refuses a mirrored image
+    if tree.scene.body.inclusion.shape == "capsule":
         return capsule
-    return swept(_stack(recording, parameters), parameters.inclusion.free)
+    return swept(_stack(recording, tree), tree.scene.body.inclusion.free)
 
 
-def _outlined(recording: Recording, parameters: Phantom) -> Capsule:
+def _outlined(recording: Recording, tree: Tree) -> Capsule:
     """Centre x, z and radius of the rest outline; height and length from the declared sweep."""
-    contours = _shifted(recording.contour("outline"), parameters)
-    moved = abs(parameters.registration.image_shift_x) + abs(parameters.registration.image_shift_z)
+    contours = _shifted(recording.contour("outline"), tree)
+    how: Placing = tree.settings.registration
+    moved = abs(how.image_shift_x) + abs(how.image_shift_z)
     return measured_capsule(recording, contours, STREAMS, moved)
 
 
-def _stack(recording: Recording, parameters: Phantom) -> Stack:
-    sweep = _shifted(recording.contour(SWEEP), parameters)
+def _stack(recording: Recording, tree: Tree) -> Stack:
+    sweep = _shifted(recording.contour(SWEEP), tree)
     return stack_of(recording, sweep, recording.signal(STREAMS.stage, "m"))
 
 
-def _shifted(contours: Contours, parameters: Phantom) -> Contours:
+def _shifted(contours: Contours, tree: Tree) -> Contours:
     pose = contours.pose.copy()
-    pose[[0, 2], 3] += parameters.registration.image_shift_x, parameters.registration.image_shift_z
+    how: Placing = tree.settings.registration
+    pose[[0, 2], 3] += how.image_shift_x, how.image_shift_z
     return replace(contours, pose=pose)

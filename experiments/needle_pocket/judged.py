@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from validate.compare.verdict import Accept
-from validate.papers.needle_pocket.pocket import NeedlePocket
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
 from validate.replay.live import LIVE, as_given
 from validate.replay.remade import made_here
+from validate.replay.tree import Tree
 
 _PLANE = 25.0  # N/m over N: what a force limit in the plane is worth in the solid's
 
 
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: NeedlePocket) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], p: Tree) -> Experiment:
     """The experiment as its recording has it: a path of the user's own is walked as it is."""
     recording = recordings[0]
     accept = tuple(_of_space(a, p) for a in experiment.accept)
@@ -27,6 +27,6 @@ def follows(experiment: Experiment, recordings: Sequence[Recording], p: NeedlePo
     return replace(experiment, accept=there, twin=replace(twin, remake=()))
 
 
-def _of_space(accept: Accept, p: NeedlePocket) -> Accept:
-    force = accept.quantity.startswith("force") and p.body.space == "solid"
+def _of_space(accept: Accept, p: Tree) -> Accept:
+    force = accept.quantity.startswith("force") and p.scene.body.space == "solid"
     return replace(accept, limit=accept.limit / _PLANE) if force and accept.limit else accept

@@ -7,18 +7,19 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.fem.condense import Condensed, condense
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.papers.fluid_block.block import FluidBlock, slab
 from validate.replay.experiment import Progress
-from validate.scene.material import Material
+from validate.replay.tree import Tree
 from validate.scene.select import nodes_of
 from validate.solve.swap import Swapped
+
+from .block import slab
 
 _SWAPS = 10_000
 _NU = 0.485  # the phantom's
 _SHORT = (0.3, 3e-2, 1e-2, 1e-4, 1e-6, 1e-8, 2e-10)  # 1 - 2 nu
 
 
-def exactness_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
+def exactness_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
     """Two tables, and the errors as numbers."""
     progress("swaps on the condensed system")
     swaps, error = _swaps(p)
@@ -32,14 +33,13 @@ def exactness_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[
     return Exhibit("condensation", "Condensation", words, tables), {"swaps.error": error}
 
 
-def _small(p: FluidBlock, nu: float) -> tuple[System, Condensed]:
-    scene = slab(p.body, p.cavities, p.mesh.squares, p.mesh.order or 1,
-                 Material(p.material.E, nu), None)  # fmt: skip
+def _small(p: Tree, nu: float) -> tuple[System, Condensed]:
+    scene = slab(p, None, {"material.nu": nu})
     system = build_system(scene)
     return system, condense(system, nodes_of(scene.mesh, "top"))
 
 
-def _swaps(p: FluidBlock) -> tuple[NumberTable, float]:
+def _swaps(p: Tree) -> tuple[NumberTable, float]:
     system, small = _small(p, _NU)
     random = np.random.default_rng(0)
     free = small.free
@@ -76,7 +76,7 @@ def _beside_the_whole(system, small, swapped, u, f) -> float:  # type: ignore[no
     return float(np.abs(whole[place] - u).max() / np.abs(whole).max())
 
 
-def _conditions(p: FluidBlock) -> NumberTable:
+def _conditions(p: Tree) -> NumberTable:
     rows: list[tuple[Entry, ...]] = []
     for short in _SHORT:
         _, small = _small(p, (1 - short) / 2)

@@ -1,28 +1,30 @@
 """What `needle_pocket` shows beside its verdicts, and the printed figures of sections 5.2, 5.3."""
 
 from collections.abc import Mapping
-from typing import Any, cast
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.published import Figure
-from validate.papers.needle_pocket.loops import energy_exhibit, hysteresis_exhibit
-from validate.papers.needle_pocket.pocket import POCKET, TOOL, NeedlePocket
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
+from validate.replay.tree import Tree
 from validate.scene.mesh import Mesh
 from validate.solve.haptic import DEVICE_HZ, QUANTILES, TickTimes
+
+from .loops import energy_exhibit, hysteresis_exhibit
+from .pocket import TOOL
+from .scene import POCKET
 
 _PAPER = "paper"
 _PERCENT = 100.0
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the needle, and the numbers of its printed figures."""
-    p, main = cast(NeedlePocket, parameters), cases[""]
+    main = cases[""]
     progress("volume and updates")
     scope, numbers = _scope(main)
     ticks, met = _ticks(main)
@@ -121,8 +123,8 @@ def _ticks(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
 # --- shapes ---------------------------------------------------------------------------------------
 
 
-def _shape_words(p: NeedlePocket) -> tuple[str, ...]:
-    spread = "grows as the logarithm of" if p.body.space == "plane" else "falls with"
+def _shape_words(p: Tree) -> tuple[str, ...]:
+    spread = "grows as the logarithm of" if p.scene.body.space == "plane" else "falls with"
     return (
         f"The tip is a point: its stiffness is that of the mesh around it, which {spread} the "
         "cell size, so force and pressure do not converge with finer meshes. The paper's "

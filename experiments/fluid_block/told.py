@@ -1,41 +1,31 @@
 """What `fluid_block` shows beside its verdicts, and the printed figures of section 3.3."""
 
-from typing import Any, cast
-
 import numpy as np
 
 from validate.compare.published import Figure
-from validate.papers.fluid_block.block import FluidBlock
-from validate.papers.fluid_block.curves import (
-    condensed_block,
-    curve_exhibit,
-    curve_of,
-    kept,
-    shapes_exhibit,
-)
-from validate.papers.fluid_block.exactness import exactness_exhibit
-from validate.papers.fluid_block.other_laws import laws_exhibit
-from validate.papers.fluid_block.updates import (
-    pressed,
-    several_exhibit,
-    updates_exhibit,
-)
 from validate.papers.stated import taken
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases
+from validate.replay.tree import Tree
 from validate.solve.pressure_curve import RATIOS
 from validate.solve.pressure_loop import PressureLoop
 
+from .block import PressedBlock
+from .curves import condensed_block, curve_exhibit, curve_of, kept, shapes_exhibit
+from .exactness import exactness_exhibit
+from .other_laws import laws_exhibit
+from .scene import SCENE
+from .updates import pressed, several_exhibit, updates_exhibit
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+
+def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
     """All exhibits of the block, and the numbers of its printed figures."""
-    p = cast(FluidBlock, parameters)
     progress("pressure against volume")
     curves = []
     for order in (1, 2):
         small = condensed_block(p, order)
-        curves += [(f"{k + 1} of {p.cavities.count}, P{order}", curve_of(small, k))
-                   for k in range(p.cavities.count)]  # fmt: skip
+        curves += [(f"{k + 1} of {p.scene.body.cavities.count}, P{order}", curve_of(small, k))
+                   for k in range(p.scene.body.cavities.count)]  # fmt: skip
     first = curves[0][1]
     updates, counted = updates_exhibit(p, progress)
     several, radii = several_exhibit(p, progress)
@@ -54,7 +44,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
 
 
 _ASSUMED = "cavity, boundary, plane state and tool are not printed: ours"
-_P = FluidBlock()
+_P = PressedBlock()
 
 
 def _drawn(name: str, number: str, theirs: float | None, unit: str, source: str,
@@ -78,15 +68,15 @@ FIGURES = (
     ),
     _drawn("updates to 1 %, cold start, .3..15 % strain, under a patch", "patch.cold", 1.0, "1",
            "section 3.3", _ASSUMED),
-    taken("width of the block", 0.05, _P.body.width, "m", "section 3.3"),
-    taken("height of the block", 0.05, _P.body.height, "m", "section 3.3"),
+    taken("width of the block", 0.05, SCENE.body.width, "m", "section 3.3"),
+    taken("height of the block", 0.05, SCENE.body.height, "m", "section 3.3"),
     Figure(
         "thickness of the block", None, 0.012, None, "m", "not comparable",
         "plane: forces are per metre, and a thickness changes neither pressure nor volume ratio",
         "section 3.3", setting=True,
     ),
-    taken("modulus of the block", 34e3, _P.material.E, "Pa", "section 3.3"),
-    taken("Poisson ratio of the block", 0.35, _P.material.nu, "1", "section 3.3"),
+    taken("modulus of the block", 34e3, SCENE.material.E, "Pa", "section 3.3"),
+    taken("Poisson ratio of the block", 0.35, SCENE.material.nu, "1", "section 3.3"),
     taken("least strain", 0.003, _P.strains[0], "1", "section 3.3",
           "read as displacement over height"),
     taken("largest strain", 0.15, _P.strains[-1], "1", "section 3.3",

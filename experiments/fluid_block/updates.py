@@ -15,13 +15,15 @@ from validate.errors import SceneError
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
 from validate.fem.system import responses as responses_of
-from validate.papers.fluid_block.block import FluidBlock, ToolName, slab
 from validate.replay.experiment import Progress
-from validate.scene.material import Material
+from validate.replay.tree import Tree
+from validate.scene.hollow_block import HollowBlock
 from validate.solve.fluid import ExactPressure
 from validate.solve.pressure_curve import tuned_gain
 from validate.solve.pressure_loop import PressureLoop, UpdateName, gain_matrix, spectral_radius
 from validate.solve.types import Scheme, State
+
+from .block import ToolName, slab
 
 TOLERANCES = (1e-2, 1e-3, 1e-12)
 TOOLS: tuple[ToolName, ...] = ("needle", "patch", "plate")
@@ -33,15 +35,15 @@ _MOST = 500
 _SEPTA = (0.25, 0.5, 1.0, 2.0)  # of the septum as set
 
 
-def pressed(p: FluidBlock, tool: ToolName, finer: int = 1, **cavities: Any) -> Responses:
+def pressed(p: Tree, tool: ToolName, finer: int = 1, **cavities: Any) -> Responses:
     """The block of linear triangles under a tool, on a mesh so many times as fine."""
-    material = Material(p.material.E, p.material.nu)
-    made = replace(p.cavities, **cavities)
-    scene = slab(p.body, made, finer * p.mesh.squares, p.mesh.order or 1, material, tool)
+    body: HollowBlock = p.scene.body
+    made = replace(body.cavities, **cavities)
+    scene = slab(p, tool, {"body.cells": finer * body.cells, "body.cavities": made})
     return responses_of(build_system(scene))
 
 
-def updates_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
+def updates_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
     """Tables of updates by law and strain for each tool, a chart, and the printed claims."""
     tables: list[NumberTable] = []
     lines: list[Series] = []
@@ -50,8 +52,8 @@ def updates_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
         progress(f"updates under a {tool}")
         r = pressed(p, tool)
         cold = _cold(r, p)
-        tables.append(_table(tool, p.strains, cold))
-        lines.append(Series(f"{tool}, the paper's law to 1 %", 100 * np.array(p.strains),
+        tables.append(_table(tool, p.settings.strains, cold))
+        lines.append(Series(f"{tool}, the paper's law to 1 %", 100 * np.array(p.settings.strains),
                             _seen(cold["proportional", 1e-2]), "points"))  # fmt: skip
         numbers |= {f"{tool}.cold": max(_seen(cold["proportional", 1e-2]))}
         tables.append(_warm_table(tool, r, p))
@@ -71,11 +73,11 @@ def updates_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
     return Exhibit("updates", "Updates of the pressure", words, tuple(tables), (chart,)), numbers
 
 
-def _laws(p: FluidBlock) -> tuple[UpdateName, ...]:
-    return _ONE if p.cavities.count == 1 else _SEVERAL
+def _laws(p: Tree) -> tuple[UpdateName, ...]:
+    return _ONE if p.scene.body.cavities.count == 1 else _SEVERAL
 
 
-def _cold(r: Responses, p: FluidBlock) -> dict[tuple[str, float], list[State]]:
+def _cold(r: Responses, p: Tree) -> dict[tuple[str, float], list[State]]:
     """States by law and tolerance at every strain, each from rest."""
     found: dict[tuple[str, float], list[State]] = {}
     for name in _laws(p):
@@ -87,9 +89,12 @@ def _cold(r: Responses, p: FluidBlock) -> dict[tuple[str, float], list[State]]:
     return found
 
 
-def _states(scheme: Scheme, r: Responses, p: FluidBlock) -> list[State]:
+def _states(scheme: Scheme, r: Responses, p: Tree) -> list[State]:
     stepper = scheme.on(r)  # type: ignore[attr-defined]
-    return [stepper.step(stepper.rest(), np.array([s * p.body.height])) for s in p.strains]
+    return [
+        stepper.step(stepper.rest(), np.array([s * p.scene.body.height]))
+        for s in p.settings.strains
+    ]
 
 
 def _seen(states: Sequence[State]) -> Floats:
@@ -109,18 +114,18 @@ def _table(
                        tuple(rows))  # fmt: skip
 
 
-def _warm(scheme: Scheme, r: Responses, p: FluidBlock) -> list[State]:
+def _warm(scheme: Scheme, r: Responses, p: Tree) -> list[State]:
     """States along the strains, each begun at the last one's pressure, until one fails."""
     stepper = scheme.on(r)  # type: ignore[attr-defined]
     found = [stepper.rest()]
-    for s in p.strains:
-        found.append(stepper.step(found[-1], np.array([s * p.body.height])))
+    for s in p.settings.strains:
+        found.append(stepper.step(found[-1], np.array([s * p.scene.body.height])))
         if found[-1].failure:
             break
     return found[1:]
 
 
-def _warm_table(tool: str, r: Responses, p: FluidBlock) -> NumberTable:
+def _warm_table(tool: str, r: Responses, p: Tree) -> NumberTable:
     loops: list[tuple[str, float, Scheme]] = [
         (name, tolerance, PressureLoop(update=name, tolerance=tolerance, max_updates=_MOST))
         for name in _laws(p)
@@ -130,10 +135,10 @@ def _warm_table(tool: str, r: Responses, p: FluidBlock) -> NumberTable:
     for name, tolerance, scheme in (*loops, ("exact", 1e-12, ExactPressure())):
         states = _warm(scheme, r, p)
         counts: list[Entry] = [None if s.failure else s.updates for s in states]
-        counts += [None] * (len(p.strains) - len(counts))
+        counts += [None] * (len(p.settings.strains) - len(counts))
         ends = "all settled" if states[-1].failure is None else states[-1].failure[0]
         rows.append((name, f"{tolerance:g}", *counts, ends))
-    heads = ("law", "tolerance of V/V0", *(f"{100 * s:g} %" for s in p.strains), "outcome")
+    heads = ("law", "tolerance of V/V0", *(f"{100 * s:g} %" for s in p.settings.strains), "outcome")
     return NumberTable(f"updates_warm_{tool}", f"Under a {tool}, each begun at the last pressure.",
                        heads, tuple(rows), folded=True)  # fmt: skip
 
@@ -141,7 +146,7 @@ def _warm_table(tool: str, r: Responses, p: FluidBlock) -> NumberTable:
 # --- several cavities -----------------------------------------------------------------------------
 
 
-def several_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
+def several_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, float]]:
     """One to three cavities and thinner septa: scalar gains, one common, the matrix."""
     progress("several cavities")
     rows: list[tuple[Entry, ...]] = []
@@ -149,16 +154,17 @@ def several_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
     alone = tuned_gain(pressed(p, "plate", 2, count=1))
     loops = {g: PressureLoop(gains=g, max_updates=_MOST) for g in ("own", "common", "matrix")}
     loops["one cavity's"] = PressureLoop(gain=alone, max_updates=_MOST)
+    septum = p.scene.body.cavities.septum
     for count in (1, 2, 3):
         for share in _SEPTA if count > 1 else (1.0,):
             try:
-                r = pressed(p, "plate", 2, count=count, septum=share * p.cavities.septum)
+                r = pressed(p, "plate", 2, count=count, septum=share * septum)
             except SceneError as refused:
-                rows.append((count, 1e3 * share * p.cavities.septum, "-", None, None, str(refused)))
+                rows.append((count, 1e3 * share * septum, "-", None, None, str(refused)))
                 continue
             for gains, loop in loops.items():
                 row, radius = _row(r, p, gains, loop)
-                rows.append((count, 1e3 * share * p.cavities.septum, *row))
+                rows.append((count, 1e3 * share * septum, *row))
                 numbers[f"{count}.{share:g}.{gains}"] = radius
     table = NumberTable(
         "several", "The plate at the largest strain, to 1 % from a cold start.",
@@ -177,10 +183,8 @@ def several_exhibit(p: FluidBlock, progress: Progress) -> tuple[Exhibit, dict[st
     return Exhibit("several", "Several cavities", words, (table,)), numbers
 
 
-def _row(
-    r: Responses, p: FluidBlock, gains: str, loop: PressureLoop
-) -> tuple[tuple[Entry, ...], float]:
-    drive = np.array([p.strains[-1] * p.body.height])
+def _row(r: Responses, p: Tree, gains: str, loop: PressureLoop) -> tuple[tuple[Entry, ...], float]:
+    drive = np.array([p.settings.strains[-1] * p.scene.body.height])
     exact = ExactPressure().on(r)
     solved = exact.step(exact.rest(), drive)
     z = np.concatenate([[1.0], solved.inner.z])

@@ -7,43 +7,32 @@ synthetic path. A path of your own: `--set recording=FILE`; in 3-D: `--set body.
 
 from validate.compare.expected import Expected
 from validate.compare.verdict import Accept
-from validate.papers.needle_pocket.judged import follows
-from validate.papers.needle_pocket.pocket import (
-    NeedlePocket,
-    build,
-    cell_size,
-    load,
-    place,
-    refined,
-    sets,
-)
-from validate.papers.needle_pocket.pocket import PocketModel as Model
-from validate.papers.needle_pocket.stated import STATED
-from validate.papers.needle_pocket.told import FIGURES, tell
-from validate.papers.needle_pocket.twin import record
-from validate.replay.experiment import Experiment, MeshLadder, Twin, Uncertainty, vary
+from validate.replay.experiment import Experiment, Twin, Uncertainty, vary
 from validate.replay.method import Method
 from validate.solve.needle import NeedleLoop
 
+from .judged import follows
+from .pocket import NeedlePocket, build, load, place, sets
+from .scene import SCENE
+from .stated import STATED
+from .told import FIGURES, tell
+from .twin import record
+
 PAPER = NeedleLoop(update="proportional", at="node", force="reaction")
-METHODS = {
-    "p2_exact": Method("P2, exact pressure", NeedleLoop(), Model(2)),
-    "p1_exact": Method("P1, exact pressure", NeedleLoop(), Model()),
-    "paper": Method("P1, the paper's law to .1 %", PAPER, Model()),
-    "p1_dry": Method("P1 without fluid", NeedleLoop(), Model(fluid=False)),
-}
-INPUTS = (
-    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
-    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
-         "nu within its declared uncertainty"),
-)  # fmt: skip
+P2 = {"body.element": "quadratic"}
 
 EXPERIMENT = Experiment(
     name="needle_pocket",
     title="Needle at haptic rate in a body with a fluid pocket",
     source="Gosline, Salcudean, Yan (2004), section 5.2",
-    parameters=NeedlePocket(),
-    methods=METHODS,
+    scene=SCENE,
+    settings=NeedlePocket(),
+    methods={
+        "p2_exact": Method("P2, exact pressure", NeedleLoop(), P2),
+        "p1_exact": Method("P1, exact pressure", NeedleLoop()),
+        "paper": Method("P1, the paper's law to .1 %", PAPER),
+        "p1_dry": Method("P1 without fluid", NeedleLoop(), {"cavities": ()}),
+    },
     accepted=("p2_exact",),
     accept=(
         # Wide: what a point feels depends on the mesh, and less could not be decided.
@@ -61,9 +50,13 @@ EXPERIMENT = Experiment(
     build=build,
     place=place,
     sets=sets,
-    uncertainty=Uncertainty(
+    uncertainty=Uncertainty(surrogate="p1_exact"),
+    variations=(
         # The compliance under a point grows as the logarithm of the cell: no order is formal.
-        MeshLadder((refined(0.5), refined(1.5)), cell_size, 1.0), INPUTS, surrogate="p1_exact",
+        vary("body.cells", "x 0.5 1.5, order 1"),
+        vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+             "nu within its declared uncertainty"),
     ),
     axis="y",
     reference="paper",
@@ -72,7 +65,7 @@ EXPERIMENT = Experiment(
     follows=follows,
     twin=Twin(
         record,
-        remake=("body.", "twin."),
+        remake=("body.space", "body.side", "body.pocket", "body.radius", "body.length", "twin."),
         kind="same law, finer mesh",
         seed=NeedlePocket().twin.seed,
         notice="The recording is a twin along a synthetic path: it and the models share linear "

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from validate.papers.fluid_inclusion.phantom import Phantom
 from validate.papers.fluid_inclusion.twin import PROFILE, SCANNER, SLICES, PhantomTwin
 from validate.papers.stated import CITED, drawn, said, taken
 
+from .scene import SCENE
+
 _RECIPE = "a recipe: it enters by the modulus and Poisson ratio only"
 _SHOWN = "a figure without numbers: the report draws ours"
-_P = Phantom()
 
 
 STATED = (
@@ -29,8 +29,8 @@ STATED = (
     said("glycerol in the fluid", 0.10, "1", "section 4.1", "the fluid is incompressible"),
     said("cellulose in the phantom", 0.03, "1", "section 4.1",
           "it makes speckle: synthetic images have theirs"),
-    taken("Poisson ratio of the phantom", 0.485, _P.material.nu, "1", "sections 4.1 and 4.4"),
-    taken("modulus in the simulation", 15.2e3, _P.material.E, "Pa", "section 4.4"),
+    taken("Poisson ratio of the phantom", 0.485, SCENE.material.nu, "1", "sections 4.1 and 4.4"),
+    taken("modulus in the simulation", 15.2e3, SCENE.material.E, "Pa", "section 4.4"),
     said("Fig. 5a: the plate test", None, "1", "section 4.1", "a photograph"),
     said("Fig. 6: the apparatus", None, "1", "section 4.2",
           "a photograph and a diagram; the frame of the recording is the diagram's"),

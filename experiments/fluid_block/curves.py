@@ -16,11 +16,12 @@ from validate.fem.cavity import pressure_load, volume_of
 from validate.fem.condense import Condensed, condense
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.papers.fluid_block.block import FluidBlock, slab
-from validate.scene.material import Material
+from validate.replay.tree import Tree
 from validate.scene.mesh import Mesh
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.pressure_curve import RATIOS, pressure_at_volume, tuned_gain
+
+from .block import slab
 
 _SHARES = (0.7, 1.3)  # of the volume, to which the paper draws its curve
 _TURNS = 60  # of the fixed point between wall and load
@@ -52,10 +53,9 @@ class PressureCurve:
         return 1 - float(((self.fixed - line) ** 2).sum()) / spread
 
 
-def condensed_block(p: FluidBlock, order: int) -> Condensed:
+def condensed_block(p: Tree, order: int) -> Condensed:
     """The block without a tool, on the walls of its cavities."""
-    material = Material(p.material.E, p.material.nu)
-    scene = slab(p.body, p.cavities, p.mesh.squares, order, material, None)
+    scene = slab(p, None, {"body.element": "tri6" if order == 2 else "tri3"})
     return condense(build_system(scene), np.zeros(0, dtype=np.int64))
 
 
@@ -141,9 +141,9 @@ def curve_exhibit(curves: Sequence[tuple[str, PressureCurve]]) -> Exhibit:
     return Exhibit("curve", "Pressure against volume", words, (table,), (chart,))
 
 
-def kept(p: FluidBlock, r: Responses) -> dict[str, float]:
+def kept(p: Tree, r: Responses) -> dict[str, float]:
     """V/V0 of the first cavity in Fig. 3, pressed without and with its pressure."""
-    drive = np.array([_PRESSED * p.body.height])
+    drive = np.array([_PRESSED * p.scene.body.height])
     found: dict[str, float] = {}
     for name, scheme in (("empty", NoFluid()), ("full", ExactPressure())):
         stepper = scheme.on(r)
@@ -152,10 +152,10 @@ def kept(p: FluidBlock, r: Responses) -> dict[str, float]:
     return found
 
 
-def shapes_exhibit(p: FluidBlock, r: Responses) -> Exhibit:
+def shapes_exhibit(p: Tree, r: Responses) -> Exhibit:
     """Fig. 3 (rest, pressed empty, pressed full) and 4b, 4c (70 and 130 % of volume)."""
     maps = []
-    drive = np.array([_PRESSED * p.body.height])
+    drive = np.array([_PRESSED * p.scene.body.height])
     for name, what, scheme in (("empty", "pressed, pressure zero", NoFluid()),
                                ("full", "pressed, volume kept", ExactPressure())):  # fmt: skip
         stepper = scheme.on(r)

@@ -7,40 +7,42 @@ pressure transducer in the cavity, which the paper names as future work.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from validate.compare.effects import Sensor
 from validate.compare.verdict import Accept
-from validate.papers.fluid_inclusion.effects import EFFECTS, UNCERTAINTY
+from validate.papers.fluid_inclusion.effects import EFFECTS, INPUTS, MESHES
 from validate.papers.fluid_inclusion.figures import FIGURES
 from validate.papers.fluid_inclusion.friction import friction_from_rise
 from validate.papers.fluid_inclusion.ladder import LADDER
-from validate.papers.fluid_inclusion.phantom import Phantom, build, load, place, read, record
-from validate.papers.fluid_inclusion.phantom import PhantomModel as Model
-from validate.papers.fluid_inclusion.stated import STATED
+from validate.papers.fluid_inclusion.phantom import Phantom, load, place, read, record
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Identified, Twin
+from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty
 from validate.replay.method import Method
+from validate.replay.tree import Tree
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.guests.guest import Guest
 from validate.solve.pressure_loop import PressureLoop
 
-PARAMETERS = Phantom()
-MEAN_DILATATION = Model(dilatation="nodal_mean")
+from .scene import SCENE
+from .stated import STATED
+
+BONDED = {"foundations.plates.contact": "bonded"}
+MEAN_DILATATION = {"dilatation": "nodal_mean"}
+P2 = {"body.element": "quadratic"}
 FELUPE = "python benchmarks/guests/felupe_guest.py"
 METHODS: Mapping[str, Method] = {
-    "p1_fluid": Method("P1 with fluid", ExactPressure(), Model()),
-    "p1_loop": Method("P1 with fluid, the paper's loop", PressureLoop(), Model()),
-    "p1_dry": Method("P1 without fluid", NoFluid(), Model()),
-    "p1_bonded": Method("P1 with fluid, bonded plates", ExactPressure(), Model(plates="bonded")),
+    "p1_fluid": Method("P1 with fluid", ExactPressure()),
+    "p1_loop": Method("P1 with fluid, the paper's loop", PressureLoop()),
+    "p1_dry": Method("P1 without fluid", NoFluid()),
+    "p1_bonded": Method("P1 with fluid, bonded plates", ExactPressure(), BONDED),
     "md_fluid": Method("P1 mean dilatation with fluid", ExactPressure(), MEAN_DILATATION),
-    "p2_fluid": Method("P2 with fluid", ExactPressure(), Model(order=2)),
-    "felupe": Method("FElupe, P2", Guest(FELUPE), Model(order=2)),  # a job carries no cavity
+    "p2_fluid": Method("P2 with fluid", ExactPressure(), P2),
+    "felupe": Method("FElupe, P2", Guest(FELUPE), P2),  # a job carries no cavity
 }
 
 
 def identify(
-    recordings: Sequence[Recording], parameters: Phantom, methods: Mapping[str, Method]
+    recordings: Sequence[Recording], parameters: Tree, methods: Mapping[str, Method]
 ) -> Identified:
     return friction_from_rise(EXPERIMENT, methods["md_fluid"], recordings, parameters)
 
@@ -63,33 +65,30 @@ ACCEPT = (
     Accept("pressure", 245.0, "a fifth of the largest measured pressure"),
 )  # fmt: skip
 
-
-def _quick(p: Phantom) -> Phantom:
-    return replace(p, loads=p.loads[:1])
-
-
 EXPERIMENT = Experiment(
     name="fluid_phantom",
     title="Fluid inclusion in a gelatin phantom under plate compression",
     source="Gosline, Salcudean, Yan (2004), section 4",
-    parameters=PARAMETERS,
+    recording="../../recordings/fluid_phantom.mcap",
+    scene=SCENE,
+    settings=Phantom(),
     methods=METHODS,
     accepted=("p2_fluid",),
     accept=ACCEPT,
     load=load,
-    build=build,
     place=place,
-    uncertainty=UNCERTAINTY,
+    uncertainty=Uncertainty(surrogate="md_fluid"),
+    variations=(MESHES, *INPUTS),
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
     published=(*FIGURES, *STATED),
     identify=identify,
     ladder=LADDER,
-    quick=_quick,
+    quick={"positions": (0.003,)},
     twin=Twin(
         record,
         kind="same law, finer mesh",
-        seed=PARAMETERS.twin.seed,
+        seed=Phantom().twin.seed,
         read=read,
         notice=(
             "The recording is a twin: it and the accepted model share the law (linear "

@@ -9,13 +9,15 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
 from validate.papers.needle_pocket.hand import closed
-from validate.papers.needle_pocket.pocket import AXES, TOOL, NeedlePocket
 from validate.replay.followed import Followed
+from validate.replay.tree import Tree
 from validate.scene.scene import Scene
 from validate.solve.haptic import DEVICE_HZ
 from validate.solve.march import march
 from validate.solve.needle import NeedleLoop
 from validate.solve.types import Run
+
+from .pocket import AXES, TOOL
 
 _TURNS = 2
 _FREE = 1e6  # N: a limit would dissipate
@@ -74,15 +76,15 @@ def turn_energy(way: Walked) -> float:
     return float(way.taken[end] - way.taken[end - n])
 
 
-def hysteresis_exhibit(p: NeedlePocket, scene: Scene) -> tuple[Exhibit, dict[str, float]]:
+def hysteresis_exhibit(p: Tree, scene: Scene) -> tuple[Exhibit, dict[str, float]]:
     """Force over depth around a closed path by every law, and the energy of a turn."""
-    unit = "J/m" if p.body.space == "plane" else "J"
+    unit = "J/m" if p.scene.body.space == "plane" else "J"
     rows: list[tuple[Entry, ...]] = []
     lines: list[Series] = []
     numbers: dict[str, float] = {}
     for key, (name, law) in zip(("exact", "reaction", "paper", "coarse"), LAWS.items(),
                                 strict=True):  # fmt: skip
-        way = around(scene, law, p.twin.depth)
+        way = around(scene, law, p.settings.twin.depth)
         most, lost = float(way.stored.max()), turn_energy(way)
         left, least = float((way.taken - way.stored)[-1]), float((way.taken - way.stored).min())
         rows.append((name, most, lost, 100 * lost / most, left, least))
@@ -97,7 +99,7 @@ def hysteresis_exhibit(p: NeedlePocket, scene: Scene) -> tuple[Exhibit, dict[str
     )  # fmt: skip
     chart = Chart(
         "hysteresis", "Force on the hand around a closed path", "way of the tip down / mm",
-        "force along y / N" + ("/m" if p.body.space == "plane" else ""), tuple(lines),
+        "force along y / N" + ("/m" if p.scene.body.space == "plane" else ""), tuple(lines),
     )  # fmt: skip
     words = (
         "Down, two turns of an ellipse within the body and back at 512 Hz, linear elements, "
@@ -110,18 +112,16 @@ def hysteresis_exhibit(p: NeedlePocket, scene: Scene) -> tuple[Exhibit, dict[str
     return Exhibit("hysteresis", "Force hysteresis", words, (table,), (chart,)), numbers
 
 
-def energy_exhibit(
-    p: NeedlePocket, main: Mapping[str, Followed]
-) -> tuple[Exhibit, dict[str, float]]:
+def energy_exhibit(p: Tree, main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
     """Energy taken less stored along the recorded path: what is left was lost where it let go."""
-    per = "/m" if p.body.space == "plane" else ""
+    per = "/m" if p.scene.body.space == "plane" else ""
     lines: list[Series] = []
     rows: list[tuple[Entry, ...]] = []
     numbers: dict[str, float] = {}
     for name, followed in main.items():
         if not followed.whole:
             continue
-        way, t = walked(followed.run, p.body.dimension), followed.run.t
+        way, t = walked(followed.run, p.scene.body.dimension), followed.run.t
         free = way.taken - way.stored
         back = float((np.maximum.accumulate(free) - free).max())
         rows.append((followed.label, 1e3 * float(way.stored.max()), 1e3 * float(way.taken[-1]),
@@ -130,7 +130,7 @@ def energy_exhibit(
         numbers[f"back.{name}"] = back / float(way.stored.max()) if way.stored.any() else 0.0
     both: tuple[Series, ...] = ()
     if "p2_exact" in main and main["p2_exact"].whole:
-        way, t = walked(main["p2_exact"].run, p.body.dimension), main["p2_exact"].run.t
+        way, t = walked(main["p2_exact"].run, p.scene.body.dimension), main["p2_exact"].run.t
         both = (
             Series("taken from the hand", t, 1e3 * way.taken),
             Series("stored", t, 1e3 * way.stored),

@@ -16,15 +16,12 @@ from validate.scene.material import LawName
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
-LINEAR = load_file(Path(__file__).with_name("fluid_phantom.py"))
-_p, _twin = LINEAR.parameters, LINEAR.twin
+LINEAR = load_file(Path(__file__).parents[1] / "fluid_phantom" / "experiment.py")
+_own, _twin = LINEAR.parameters.settings, LINEAR.twin
 assert _twin is not None
 assert LINEAR.uncertainty is not None
-PARAMETERS = replace(
-    _p,
-    recording=str(Path(__file__).parents[1] / "recordings" / "fluid_phantom_large.mcap"),
-    outlines="images",
-    twin=replace(_p.twin, law="neo_hooke", seed=20040328, frames=True),
+SETTINGS = replace(
+    _own, outlines="images", twin=replace(_own.twin, law="neo_hooke", seed=20040328, frames=True)
 )
 _mean, _quadratic = LINEAR.methods["md_fluid"], LINEAR.methods["p2_fluid"]
 
@@ -32,7 +29,7 @@ _mean, _quadratic = LINEAR.methods["md_fluid"], LINEAR.methods["p2_fluid"]
 def _large(label: str, linear: Method, law: LawName, step: float) -> Method:
     """A method at large strain, solved on a grid of loads of `step` m."""
     scheme = Tabulated(StaticNewton(), step)
-    return Method(label, scheme, replace(linear.scene, law=law))
+    return Method(label, scheme, {**linear.scene, "material.law": law})
 
 
 METHODS = {
@@ -48,7 +45,9 @@ EXPERIMENT = replace(
     name="fluid_phantom_large",
     title="Fluid inclusion in a phantom, twin at large strain",
     source="Gosline, Salcudean, Yan (2004), section 4",
-    parameters=PARAMETERS,
+    scene=LINEAR.parameters.scene,
+    settings=SETTINGS,
+    recording="../../recordings/fluid_phantom_large.mcap",
     methods=METHODS,
     accepted=("p2_neo_hooke",),
     accept=(
@@ -70,7 +69,7 @@ EXPERIMENT = replace(
     ),
     identify=None,
     published=(),
-    twin=replace(_twin, seed=PARAMETERS.twin.seed, notice=(
+    twin=replace(_twin, seed=SETTINGS.twin.seed, notice=(
         "The outlines are extracted from synthetic B-mode images. The recording is a twin: it and "
         "the accepted model share the law (neo-Hookean), not the mesh. u_num of the accepted model "
         "is that of the linear quadratic elements."

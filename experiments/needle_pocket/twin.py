@@ -5,20 +5,16 @@ import numpy as np
 from validate.errors import SceneError
 from validate.fem.system import build as build_system
 from validate.papers.needle_pocket.hand import Hand
-from validate.papers.needle_pocket.pocket import (
-    AXES,
-    POCKET,
-    TOOL,
-    NeedlePocket,
-    body_mesh,
-    pocket_scene,
-)
+from validate.parameters import with_given
 from validate.recording.types import Recording, Source
 from validate.replay.experiment import Progress
-from validate.scene.material import Material
+from validate.replay.tree import Built, Tree
 from validate.solve.march import march
 from validate.solve.needle import NeedleLoop
 from validate.twin.sensors import signal, streams
+
+from .pocket import AXES, TOOL, grip_of, under
+from .scene import POCKET
 
 FRAME = "block"
 _START_NS = 1_080_345_600_000_000_000  # the year of the paper, an arbitrary moment
@@ -27,29 +23,33 @@ _FREE = 1e6  # N: the twin's own force is not limited
 _SD_FORCE = {"plane": 0.2, "solid": 1e-3}  # N
 
 
-def hand_of(p: NeedlePocket) -> Hand:
+def hand_of(p: Tree) -> Hand:
     """The path over the body's upper side."""
-    above = (_BESIDE, 0.0) if p.body.space == "plane" else (_BESIDE, 0.0, 0.6 * _BESIDE)
-    return Hand(p.twin.depth, above, p.twin.rate, p.twin.tremor, p.twin.seed)
+    above = (_BESIDE, 0.0) if p.scene.body.space == "plane" else (_BESIDE, 0.0, 0.6 * _BESIDE)
+    twin = p.settings.twin
+    return Hand(twin.depth, above, twin.rate, twin.tremor, twin.seed)
 
 
-def record(p: NeedlePocket, progress: Progress) -> Recording:
+def record(p: Tree, progress: Progress) -> Recording:
     """Path, force on the hand and pressure at every tick; seeded."""
     progress("simulate")
-    twin, d = p.twin, p.body.dimension
+    twin, body = p.settings.twin, p.scene.body
     t, x = hand_of(p).path()
     t = np.round(t, 9)
-    mesh = body_mesh(p.body, twin.plane, twin.solid, 2)
-    scene = pocket_scene(mesh, Material(p.material.E, p.material.nu), tuple(x[0].tolist()))
-    stepper = NeedleLoop(grip=p.grip, limit=_FREE).prepare(build_system(scene))
+    finer = {
+        "body.plane": twin.plane, "body.solid": twin.solid, "body.element": "quadratic"
+    }  # fmt: skip
+    scene = under(Built()(None, with_given(p, finer)), x[0])
+    mesh = scene.mesh
+    stepper = NeedleLoop(grip=grip_of(p), limit=_FREE).prepare(build_system(scene))
     run = march("twin", stepper, t, x - x[0], np.array([len(t) - 1]), 0.0)
     if not run.finished:
         raise SceneError(f"the twin: {run.outcome.why}")
     progress("measure")
     rng = streams(twin.seed, ("tip", "force", "pressure"))
-    sd = _SD_FORCE[p.body.space] if twin.sd_force is None else twin.sd_force
+    sd = _SD_FORCE[body.space] if twin.sd_force is None else twin.sd_force
     signals = {}
-    for c, a in enumerate(AXES[:d]):
+    for c, a in enumerate(AXES[: body.dimension]):
         y = run.traces[f"{TOOL}.force.{a}"].y
         signals[f"tip.{a}"] = signal(t, x[:, c], "m", twin.sd_tip, FRAME, rng["tip"])
         signals[f"force.{a}"] = signal(t, y, "N", sd, FRAME, rng["force"])

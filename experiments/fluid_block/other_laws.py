@@ -10,30 +10,32 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import Responses
-from validate.papers.fluid_block.block import FluidBlock
-from validate.papers.fluid_block.updates import pressed
+from validate.replay.tree import Tree
 from validate.solve.fluid import ElasticPressure, ExactPressure
 from validate.solve.pressure_curve import slopes, still
 from validate.solve.pulse import LINEAR_TO, MMHG, PulsePressure
 from validate.solve.types import State
 
+from .block import FluidLaws
+from .updates import pressed
+
 _INSTANTS = 100  # of two pulses
 
 
-def laws_exhibit(p: FluidBlock) -> Exhibit:
+def laws_exhibit(p: Tree) -> Exhibit:
     """A reservoir by Newton where substitution diverges, a compressible fluid, and a pulse."""
     r = pressed(p, "plate")
-    drive = np.array([p.strains[-1] * p.body.height])
+    drive = np.array([p.settings.strains[-1] * p.scene.body.height])
     slope = 1 / float(slopes(r, still(r))[0, 0])
     rows: list[tuple[Entry, ...]] = []
     for times in (0.1, 0.5, 0.9, 1.1, 2.0, 10.0):
-        law = ElasticPressure(p.laws.preset, times * slope)
+        law = ElasticPressure(p.settings.laws.preset, times * slope)
         rows.append((f"P = Pe - B(V/V0 - 1), B = {times:g} slopes", *_told(_one(law, r, drive)),
                      _substituted(r, drive, law)))  # fmt: skip
-    own = ElasticPressure(p.laws.preset, p.laws.stiffness)
-    rows.append((f"P = Pe - B(V/V0 - 1), B = {p.laws.stiffness:.4g} Pa",
+    own = ElasticPressure(p.settings.laws.preset, p.settings.laws.stiffness)
+    rows.append((f"P = Pe - B(V/V0 - 1), B = {p.settings.laws.stiffness:.4g} Pa",
                  *_told(_one(own, r, drive)), _substituted(r, drive, own)))  # fmt: skip
-    for K in (1e4, 1e6, p.laws.bulk_modulus):
+    for K in (1e4, 1e6, p.settings.laws.bulk_modulus):
         state = _one(ExactPressure(1.0, K), r, drive)
         rows.append((f"compressible, bulk modulus {K:.3g} Pa", *_told(state), None))
     rows.append(("incompressible", *_told(_one(ExactPressure(), r, drive)), None))
@@ -41,7 +43,7 @@ def laws_exhibit(p: FluidBlock) -> Exhibit:
         "laws", "The plate at the largest strain.",
         ("law", "pressure / Pa", "V/V0 / 1", "Newton steps", "outcome", "substitutions to 1e-9"),
         tuple(rows),
-        f"Pe = {p.laws.preset:g} Pa. No number of substitutions: it diverges, as expected "
+        f"Pe = {p.settings.laws.preset:g} Pa. No number of substitutions: it diverges, as expected "
         "where B exceeds the slope.",
     )  # fmt: skip
     pulse, words = _pulse(r, p)
@@ -75,9 +77,10 @@ def _substituted(r: Responses, drive: Floats, law: ElasticPressure) -> int | Non
     return None
 
 
-def _pulse(r: Responses, p: FluidBlock) -> tuple[Chart, tuple[str, ...]]:
+def _pulse(r: Responses, p: Tree) -> tuple[Chart, tuple[str, ...]]:
     """Two pulses of the prescribed pressure, no tool, and where a linear model ends."""
-    low, high, rate = p.laws.pulse_low, p.laws.pulse_high, p.laws.pulse_rate
+    laws: FluidLaws = p.settings.laws
+    low, high, rate = laws.pulse_low, laws.pulse_high, laws.pulse_rate
     dt = (2 / rate if rate else 1.0) / _INSTANTS
     stepper = PulsePressure(low, high, rate, dt).on(r)
     state, found = stepper.rest(), []
