@@ -10,15 +10,18 @@ from commands import here
 
 from validate.compare.verdict import Accept
 from validate.errors import RegistrationError, SceneError, UsageError
+from validate.parameters import with_given
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.register.as_declared import as_declared
 from validate.replay import compare
 from validate.replay.declaration import holds_code, to_json
+from validate.replay.declared_paths import require_paths
 from validate.replay.experiment import Experiment, Uncertainty, free, vary
 from validate.replay.find import load_file
 from validate.replay.method import Method
 from validate.replay.options import Options, configure
+from validate.replay.tree import changed_by
 from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support
@@ -182,3 +185,14 @@ def test_an_error_of_a_declaration_names_its_path_and_line(
         load_file(tmp_path / "bar.py")
     assert says in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_method_takes_a_value_of_another_parameter() -> None:
+    """As where every method has a modulus of its own; an open one names the path to set."""
+    tree, own = bar().parameters, {"material.E": "as material.rho"}
+    with pytest.raises(UsageError, match=r"material\.rho is not set; give it with --set"):
+        changed_by(tree, own)
+    assert changed_by(with_given(tree, {"material.rho": 2e3}), own).scene.material.E == 2e3
+    unknown = Method("m", QuasiStatic(), {"material.E": "as moduli.slip"})
+    with pytest.raises(UsageError, match=r"unknown parameter 'moduli\.slip'"):
+        require_paths(bar(methods={"m": unknown}), Path(__file__))

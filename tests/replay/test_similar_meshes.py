@@ -31,7 +31,9 @@ from validate.solve.quasi_static import QuasiStatic
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
 _COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
            "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
-OPEN = {"skin_pads": {"pads.width": "8mm"}}  # what only the data tell
+SKIN = {"length": "100mm", "width": "50mm", "pad_length": "8mm", "pad_width": "8mm", "gap": "30mm"}
+# What only the data tell.
+OPEN = {"skin_pads": {f"body.{k}": v for k, v in SKIN.items()}}
 
 
 def family(p: MeasuredBody) -> list[tuple[int, ...]]:

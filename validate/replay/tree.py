@@ -63,12 +63,24 @@ class Built:
     def __call__(
         self, recording: Recording | None, tree: Tree, changes: Mapping[str, Any] | None = None
     ) -> Scene:
-        changed = change_of(changes)(tree) if changes else tree
+        changed = changed_by(tree, changes or {})
         scene: Any = changed.scene
         if not isinstance(scene, Meshless):
             scene = scene.resolved(mesh_of(recording, changed, self.folder))
         built: Scene = scene
         return built
+
+
+def changed_by(tree: Tree, changes: Mapping[str, Any]) -> Tree:
+    """The tree with a method's changes by path. Raises `UsageError` where a change follows a value
+    that stands open."""
+    changed: Tree = change_of(changes)(tree)
+    return changed
+
+
+def follows(value: Any) -> bool:
+    """Whether a change takes another parameter's value: "as PATH"."""
+    return isinstance(value, str) and value.startswith("as ")
 
 
 @dataclass(frozen=True)

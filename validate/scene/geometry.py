@@ -6,6 +6,7 @@
     Cone("60 mm", "40 mm", "20 mm", cells=(4, 6))          a quarter, about z
     MeshFile("liver.vtk", unit="mm")                               beside the experiment's file
     SurfaceFile("liver.stl", unit="mm", edge="4 mm")               filled with tetrahedra
+    Sheet(...)                                                     two pads on it (`scene.sheet`)
 
 Every number has a path (`body.cells`), and every geometry has a family of similar ones, which u_num
 is found on.

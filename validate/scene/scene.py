@@ -4,7 +4,7 @@ Declared, it is the parameter tree of an experiment: its body is a geometry (`sc
 places are words (`scene.named_place`). What is simulated is `resolved` on a mesh of the body.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, replace
 from hashlib import sha256
 from typing import Any, Literal, TypeVar
@@ -281,10 +281,10 @@ class Scene:
 
     def resolved(self, mesh: Mesh) -> "Scene":
         """The scene on this mesh of its body: words become places, symmetry holds its planes."""
-        held = tuple(getattr(self.body, "held", ()))
+        held, places = tuple(getattr(self.body, "held", ())), getattr(self.body, "places", {})
 
         def placed(parts: tuple[P, ...]) -> tuple[P, ...]:
-            return tuple(_placed(part, mesh) for part in parts)
+            return tuple(_placed(part, mesh, places) for part in parts)
 
         return replace(
             self,
@@ -424,12 +424,13 @@ class Scene:
 P = TypeVar("P")
 
 
-def _placed(part: P, mesh: Mesh) -> P:
-    """A part whose place is words, on the facets that they choose."""
+def _placed(part: P, mesh: Mesh, places: Mapping[str, Place]) -> P:
+    """A part whose place is words, on the facets that they choose; or a place of its geometry."""
     facets = getattr(part, "facets", None)
     if not isinstance(facets, str) or facets in mesh.facets:
         return part
-    return replace(part, facets=place_of(facets, mesh))  # type: ignore[type-var]
+    place = places[facets] if facets in places else place_of(facets, mesh)
+    return replace(part, facets=place)  # type: ignore[type-var]
 
 
 def _chosen(region: Region, mesh: Mesh, own: Material) -> Region:
