@@ -105,7 +105,7 @@ def stated(recording: Recording) -> dict[str, float]:
     return {path: float(text) for path, text in recording.record("geometry").items()}
 
 
-def build(recording: Recording, tree: Tree, changes: Mapping[str, Any]) -> Scene:
+def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None) -> Scene:
     """The declared scene; Yeoh's coefficient is in proportion to the modulus."""
     scene = _BUILT(recording, tree, changes)
     if scene.material.law != "yeoh":

@@ -23,6 +23,7 @@ from validate.replay.method import Method
 from validate.replay.options import Options, configure
 from validate.replay.tree import changed_by
 from validate.scene.geometry import Box
+from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.quasi_static import QuasiStatic
@@ -196,3 +197,11 @@ def test_a_method_takes_a_value_of_another_parameter() -> None:
     unknown = Method("m", QuasiStatic(), {"material.E": "as moduli.slip"})
     with pytest.raises(UsageError, match=r"unknown parameter 'moduli\.slip'"):
         require_paths(bar(methods={"m": unknown}), Path(__file__))
+
+
+def test_the_law_of_a_method_keeps_what_it_knows_of_the_coefficients() -> None:
+    rubber = Material(E, 0.4, "neo_hooke", coefficients=Coefficients(volumetric="coupled"))
+    tree = bar().parameters.with_scene(material=rubber)
+    linear, yeoh = (changed_by(tree, {"material.law": law}).scene.material
+                    for law in ("linear", "yeoh"))  # fmt: skip
+    assert (linear.coefficients, yeoh.coefficients.volumetric) == (Coefficients(), "coupled")

@@ -33,7 +33,11 @@ _COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "no
            "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
 SKIN = {"length": "100mm", "width": "50mm", "pad_length": "8mm", "pad_width": "8mm", "gap": "30mm"}
 # What only the data tell.
-OPEN = {"skin_pads": {f"body.{k}": v for k, v in SKIN.items()}}
+GEL = {"x": "0", "y": "0", "side": "100um", "bottom": "0", "middle": "50um", "top": "100um"}
+OPEN = {
+    name: {f"body.{k}": v for k, v in sizes.items()}
+    for name, sizes in (("skin_pads", SKIN), ("gel_indentation", GEL))
+}
 
 
 def family(p: MeasuredBody) -> list[tuple[int, ...]]:

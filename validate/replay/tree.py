@@ -72,8 +72,13 @@ class Built:
 
 
 def changed_by(tree: Tree, changes: Mapping[str, Any]) -> Tree:
-    """The tree with a method's changes by path. Raises `UsageError` where a change follows a value
-    that stands open."""
+    """The tree with a method's changes by path; its law keeps what it knows of the coefficients.
+
+    Raises `UsageError` where a change follows a value that stands open.
+    """
+    law = changes.get("material.law")
+    if law and not follows(law):
+        tree = tree.with_scene(material=tree.scene.material.of_law(law))
     changed: Tree = change_of(changes)(tree)
     return changed
 

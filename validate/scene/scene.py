@@ -302,6 +302,7 @@ class Scene:
 
     def _check(self) -> None:
         known(self.material.E, "material.E")
+        known(self.material.nu, "material.nu")
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation needs linear elements; use order 1")
         if self.mesh.dimension == 2 and (
