@@ -32,8 +32,10 @@ class Material:
     not know, and those that lose positive energy, with the stretch.
     """
 
-    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
-    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells")
+    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain", opened=True)
+    nu: float = quantity(
+        MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells", opened=True
+    )
     law: LawName = quantity("linear", "1", "linear, or the law at large strain")
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")

@@ -162,15 +162,12 @@ class Mass:
 
     name: str
     facets: Place = quantity(MISSING, "1", "where it hangs")
-    mass: float = quantity(MISSING, "kg", "mass")
+    mass: float = quantity(MISSING, "kg", "mass; 0: none hangs there")
 
     def __post_init__(self) -> None:
         take_units(self)
-        if not (np.isfinite(self.mass) and self.mass > 0):
-            raise SceneError(
-                f"mass '{self.name}': {self.mass:g} kg; expected a mass above 0; otherwise "
-                "remove the part"
-            )
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise SceneError(f"mass '{self.name}': {self.mass:g} kg; expected a mass of 0 or above")
 
 
 @dataclass(frozen=True)
@@ -294,7 +291,7 @@ class Scene:
             foundations=placed(self.foundations),
             membranes=placed(self.membranes),
             loads=placed(self.loads),
-            masses=placed(self.masses),
+            masses=placed(tuple(mass for mass in self.masses if mass.mass)),
             contacts=placed(self.contacts),
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
             copies=self.copies * getattr(self.body, "copies", 1),
