@@ -205,3 +205,16 @@ def test_the_law_of_a_method_keeps_what_it_knows_of_the_coefficients() -> None:
     linear, yeoh = (changed_by(tree, {"material.law": law}).scene.material
                     for law in ("linear", "yeoh"))  # fmt: skip
     assert (linear.coefficients, yeoh.coefficients.volumetric) == (Coefficients(), "coupled")
+
+
+def test_a_user_changes_a_method_that_takes_a_value_of_another_parameter() -> None:
+    """Several of its paths may only agree together: a law and its coefficient."""
+    own = Method("m", QuasiStatic(), {"material.E": "as material.rho"})
+    given = {"material.C01": "1kPa", "material.law": "mooney_rivlin"}
+    _, methods = configure(
+        bar(methods={"m": own}, accepted=("m",)),
+        Options({f"methods.m.{path}": text for path, text in given.items()}),
+    )
+    assert dict(methods["m"].scene) == {**own.scene, **given, "material.C01": 1e3}
+    with pytest.raises(UsageError, match=r"unknown parameter 'moduli\.E'"):
+        configure(bar(), Options({"methods.linear.material.E": "as moduli.E"}))

@@ -31,12 +31,13 @@ from validate.solve.quasi_static import QuasiStatic
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
 _COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
            "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
-SKIN = {"length": "100mm", "width": "50mm", "pad_length": "8mm", "pad_width": "8mm", "gap": "30mm"}
 # What only the data tell.
+SKIN = {"length": "100mm", "width": "50mm", "pad_length": "8mm", "pad_width": "8mm", "gap": "30mm"}
+ROUND = {"diameter": "50mm", "height": "30mm"}
 GEL = {"x": "0", "y": "0", "side": "100um", "bottom": "0", "middle": "50um", "top": "100um"}
 OPEN = {
     name: {f"body.{k}": v for k, v in sizes.items()}
-    for name, sizes in (("skin_pads", SKIN), ("gel_indentation", GEL))
+    for name, sizes in (("skin_pads", SKIN), ("gel_indentation", GEL), ("ecoflex_cylinder", ROUND))
 }
 
 
