@@ -39,7 +39,7 @@ class Judged:
 
 def judged() -> tuple[Judged, ...]:
     loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
-    under = {"recording": str(loaded), "load.mass": "52g"}
+    under = {"recording": str(loaded), "masses.load.mass": "52g"}
     beams = ("mixed", "still", "felupe", "calculix", "mujoco", "mujoco_45")
     cylinders = ("slip", "neo_slip", "svk_slip", "felupe", "calculix", "mujoco")
     rest, rings = "tip.vertical.max@settled", "ringing.frequency@swing"

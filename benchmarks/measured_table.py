@@ -67,7 +67,7 @@ def _cells(c: Check) -> tuple[str, ...]:
 def measured() -> tuple[Measured, ...]:
     """The experiments on recordings made by others, as they ship and the beam's loaded case."""
     loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
-    under = {"recording": str(loaded), "load.mass": "52g"}
+    under = {"recording": str(loaded), "masses.load.mass": "52g"}
     return (
         Measured("stylus_phantom", "the other landmarks"),
         Measured("ultrasound_disk", "the centre, image by image"),

@@ -27,6 +27,7 @@ from validate.replay.road import compare
 from validate.replay.room import coarser
 from validate.scene.box import box, grid
 from validate.scene.cylinder import quarter_cylinder
+from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
 
@@ -160,6 +161,8 @@ def test_the_next_step_is_a_mesh_that_fits(phantom: Experiment) -> None:
     told = coarser("fluid_phantom", phantom.parameters, 1 / 16)
     assert told == "such as --set body.cells=3,4,6"
     assert coarser("own", phantom.parameters.scene.material, 0.5) == "see `validate list own`"
+    bar = {"body": Box((0.1, 0.1, 0.2), (8, 8, 16))}
+    assert coarser("bar", bar, 1 / 16) == "such as --set body.cells=3,3,7"
 
 
 def test_a_method_whose_finest_mesh_does_not_fit_is_refused_before_anything_is_solved(

@@ -20,16 +20,22 @@ from validate.units import in_si, split
 # Where sizes and moduli of bodies lie, and the unit whose name is forgotten most easily.
 _PLAUSIBLE = {"Pa": (100.0, 1e9, "kPa"), "m": (1e-5, 1.0, "mm")}
 
+_OPEN = ("none", "null")
+
 # Read from the recording; given in the experiment's file or by --set; the library's; or fitted.
 Origin = Literal["recorded", "entered", "default", "identified"]
 
 
-def quantity(default: Any, unit: str, doc: str, *, asked: bool = False) -> Any:
+def quantity(
+    default: Any, unit: str, doc: str, *, asked: bool = False, opened: bool = False
+) -> Any:
     """A dataclass field with default, SI unit ("1" for none) and what it is.
 
-    `asked`: nothing may run while it is None; the recording says it, or the user does.
+    `asked`: nothing may run while it is None; the recording says it, or the user does. `opened`:
+    a declaration, or the user by "none", may leave it open (None), whatever its type.
     """
-    return field(default=default, metadata={"unit": unit, "doc": doc, "asked": asked})
+    known = {"unit": unit, "doc": doc, "asked": asked, "opened": opened}
+    return field(default=default, metadata=known)
 
 
 def known(value: float | None, path: str) -> float:
@@ -347,14 +353,20 @@ def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]
     if not isinstance(text, str):
         return text
     unit, _ = _leaf(settings, [head])
+    if text.lower() in _OPEN and _may_open(settings, head):
+        return None
     return parsed(_hints(settings.__class__)[head], path, text, unit)
+
+
+def _may_open(settings: Any, name: str) -> bool:
+    return any(member == name and meta.get("opened") for member, _, _, meta in _members(settings))
 
 
 def parsed(hint: Any, path: str, text: str, unit: str) -> Any:
     """A text as the value of a field of this type and unit. Raises as `with_values` does."""
     if get_origin(hint) in (Union, types.UnionType):
         options = [a for a in get_args(hint) if a is not type(None)]
-        return None if text.lower() in ("none", "null") else parsed(options[0], path, text, unit)
+        return None if text.lower() in _OPEN else parsed(options[0], path, text, unit)
     if get_origin(hint) is Literal:
         choices = {str(choice): choice for choice in get_args(hint)}
         if text not in choices:

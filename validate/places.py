@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
 
+from platformdirs import user_cache_path
+
 from validate.errors import UsageError
 
 REPORT_BYTES = 20_000_000  # reports of the shipped experiments take 7 to 17 MB
@@ -28,6 +30,11 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _OF_THE_PLACE = (
     *_FULL, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENAMETOOLONG, errno.ENOTDIR,
 )  # fmt: skip
+
+
+def cache(name: str) -> Path:
+    """The folder of that name in the user's cache; it may not be there yet."""
+    return user_cache_path("validate") / name
 
 
 def try_folder(folder: Path, needed: int = REPORT_BYTES) -> None:

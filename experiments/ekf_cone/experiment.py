@@ -44,6 +44,7 @@ PUSHED = {
 }
 QUASI_STATIC = Tabulated(StaticNewton("none"), 0.4e-3)
 A = ("node_A",)
+_TENTH = "a tenth of the largest displacement"
 METHODS = {
     "plate_p2": Method("plate moved, P2 neo-Hooke", QUASI_STATIC),
     "plate_mixed": Method(
@@ -93,17 +94,9 @@ EXPERIMENT = Experiment(
     accepted=("plate_p2",),
     accept=(
         Accept("force", 1.5, "a tenth of the largest force"),
-        Accept(
-            "node_B",
-            0.15e-3,
-            "a tenth of the largest displacement there, rms over time",
-            statistic="rms",
-        ),
-        Accept(
-            "node_C",
-            0.15e-3,
-            "a tenth of the largest displacement there, rms over time",
-            statistic="rms",
+        *(
+            Accept(node, 0.15e-3, f"{_TENTH} there, rms over time", statistic="rms")
+            for node in ("node_B", "node_C")
         ),
     ),
     place=place,

@@ -1,48 +1,53 @@
 """Changes of the beam that are no single value: finer cells with their steps, the loss as it is
-identified, the recording under gravity alone."""
+identified."""
 
-from dataclasses import replace
+from typing import Any
 
-from validate.papers.released_beam.cards import HungMass, Relaxation, ReleasedBeam
+from validate.papers.released_beam.cards import hung
+from validate.parameters import with_given
+from validate.replay.tree import Tree
 from validate.replay.variation import Change
-from validate.scene.similar_grids import member
 
 
 def finer(share: float) -> Change:
     """Cells in every direction and steps at once: both errors are of order two."""
 
-    def change(p: ReleasedBeam) -> ReleasedBeam:
-        along, across = member((p.mesh.along, p.mesh.across), share)
-        finer = replace(p, mesh=replace(p.mesh, along=along, across=across))
-        by = edge(finer) / edge(p)
-        return replace(finer, swing=replace(p.swing, dt=p.swing.dt * by))
+    def change(tree: Tree) -> Any:
+        finer = tree.with_scene(body=tree.scene.body.scaled(share))
+        by = edge(finer) / edge(tree)
+        return with_given(finer, {"swing.dt": tree.settings.swing.dt * by})
 
     return change
 
 
-def edge(p: ReleasedBeam) -> float:
+def edge(tree: Tree) -> float:
     """The edge m of a cube as large as a cell."""
-    volume = p.size.length * p.size.width * p.size.height
-    return float((volume / p.mesh.along / p.mesh.across**2) ** (1 / 3))
+    length, width, height = tree.scene.body.size
+    along, across, _ = tree.scene.body.cells
+    return float((length * width * height / along / across**2) ** (1 / 3))
 
 
-def hung(p: ReleasedBeam, z: float) -> ReleasedBeam:
+def heavier(tree: Tree, z: float) -> Any:
     """No mass is none, whatever its uncertainty."""
-    mass = p.load.mass and p.load.mass + z * p.ranges.mass
-    return replace(p, load=replace(p.load, mass=mass))
+    mass = hung(tree)
+    return with_given(tree, {"masses.load.mass": mass and mass + z * tree.settings.ranges.mass})
 
 
-def relaxing(p: ReleasedBeam, relaxation: Relaxation) -> ReleasedBeam:
-    return replace(p, material=replace(p.material, relaxation=relaxation))
+def higher(tree: Tree, z: float) -> Any:
+    """Another height of the section."""
+    length, width, height = tree.scene.body.size
+    return with_given(tree, {"body.size": (length, width, height + z * tree.settings.ranges.size)})
 
 
-def sooner(p: ReleasedBeam, z: float) -> ReleasedBeam:
+def sooner(tree: Tree, z: float) -> Any:
     """What is identified is the loss, g tau of a short time: the modulus goes the other way."""
-    card, by = p.material.relaxation, 1 + z * p.ranges.fast_time
-    return relaxing(p, replace(card, fast_time=card.fast_time and card.fast_time * by,
-                            fast=card.fast and card.fast / by))  # fmt: skip
+    card, by = tree.settings.relaxation, 1 + z * tree.settings.ranges.fast_time
+    return with_given(tree, {
+        "relaxation.fast_time": card.fast_time and card.fast_time * by,
+        "relaxation.fast": card.fast and card.fast / by,
+    })  # fmt: skip
 
 
-def gravity_alone(p: ReleasedBeam) -> ReleasedBeam:
+def gravity_alone(tree: Tree) -> Any:
     """The recording under gravity, on which what stands open is identified."""
-    return replace(p, recording=p.calibration, load=HungMass())
+    return with_given(tree, {"recording": tree.settings.calibration, "masses.load.mass": 0.0})

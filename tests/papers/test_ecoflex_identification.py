@@ -2,39 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import experiment
 
-from validate.errors import RecordingError, UsageError
-from validate.papers.ecoflex import cylinder as cylinder_module
-from validate.papers.ecoflex.cylinder import (
-    CylinderModel,
-    LoggedCylinder,
-    LoggedSpecimen,
-    model_scene,
-    place,
-)
+from validate.errors import UsageError
+from validate.papers.ecoflex.cylinder import model_scene, place
 from validate.papers.ecoflex.modulus import identified
 from validate.parameters import with_values
 from validate.recording.alignment import Offset, shift
 from validate.recording.types import Recording, Signal, Source
 from validate.register.signals import SignalObservation
-from validate.replay.cards import QuarterGrid
 from validate.replay.experiment import Identified
-from validate.replay.find import load_file
 from validate.replay.method import Method
 from validate.replay.origins import opened
 
 DIAMETER, HEIGHT, E = 0.05, 0.03, 90e3
-SMALL = LoggedCylinder(
-    specimen=LoggedSpecimen(DIAMETER, HEIGHT),
-    mesh=QuarterGrid(2, 2),
-    limit_svk=0.11,
-    limit_neo_hooke=0.12,
-)
+SHIPPED = experiment("ecoflex_cylinder")
+SMALL = with_values(
+    SHIPPED.parameters,
+    {"body.diameter": "50mm", "body.height": "30mm", "body.cells": "2,2", "limit_svk": "0.11",
+     "limit_neo_hooke": "0.12"},
+)  # fmt: skip
 
 
 def pressed() -> Recording:
@@ -50,14 +40,16 @@ def pressed() -> Recording:
     )  # fmt: skip
 
 
+def with_cells(name: str, cells: tuple[int, int]) -> dict[str, Method]:
+    """A shipped method on other cells."""
+    own = SHIPPED.methods[name]
+    return {name: replace(own, scene={**own.scene, "body.cells": cells})}
+
+
 @pytest.fixture(scope="module")
-def methods(project_root: Path) -> Mapping[str, Method]:
+def methods() -> Mapping[str, Method]:
     """The shipped ones, with fewer elements between held plates."""
-    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py").methods
-    coarse: Mapping[str, Method] = with_values(
-        shipped, {"neo_bonded.radial": "2", "neo_bonded.axial": "2"}
-    )
-    return coarse
+    return {**SHIPPED.methods, **with_cells("neo_bonded", (2, 2))}
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +64,7 @@ def values(found: Identified) -> dict[str, float]:
 def test_a_moved_force_clock_moves_what_is_compared() -> None:
     """2 s too late at rates of 0.1 s: 20 samples; and the clock's uncertainty is kept."""
     plain, offset = pressed(), Offset(2.0, 0.05, "given by the user", 200, 1.0)
-    scene = model_scene(SMALL, CylinderModel(), E)
+    scene = model_scene(SMALL, SHIPPED.methods["slip"], E=E)
     moved = shift(plain, "force", offset)
     (before,), (after,) = (place(r, SMALL, scene).of(SignalObservation) for r in (plain, moved))
     assert after.y[:50, 0] - after.y[0, 0] == pytest.approx(before.y[:50, 0] - before.y[0, 0])
@@ -93,7 +85,7 @@ def test_what_the_mesh_does_not_resolve_stands_in_the_interval(
     found: Mapping[str, float], methods: Mapping[str, Method]
 ) -> None:
     """Held plates: the modulus on twice as many elements lies within the band of the fewer."""
-    more = with_values(methods, {"bonded.radial": "5", "bonded.axial": "6"})
+    more = {**methods, **with_cells("bonded", (5, 6))}
     better = values(identified([pressed()], SMALL, more))
     moved = abs(better["modulus.E_bonded"] - found["modulus.E_bonded"])
     assert moved > 0.02 * found["modulus.E_bonded"]
@@ -103,44 +95,44 @@ def test_what_the_mesh_does_not_resolve_stands_in_the_interval(
 
 @pytest.mark.slow
 def test_it_follows_the_methods_as_they_are_set(methods: Mapping[str, Method]) -> None:
-    same = MappingProxyType({"neo_slip.law": "svk", "bonded.plates": "slip"})
-    set_otherwise = identified([pressed()], SMALL, with_values(methods, same))
+    slips, svk = {"material.E": "as material.E_bonded"}, {"material.law": "svk"}
+    other = {
+        "bonded": replace(methods["bonded"], scene=slips),
+        "neo_slip": replace(methods["neo_slip"], scene={**methods["neo_slip"].scene, **svk}),
+    }
+    set_otherwise = identified([pressed()], SMALL, {**methods, **other})
     scores = values(set_otherwise)
     assert scores["modulus.neo_slip"] != pytest.approx(E, rel=0.05)
     assert scores["modulus.bonded_factor"] == pytest.approx(1.0, rel=1e-9)
-    assert set_otherwise.parameters.material.E_bonded == pytest.approx(
+    assert set_otherwise.parameters.settings.material.E_bonded == pytest.approx(
         scores["modulus.E"], rel=1e-9
     )
 
 
-def test_logs_without_a_header_take_the_sizes_that_are_set(project_root: Path) -> None:
-    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py")
-    bare = replace(shipped, load=lambda p, folder: (pressed(), pressed()))
-    with pytest.raises(UsageError, match=r"ecoflex_cylinder.py:\d+: specimen.diameter") as refused:
+def test_logs_without_a_header_take_the_sizes_that_are_set() -> None:
+    bare = replace(SHIPPED, load=lambda p, folder: (pressed(), pressed()))
+    with pytest.raises(UsageError, match=r"experiment.py:\d+: body.diameter") as refused:
         opened(bare, bare.parameters)
-    assert "--set specimen.height=VALUE" in str(refused.value)
-    sizes = {"specimen.diameter": repr(DIAMETER), "specimen.height": repr(HEIGHT)}
+    assert "--set body.height=VALUE" in str(refused.value)
+    sizes = {"body.diameter": repr(DIAMETER), "body.height": repr(HEIGHT)}
     used = opened(bare, with_values(bare.parameters, sizes)).parameters
-    scene = model_scene(used, CylinderModel(), E)
+    scene = model_scene(used, SHIPPED.methods["slip"], E=E)
     (force,) = place(pressed(), used, scene).of(SignalObservation)
     assert np.ptp(scene.mesh.nodes[:, 2]) == pytest.approx(HEIGHT)
     assert len(force.y) > 100
 
 
-def test_what_logs_say_differently_is_asked_for(project_root: Path) -> None:
-    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py")
+def test_what_logs_say_differently_is_asked_for() -> None:
     logs = [
         replace(pressed(), metadata={"specimen": {"diameter_m": "0.05", "height_m": height}})
         for height in ("0.03", "0.02")
     ]
-    mixed = replace(shipped, load=lambda p, folder: tuple(logs))
-    with pytest.raises(UsageError, match=r"specimen.height \(m\) is not set\. The rec") as refused:
+    mixed = replace(SHIPPED, load=lambda p, folder: tuple(logs))
+    with pytest.raises(UsageError, match=r"body.height \(m\) is not set\. The rec") as refused:
         opened(mixed, mixed.parameters)
-    assert "specimen.diameter" not in str(refused.value)
+    assert "body.diameter" not in str(refused.value)
 
 
 def test_a_cylinder_without_a_modulus_has_no_scene() -> None:
-    p = SimpleNamespace(material=SimpleNamespace(E_slip=None))
-    model = SimpleNamespace(modulus="slip")
-    with pytest.raises(RecordingError, match=r"no modulus identified; set material.E_slip"):
-        cylinder_module.build(None, p, model)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"material\.E_slip is not set; give it with --set"):
+        SHIPPED.build(pressed(), SMALL, SHIPPED.methods["slip"].scene)

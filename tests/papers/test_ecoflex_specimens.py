@@ -1,21 +1,16 @@
 """Several specimens: repeats have one vote, one is left out and predicted from the others."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from beside import experiment
 
 from validate.errors import RecordingError, UsageError
 from validate.identify.modulus import fit_modulus
 from validate.identify.votes import by_specimen
-from validate.papers.ecoflex.cylinder import (
-    CylinderModel,
-    LoggedCylinder,
-    LoggedSpecimen,
-    model_scene,
-    place,
-)
+from validate.papers.ecoflex.cylinder import model_scene, place, size
 from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.papers.ecoflex.specimens import (
@@ -30,16 +25,17 @@ from validate.parameters import with_values
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.signals import SignalObservation
-from validate.replay.cards import QuarterGrid
 from validate.replay.experiment import Identified
-from validate.replay.find import load_file
 from validate.solve.types import Outcome, Run, Trace
 
 HEIGHT, AREA = 0.03, np.pi * 0.05**2 / 4
-SMALL = LoggedCylinder(
-    specimen=LoggedSpecimen(0.05, HEIGHT), mesh=QuarterGrid(2, 2), limit_svk=0.11,
-    limit_neo_hooke=0.12,
+SHIPPED = experiment("ecoflex_cylinder")
+SMALL = with_values(
+    SHIPPED.parameters,
+    {"body.diameter": "50mm", "body.height": "30mm", "body.cells": "2,2", "limit_svk": "0.11",
+     "limit_neo_hooke": "0.12"},
 )  # fmt: skip
+RANGES = SMALL.settings.ranges
 
 
 def log(name: str, E: float, header: bool = True) -> Recording:
@@ -75,7 +71,7 @@ def test_repeats_of_one_specimen_have_one_vote() -> None:
     assert found.mean == pytest.approx(305 / 3)
     assert found.between == pytest.approx(np.std([102, 111, 92], ddof=1))
     assert found.within == pytest.approx(np.sqrt((8 + 8) / 3))
-    fits = [fit_modulus(r, SMALL.specimen.size) for r in LOGS]
+    fits = [fit_modulus(r, size(SMALL)) for r in LOGS]
     mean = summarised(fits, every)
     assert mean.mean == pytest.approx(305e3 / 3, rel=1e-6)
     assert mean.sd_mean == pytest.approx(found.between * 1e3 / np.sqrt(3), rel=1e-6)
@@ -105,9 +101,10 @@ def test_the_last_specimen_is_left_out_unless_another_is_named() -> None:
 
 
 @pytest.fixture(scope="module")
-def found(project_root: Path) -> Mapping[str, Identified]:
-    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py").methods
-    coarse = with_values(shipped, {"neo_bonded.radial": "2", "neo_bonded.axial": "2"})
+def found() -> Mapping[str, Identified]:
+    own = SHIPPED.methods["neo_bonded"]
+    few = replace(own, scene={**own.scene, "body.cells": (2, 2)})
+    coarse = {**SHIPPED.methods, "neo_bonded": few}
     sets = {"three": LOGS, "two": LOGS[:4], "one": LOGS[:1]}
     return {name: identified(logs, SMALL, coarse) for name, logs in sets.items()}
 
@@ -117,7 +114,7 @@ def test_the_judged_specimen_does_not_calibrate(found: Mapping[str, Identified])
     E = {s.name: s.value for s in three.scores}["modulus.E"]
     assert pytest.approx((102e3 + 111e3) / 2, rel=1e-6) == E
     assert three.calibrated == ()
-    p = three.parameters
+    p = three.parameters.settings
     assert p.judged == "EF30_0T_C"
     scatter = np.std([102, 111], ddof=1) / 106.5
     assert p.ranges.specimen == pytest.approx(scatter, rel=1e-6)
@@ -130,7 +127,7 @@ def test_scatter_that_the_logs_do_not_show_is_the_declared_one(
 ) -> None:
     """One specimen that calibrates says nothing of how specimens differ."""
     for name in ("two", "one"):
-        assert found[name].parameters.ranges.specimen == SMALL.ranges.specimen
+        assert found[name].parameters.settings.ranges.specimen == RANGES.specimen
         assert "is unknown" in found[name].notes[1]
     assert "extrapolates in strain the same logs" in found["one"].notes[0]
     assert found["one"].calibrated == ("force@5pct",)
@@ -140,19 +137,17 @@ def test_scatter_that_the_logs_do_not_show_is_the_declared_one(
 def test_scatter_between_specimens_is_in_u_D_of_the_judged_one_alone(
     found: Mapping[str, Identified],
 ) -> None:
-    p = found["three"].parameters
-    scene = model_scene(p, CylinderModel(), 1e5)
-    judged, other = place(LOGS[4], p, scene), place(LOGS[0], p, scene)
+    tree = found["three"].parameters
+    scene = model_scene(tree, SHIPPED.methods["slip"], E=1e5)
+    judged, other = place(LOGS[4], tree, scene), place(LOGS[0], tree, scene)
     (force,), (calibrating,) = (s.of(SignalObservation) for s in (judged, other))
-    assert (force.role, force.share) == ("validates", p.ranges.specimen)
+    assert (force.role, force.share) == ("validates", tree.settings.ranges.specimen)
     assert (calibrating.role, calibrating.share) == ("calibrates", 0.0)
     assert {s.label for s in judged.selections}.isdisjoint(s.label for s in other.selections)
 
 
-def test_a_prediction_of_another_specimen_is_judged_where_it_was_fitted_too(
-    project_root: Path,
-) -> None:
-    shipped = load_file(project_root / "experiments" / "ecoflex_cylinder.py")
+def test_a_prediction_of_another_specimen_is_judged_where_it_was_fitted_too() -> None:
+    shipped = SHIPPED
     assert follows(shipped, LOGS, SMALL).accept[0].loads == ("5pct", "10pct")
     assert follows(shipped, LOGS[:3], SMALL).accept[0].loads == ("10pct",)
     assert shipped.accepted == ("slip",)

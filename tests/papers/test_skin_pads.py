@@ -6,34 +6,33 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import beside, experiment
 
 from validate.arrays import Floats
 from validate.cli.main import run
 from validate.errors import RecordingError, UsageError
-from validate.papers.skin_pads import files as files_module
-from validate.papers.skin_pads.files import FORCE, paired, read_folder
-from validate.papers.skin_pads.placed import Images, binned, place, spurious
-from validate.papers.skin_pads.sheet import (
-    PulledSkin,
-    SheetModel,
-    build,
-    load,
-    sheet_mesh,
-    stated,
-)
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.replay import compare
-from validate.replay.find import load_file
 from validate.replay.solved import solve
+from validate.replay.tree import Tree, mesh_of
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
+
+EXPERIMENT = experiment("skin_pads")
+files_module, placed, skin = (beside("skin_pads", name) for name in ("files", "placed", "skin"))
+FORCE, paired, read_folder = files_module.FORCE, files_module.paired, files_module.read_folder
+Images, binned, place, spurious = placed.Images, placed.binned, placed.place, placed.spurious
+build, load, stated = skin.build, skin.load, skin.stated
 
 SCALE = 0.05  # mm per px
 PULL = np.linspace(0.0, 4.0, 9)  # mm at rest and in eight images
 SHARE = 0.7  # of the moving pad
 GEO = "L = 60;\nH = 40; // drawn\nl_pad = 8.0;\nh_pad = 8.0;\ndL_pad = 30.0;\n"
-SOON = PulledSkin(fit_to=3e-3, predict_to=6e-3, field=(2e-3, 3.5e-3))
+SOON = with_values(
+    EXPERIMENT.parameters, {"fit_to": "3mm", "predict_to": "6mm", "field": "2mm,3.5mm"}
+)
 
 
 def stretched(x: Floats, pull: float) -> Floats:
@@ -74,18 +73,18 @@ def recording(tmp_path: Path) -> Recording:
     return read_folder(folder(tmp_path), (1.0, 1.0))
 
 
-def scene_of(recording: Recording) -> tuple[PulledSkin, Scene]:
+def scene_of(recording: Recording) -> tuple[Tree, Scene]:
     sizes = {path: repr(value) for path, value in stated(recording).items()}
-    p = with_values(SOON, {**sizes, "material.E_neo": "26", "mesh.cells": "1"})
-    return p, build(recording, p, SheetModel())
+    p = with_values(SOON, {**sizes, "material.E_neo": "26", "body.cells": "1"})
+    return p, build(recording, p, EXPERIMENT.methods["neo_hooke"].scene)
 
 
 def test_a_folder_is_a_recording_with_its_clocks_paired(recording: Recording) -> None:
     assert recording.record("pairing")["images"] == "8 of 8"
     assert recording.signal("force", FORCE).y.shape == (400, 1)
     assert stated(recording) == {
-        "sheet.length": 0.06, "sheet.width": 0.04, "pads.length": 0.008, "pads.width": 0.008,
-        "pads.gap": 0.03,
+        "body.length": 0.06, "body.width": 0.04, "body.pad_length": 0.008,
+        "body.pad_width": 0.008, "body.gap": 0.03,
     }  # fmt: skip
     assert float(recording.record("scale")["m_per_px"]) == pytest.approx(1e-3 * SCALE)
     t = recording.marker("points").t
@@ -144,14 +143,14 @@ def test_files_that_are_no_such_recording(
 
 
 def test_force_is_averaged_from_its_zero_and_spikes_are_left_out(recording: Recording) -> None:
-    curve = binned(recording, SOON)
+    curve = binned(recording, SOON.settings)
     assert curve.force == pytest.approx(20 * curve.d, rel=0.02, abs=1e-4)
     assert curve.left_out == 0
     force = recording.signal("force", FORCE)
     y = force.y + 1e-4 * np.random.default_rng(1).normal(size=force.y.shape)
     y[100] += 1.0
     with_spike = replace(recording, signals={**recording.signals, "force": replace(force, y=y)})
-    again = binned(with_spike, SOON)
+    again = binned(with_spike, SOON.settings)
     assert again.left_out >= 1
     assert again.force == pytest.approx(curve.force, abs=1e-3)
 
@@ -172,19 +171,16 @@ def test_points_are_where_the_sheet_is_and_windows_are_apart(recording: Recordin
     assert {s.label for s in seen.selections} >= {"2.0mm", "3.5mm", "end"}
     assert any(note.startswith("8 of 8 images are paired") for note in seen.findings)
     with pytest.raises(RecordingError, match="set fit_to"):
-        place(recording, replace(p, fit_to=7e-3), scene)
+        place(recording, with_values(p, {"fit_to": "7mm"}), scene)
     with pytest.raises(RecordingError, match="0 matched"):
-        place(recording, replace(p, field=(5e-3,)), scene)
+        place(recording, with_values(p, {"field": "5mm"}), scene)
 
 
-def test_a_run_answers_each_stream_where_it_is_compared(
-    project_root: Path, recording: Recording
-) -> None:
+def test_a_run_answers_each_stream_where_it_is_compared(recording: Recording) -> None:
     """Force in its unit, points at the holds; twice the modulus is twice the force, same field."""
-    experiment = load_file(project_root / "experiments" / "skin_pads.py")
     p, _ = scene_of(recording)
     one, two = (
-        solve(experiment, (recording,), "neo_hooke", experiment.methods["neo_hooke"],
+        solve(EXPERIMENT, (recording,), "neo_hooke", EXPERIMENT.methods["neo_hooke"],
               with_values(p, {"material.E_neo": E})).residuals
         for E in ("20", "40")
     )  # fmt: skip
@@ -205,19 +201,24 @@ def test_a_point_that_moves_otherwise_than_its_neighbours_is_spurious() -> None:
     assert np.flatnonzero(spurious(x, moved)).tolist() == [37]
 
 
+def meshed(p: Tree, values: dict[str, str]) -> Mesh:
+    return mesh_of(None, with_values(p, values), Path())
+
+
 def test_meshes_are_parts_of_finer_ones_and_reach_beyond_the_pads(recording: Recording) -> None:
     p, _ = scene_of(recording)
-    coarse, fine = (sheet_mesh(with_values(p, {"mesh.cells": n})).nodes for n in ("1", "2"))
+    coarse, fine = (meshed(p, {"body.cells": n}).nodes for n in ("1", "2"))
     apart = np.abs(coarse[:50, None] - fine[None]).max(axis=2).min(axis=1)
     assert apart.max() < 1e-9
     assert np.ptp(fine, axis=0) == pytest.approx([0.06, 0.04])
     with pytest.raises(UsageError, match="must reach beyond"):
-        sheet_mesh(with_values(p, {"sheet.length": "0.04"}))
+        meshed(p, {"body.length": "0.04"})
 
 
 def test_the_data_set_is_paired_whole(shared_data: Path) -> None:
-    p = replace(PulledSkin(), data=str(shared_data / "force" / "skin-pads"))
-    (recording,) = load(p, Path())
+    data = {"data": str(shared_data / "force" / "skin-pads")}
+    tree = with_values(EXPERIMENT.parameters, data)
+    (recording,), p = load(tree, Path()), tree.settings
     assert recording.record("pairing")["images"] == "49 of 49"
     assert float(recording.record("scale")["m_per_px"]) == pytest.approx(24e-3 / 448.5, rel=1e-4)
     images, curve = Images(recording), binned(recording, p)
@@ -229,11 +230,10 @@ def test_the_data_set_is_paired_whole(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(project_root: Path, shared_data: Path) -> None:
+def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(shared_data: Path) -> None:
     """Skin stiffens: what was fitted is no evidence, what was predicted lies far below."""
-    experiment = load_file(project_root / "experiments" / "skin_pads.py")
-    values = {"data": str(shared_data / "force" / "skin-pads"), "mesh.cells": "1"}
-    result = compare(experiment, values, methods=("linear",), quick=True)
+    values = {"data": str(shared_data / "force" / "skin-pads"), "body.cells": "1"}
+    result = compare(EXPERIMENT, values, methods=("linear",), quick=True)
     (linear,) = result.methods
     verdicts = {c.name: c.verdict for c in linear.checks}
     assert verdicts["force.max@predicted"] == "not good enough"
@@ -424,18 +424,17 @@ def test_a_log_without_samples_at_its_zero_needs_a_larger_bin() -> None:
     with pytest.raises(
         RecordingError, match="r: 2 samples within 1 mm of the zero of displacement,"
     ):
-        binned(recording, p)  # type: ignore[arg-type]
+        binned(recording, p)
 
 
-def test_a_run_is_driven_by_the_edge_points(project_root: Path, tmp_path: Path) -> None:
+def test_a_run_is_driven_by_the_edge_points(tmp_path: Path) -> None:
     """The pads of the simulated sheet move by the truth at every load step with an image."""
     edge_marks(grid_folder(tmp_path), 50, "column")
-    experiment = load_file(project_root / "experiments" / "skin_pads.py")
-    p = with_values(SOON, {"data": str(tmp_path), "pads.window": "24mm", "mesh.cells": "1",
+    p = with_values(SOON, {"data": str(tmp_path), "pads.window": "24mm", "body.cells": "1",
                            "material.E_linear": "28"})  # fmt: skip
     recordings = load(p, Path())
     p = with_values(p, {path: repr(value) for path, value in stated(recordings[0]).items()})
-    ended = solve(experiment, recordings, "linear", experiment.methods["linear"], p)
+    ended = solve(EXPERIMENT, recordings, "linear", EXPERIMENT.methods["linear"], p)
     assert ended.whole
     pads = ended.seen.inputs[ended.seen.inputs.sum(axis=1) <= 4e-3]
     assert len(pads) > 10
@@ -452,7 +451,7 @@ def test_validate_run_reports_what_the_pads_follow(
     edge_marks(grid_folder(tmp_path / "data"), 50, "row")
     arguments = [
         "run", "skin_pads", "--quick", "--methods", "linear", "--out", str(tmp_path / "out"),
-        "--set", f"data={tmp_path / 'data'}", "--set", "mesh.cells=1",
+        "--set", f"data={tmp_path / 'data'}", "--set", "body.cells=1",
     ]  # fmt: skip
     assert run(arguments) == 2
     assert "pass it with its unit, as in --set pads.window=8mm" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """Declarations as JSON: exact over all experiments, and data where they hold no code."""
 
+import ast
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -35,8 +36,20 @@ def test_json_is_exact(name: str) -> None:
     assert (again.accept, again.cases, again.expected) == (
         declared.accept, declared.cases, declared.expected
     )  # fmt: skip
-    if isinstance(declared.parameters, Tree):
-        assert str(shipped().parent) not in text
+    assert str(shipped().parent) not in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_experiment_is_one_short_declaration_of_its_scene(name: str) -> None:
+    file = experiment_files(shipped().parent)[name]
+    assert isinstance(experiment(name).parameters, Tree)
+    text = file.read_text("utf-8")
+    assert len(text.splitlines()) <= 150
+    code = list(ast.walk(ast.parse(text)))
+    assert not [node for node in code if isinstance(node, ast.Lambda | ast.ClassDef)]
+    made = [t.id for n in code if isinstance(n, ast.Assign) for t in n.targets
+            if isinstance(t, ast.Name)]  # fmt: skip
+    assert made.count("EXPERIMENT") == 1
 
 
 def body(**changes: object) -> Experiment:

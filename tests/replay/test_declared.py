@@ -10,16 +10,20 @@ from commands import here
 
 from validate.compare.verdict import Accept
 from validate.errors import RegistrationError, SceneError, UsageError
+from validate.parameters import with_given
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.register.as_declared import as_declared
 from validate.replay import compare
 from validate.replay.declaration import holds_code, to_json
+from validate.replay.declared_paths import require_paths
 from validate.replay.experiment import Experiment, Uncertainty, free, vary
 from validate.replay.find import load_file
 from validate.replay.method import Method
 from validate.replay.options import Options, configure
+from validate.replay.tree import changed_by
 from validate.scene.geometry import Box
+from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.quasi_static import QuasiStatic
@@ -188,3 +192,35 @@ def test_an_error_of_a_declaration_names_its_path_and_line(
         load_file(tmp_path / "bar.py")
     assert says in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_method_takes_a_value_of_another_parameter() -> None:
+    """As where every method has a modulus of its own; an open one names the path to set."""
+    tree, own = bar().parameters, {"material.E": "as material.rho"}
+    with pytest.raises(UsageError, match=r"material\.rho is not set; give it with --set"):
+        changed_by(tree, own)
+    assert changed_by(with_given(tree, {"material.rho": 2e3}), own).scene.material.E == 2e3
+    unknown = Method("m", QuasiStatic(), {"material.E": "as moduli.slip"})
+    with pytest.raises(UsageError, match=r"unknown parameter 'moduli\.slip'"):
+        require_paths(bar(methods={"m": unknown}), Path(__file__))
+
+
+def test_the_law_of_a_method_keeps_what_it_knows_of_the_coefficients() -> None:
+    rubber = Material(E, 0.4, "neo_hooke", coefficients=Coefficients(volumetric="coupled"))
+    tree = bar().parameters.with_scene(material=rubber)
+    linear, yeoh = (changed_by(tree, {"material.law": law}).scene.material
+                    for law in ("linear", "yeoh"))  # fmt: skip
+    assert (linear.coefficients, yeoh.coefficients.volumetric) == (Coefficients(), "coupled")
+
+
+def test_a_user_changes_a_method_that_takes_a_value_of_another_parameter() -> None:
+    """Several of its paths may only agree together: a law and its coefficient."""
+    own = Method("m", QuasiStatic(), {"material.E": "as material.rho"})
+    given = {"material.C01": "1kPa", "material.law": "mooney_rivlin"}
+    _, methods = configure(
+        bar(methods={"m": own}, accepted=("m",)),
+        Options({f"methods.m.{path}": text for path, text in given.items()}),
+    )
+    assert dict(methods["m"].scene) == {**own.scene, **given, "material.C01": 1e3}
+    with pytest.raises(UsageError, match=r"unknown parameter 'moduli\.E'"):
+        configure(bar(), Options({"methods.linear.material.E": "as moduli.E"}))

@@ -9,14 +9,16 @@ from tiny import TINY, Card
 from validate.compare.published import Figure
 from validate.compare.result import Result
 from validate.errors import RecordingError
-from validate.papers.ecoflex.cylinder import LoggedCylinder, load
+from validate.papers.ecoflex.cylinder import load
 from validate.papers.ecoflex.logged import follows, material_of
+from validate.parameters import with_values
 from validate.replay import load as experiment_named
 from validate.replay.experiment import Experiment, Told
 from validate.replay.followed import Cases
 from validate.replay.options import Options
 from validate.replay.origins import opened
 from validate.replay.road import compare
+from validate.replay.tree import Tree
 
 FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here", 3.0, 0.0)
 
@@ -50,9 +52,14 @@ def test_other_settings_are_not_compared_with_a_printed_figure() -> None:
 # --- the Ecoflex cylinder -------------------------------------------------------------------------
 
 
+def tree(folder: Path, logs: str, **values: str) -> Tree:
+    given = {"data": str(folder), "logs": logs, **values}
+    found: Tree = with_values(experiment_named("ecoflex_cylinder").parameters, given)
+    return found
+
+
 def followed(folder: Path, logs: str) -> Experiment:
-    experiment = experiment_named("ecoflex_cylinder")
-    p = replace(LoggedCylinder(), data=str(folder), logs=logs)
+    experiment, p = experiment_named("ecoflex_cylinder"), tree(folder, logs)
     found = opened(experiment, p)
     return follows(experiment, found.recordings, found.parameters)
 
@@ -63,8 +70,8 @@ def logs(shared_data: Path) -> Path:
 
 
 def test_the_five_logs_leave_the_experiment_as_declared(logs: Path) -> None:
-    declared, p = experiment_named("ecoflex_cylinder"), LoggedCylinder()
-    one = load(replace(p, data=str(logs), logs="EF30_0T_A1.csv"), logs)[0]
+    declared, p = experiment_named("ecoflex_cylinder"), tree(logs, "EF30_0T_A1.csv")
+    one = load(p, logs)[0]
     found = follows(declared, [replace(one, name=f"EF30_0T_A{k}") for k in range(1, 6)], p)
     assert (found.title, found.accept) == (declared.title, declared.accept)
     kept = [(f.name, f.expected, f.other) for f in found.published]
@@ -101,7 +108,7 @@ def test_other_logs_of_the_printed_material_are_held_to_its_number_alone(logs: P
 
 def test_windows_are_named_by_the_strains_they_end_at(logs: Path) -> None:
     experiment = experiment_named("ecoflex_cylinder")
-    p = replace(LoggedCylinder(), data=str(logs), logs="EF30_0T_A1.csv", limit_linear=0.125)
+    p = tree(logs, "EF30_0T_A1.csv", limit_linear="0.125")
     (accept,) = follows(experiment, recordings := load(p, Path()), p).accept
     assert accept.loads == ("12.5pct",)
     assert material_of(recordings[0]) == "EF30_0T"
@@ -109,4 +116,4 @@ def test_windows_are_named_by_the_strains_they_end_at(logs: Path) -> None:
 
 def test_missing_logs_name_the_folder_and_the_setting(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no logs '\*.csv' in .*; pass --set logs=PATTERN"):
-        load(replace(LoggedCylinder(), data=str(tmp_path), logs="*.csv"), tmp_path)
+        load(tree(tmp_path, "*.csv"), tmp_path)

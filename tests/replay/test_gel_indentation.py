@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beside import experiment
 from scipy.io import savemat
 
 from validate.errors import RecordingError, RegistrationError, UsageError
@@ -13,16 +14,22 @@ from validate.papers.gel import between as between_module
 from validate.papers.gel import box as box_module
 from validate.papers.gel import pair as pair_module
 from validate.papers.gel.between import RATIOS, best_ratio, solved
-from validate.papers.gel.box import FACES, GelIndentation, _axis, load, stated
+from validate.papers.gel.box import FACES, GelBoxes, _axis, load, stated
 from validate.papers.gel.pair import motion, side_of
-from validate.replay.find import load_file
+from validate.parameters import with_values
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Tree
 from validate.scene.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.scene.select import nodes_of
+
+
+def tree(**values: str) -> Tree:
+    found: Tree = with_values(experiment("gel_indentation").parameters, values)
+    return found
 
 
 def pair(folder: Path, count: int = 3000) -> Path:
@@ -42,7 +49,7 @@ def pair(folder: Path, count: int = 3000) -> Path:
 @pytest.mark.slow
 def test_another_pair_is_linked_in_the_scale_that_is_said(tmp_path: Path) -> None:
     folder = pair(tmp_path / "other")
-    p = GelIndentation(data=str(folder))
+    p = tree(data=str(folder))
     with pytest.raises(UsageError, match=r"one\.mat is in pixels .* --set voxel=0\.4um"):
         load(p, tmp_path)
     (folder / "SOURCE.txt").write_text("0.5 um per pixel in x, y, z")
@@ -53,8 +60,8 @@ def test_another_pair_is_linked_in_the_scale_that_is_said(tmp_path: Path) -> Non
     x, u = motion(recording)
     assert u[:, 2].min() == pytest.approx(-20 * 0.5e-6, rel=0.2)
     ends = stated(recording)
-    assert ends["box.x"] == pytest.approx(75e-6, abs=15e-6)
-    assert ends["box.bottom"] < ends["box.middle"] < ends["box.top"] < x[:, 2].max()
+    assert ends["body.x"] == pytest.approx(75e-6, abs=15e-6)
+    assert ends["body.bottom"] < ends["body.middle"] < ends["body.top"] < x[:, 2].max()
 
 
 def test_a_small_deep_contact_beside_the_indenter_does_not_draw_the_axis() -> None:
@@ -93,13 +100,13 @@ def test_which_files_are_a_pair_is_asked_for(tmp_path: Path) -> None:
     folder = pair(tmp_path / "other")
     savemat(folder / "three.mat", {"R": np.ones((4, 3))})
     with pytest.raises(RecordingError, match="3 MATLAB files; a pair is needed"):
-        load(GelIndentation(data=str(folder), voxel=1e-6), tmp_path)
-    named = GelIndentation(data=str(folder), voxel=1e-6, before="one.mat", after="two.mat")
+        load(tree(data=str(folder), voxel="1um"), tmp_path)
+    named = tree(data=str(folder), voxel="1um", before="one.mat", after="two.mat")
     assert load(named, tmp_path)[0].name == "one to two"
 
 
 def test_a_box_without_volume_is_refused() -> None:
-    box = replace(GelIndentation().box, x=0.0, y=0.0, side=1e-4, bottom=2e-5, middle=1e-5, top=5e-5)
+    box = GelBoxes(x=0.0, y=0.0, side=1e-4, bottom=2e-5, middle=1e-5, top=5e-5)
     with pytest.raises(UsageError, match=r"the lower box has no volume: side 100\.0 um"):
         replace(box, which="lower").ends()
     assert box.ends()[1].tolist() == pytest.approx([5e-5, 5e-5, 5e-5])
@@ -111,11 +118,11 @@ def test_the_public_pair_has_the_scale_of_its_source(shared_data: Path) -> None:
 
 @pytest.mark.slow
 def test_the_upper_box_is_predicted_by_the_lower_one(
-    shared_data: Path, project_root: Path, monkeypatch: pytest.MonkeyPatch
+    shared_data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ratios of the error to the floor; aims: 1.5 in the lower box, 2.2 in the upper one."""
     monkeypatch.setenv("VALIDATE_SHARED_DATA", str(shared_data))
-    result = compare(load_file(project_root / "experiments" / "gel_indentation.py"), Options({}))
+    result = compare(experiment("gel_indentation"), Options({}))
     (nu,) = (s for s in result.identified if s.name == "material.nu")
     assert 0.44 < nu.value < 0.49
     lower = {s.name: s.value for s in result.identified}
@@ -146,7 +153,7 @@ def test_boxes_with_too_few_particles_are_refused_or_left_out(
     around = [("own", inside), ("empty", inside), ("beyond", beyond), ("other", inside)]
     for name, found in (
         ("motion", lambda recording: (np.array([np.zeros(3), np.ones(3)]), None)),
-        ("replace", lambda box, which: box), ("_around", lambda box: around), ("_fitted", few),
+        ("replace", lambda box, **changes: box), ("_around", lambda box: around), ("_fitted", few),
     ):  # fmt: skip
         monkeypatch.setattr(between_module, name, found)
     whose = SimpleNamespace(recording=None)
@@ -156,9 +163,10 @@ def test_boxes_with_too_few_particles_are_refused_or_left_out(
 def test_a_ratio_that_is_open_and_clouds_that_are_none_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    p = SimpleNamespace(material=SimpleNamespace(nu=None))
+    sizes = {"x": "0", "y": "0", "side": "1mm", "bottom": "0", "middle": "1mm", "top": "2mm"}
+    p = tree(**{f"body.{name}": text for name, text in sizes.items()})
     with pytest.raises(
-        UsageError, match=r"material.nu is not set: identify it, or --set material.nu="
+        UsageError, match=r"material.nu is not set; give it with --set material.nu="
     ):
         box_module.build(None, p, None)  # type: ignore[arg-type]
     points = SimpleNamespace(x=np.zeros((1, 4, 2)))

@@ -225,8 +225,21 @@ def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
     assert (times.tolist(), moved.tolist()) == ([0.0, 2.0, 4.0], [0.0, 2.0, 4.0])
 
 
-def test_an_experiment_is_named_as_its_file(tmp_path: Path, project_root: Path) -> None:
-    text = (project_root / "experiments" / "multimode.py").read_text("utf-8")
-    (tmp_path / "other.py").write_text(text)
-    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'multimode', not the file's name"):
+def test_an_experiment_is_named_as_its_file(tmp_path: Path) -> None:
+    head = "from validate.replay.experiment import Experiment\n"
+    (tmp_path / "other.py").write_text(f"{head}EXPERIMENT = Experiment('bar', 'A bar', 'made')\n")
+    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'bar', not the file's name"):
         load_file(tmp_path / "other.py")
+
+
+def test_a_file_of_the_old_form_is_refused_with_the_command_that_writes_it_anew(
+    tmp_path: Path,
+) -> None:
+    """Parameters of a class of its own, and a function that builds a scene from them."""
+    (tmp_path / "bar.py").write_text(
+        "from validate.replay.experiment import Experiment\n"
+        "from validate.replay.cards import TimeSteps\n"
+        "EXPERIMENT = Experiment('bar', 'A bar', 'made', TimeSteps(), build=lambda *_: None)\n"
+    )
+    with pytest.raises(UsageError, match="a TimeSteps, not a scene; .* validate new bar --from"):
+        load_file(tmp_path / "bar.py")

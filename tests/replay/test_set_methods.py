@@ -67,7 +67,7 @@ def value_at(method: Any, part: str, path: str) -> Any:
 
 
 #: A rigid body and a material point alone have settings of their own to none.
-WITHOUT = {"multimode", "stylus_phantom", "ultrasound_disk"}
+WITHOUT = {"multimode", "rubber_strip", "stylus_phantom", "ultrasound_disk"}
 
 
 def test_which_experiments_have_methods_without_settings() -> None:

@@ -15,8 +15,8 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import place_of
-from validate.scene.scene import Foundation, Membrane, Scene, Support
-from validate.scene.select import nodes_of
+from validate.scene.scene import Foundation, Mass, Membrane, Scene, Support
+from validate.scene.select import OnPlane, facets_of, nodes_of
 
 HERE = Path()
 BOX = Box((0.02, 0.01, 0.04), (4, 2, 8))
@@ -106,3 +106,19 @@ def test_a_declared_foundation_slips_has_springs_or_holds_its_places() -> None:
     assert [m.thickness for m in springs.membranes] == [1e-3]
     with pytest.raises(SceneError, match="foundation 'plates': contact 'slip' is of a declared"):
         replace(slips, foundations=(replace(ground, facets="x0"),))
+
+
+def test_two_sides_share_an_edge_and_no_mass_is_none() -> None:
+    """Words choose the edge as planes do, on quadratic cells too; a mass of 0 hangs nowhere."""
+    size = (0.1, 0.03, 0.02)
+    body = Box(size, cells=(3, 2, 2), element="hex27")
+    scene = Scene(body, Material(1.0, 0.3), (Support("x0"),), masses=(Mass("one", "x1 & z1", 1.0),))
+    mesh = body.resolved(Path())
+    end, top = OnPlane((0.1, 0.0, 0.0), (1.0, 0.0, 0.0)), OnPlane((0.0, 0.0, 0.02), (0.0, 0.0, 1.0))
+    expected = (end & top).edges.entities(mesh)
+    for words in ("x1 & z1", "xmax & zmax"):
+        named = replace(scene, masses=(Mass("one", words, 1.0),)).resolved(mesh)
+        assert facets_of(mesh, named.masses[0].facets).tolist() == expected.tolist()
+    assert replace(scene, masses=(Mass("one", "x1 & z1", 0.0),)).resolved(mesh).masses == ()
+    with pytest.raises(SceneError, match="none of"):
+        replace(scene, masses=(Mass("one", "x0 & x1", 1.0),)).resolved(mesh)

@@ -4,10 +4,9 @@ import os
 from hashlib import sha256
 from pathlib import Path
 
-from platformdirs import user_cache_path
-
 from validate.datasets.registry import DataFile, named
 from validate.errors import RecordingError
+from validate.places import cache
 
 SHARED = "VALIDATE_SHARED_DATA"
 
@@ -54,7 +53,7 @@ def searched(beside: Path) -> tuple[Path, ...]:
 
 def cache_folder() -> Path:
     """Where `validate data get` brings files to."""
-    return user_cache_path("validate") / "data"
+    return cache("data")
 
 
 def whole(path: Path, file: DataFile) -> bool:

@@ -1,6 +1,5 @@
 """What the parameters of several experiments have in common: cards, and changes of them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from math import sqrt
 from pathlib import Path
@@ -10,29 +9,12 @@ from validate.errors import UsageError
 from validate.parameters import quantity
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
-from validate.replay.experiment import CORNER_ORDER, Change, MeshLadder
+from validate.replay.experiment import Change
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.plates import plates_of_share, rubbing_share
 from validate.scene.similar_grids import member
 from validate.twin.tracked import Camera, require_noise
-
-
-@dataclass(frozen=True)
-class DampedTissue:
-    """A linear material with Rayleigh damping, of the models."""
-
-    E: float = quantity(10e3, "Pa", "Young's modulus")
-    nu: float = quantity(0.47, "1", "Poisson ratio")
-    rho: float = quantity(1000.0, "kg/m3", "density")
-    mass_damping: float = quantity(0.0, "1/s", "Rayleigh alpha")
-    stiffness_damping: float = quantity(0.0, "s", "Rayleigh beta")
-
-    @property
-    def material(self) -> Material:
-        return Material(
-            self.E, self.nu, "linear", self.rho, self.mass_damping, self.stiffness_damping
-        )
 
 
 @dataclass(frozen=True)
@@ -66,11 +48,6 @@ class TrackedTwin:
         return replace(material, E=self.stiffness * material.E, nu=nu)
 
 
-def shipped(parameters: Any, folder: Path) -> tuple[Recording, ...]:
-    """The one recording whose path the parameters give."""
-    return (read_recording(Path(parameters.recording)),)
-
-
 def beside(parameters: Any, folder: Path) -> tuple[Recording, ...]:
     """The one recording that lies beside the experiment's own file, under the name it gives."""
     return (read_recording(folder / parameters.recording),)
@@ -85,16 +62,6 @@ def rubbed(p: Any, z: float) -> Any:
     return replace(p, plates=plates, friction=friction)
 
 
-@dataclass(frozen=True)
-class QuarterGrid:
-    """A quarter of a round body."""
-
-    radial: int = quantity(6, "1", "cells from axis to rim")
-    axial: int = quantity(8, "1", "cells along the axis")
-    grading: float = quantity(2.0, "1", "above 1: smaller cells towards rim and plates")
-    finer: float = quantity(1.3, "1", "how many times finer the finest mesh is, for u_num")
-
-
 def scaled(share: float | None, *counts: str) -> Change:
     """The similar mesh with about `share` of the cells along every edge (none: its own `finer`), in
     the fields `counts`."""
@@ -105,20 +72,6 @@ def scaled(share: float | None, *counts: str) -> Change:
         return replace(p, mesh=replace(p.mesh, **dict(zip(counts, cells, strict=True))))
 
     return change
-
-
-def quarter_meshes(size: Callable[[Any], float]) -> MeshLadder:
-    """Meshes of a quarter of a round body of `size` (m), the finest `finer` times as fine.
-
-    The corners of bonded plates limit the order.
-    """
-    levels = [scaled(share, "radial", "axial") for share in (0.5, 0.75, None)]
-
-    def cell(p: Any) -> float:
-        cells: int = p.mesh.radial**2 * p.mesh.axial
-        return float(size(p) / cells ** (1 / 3))
-
-    return MeshLadder(tuple(levels), cell, CORNER_ORDER)
 
 
 def require_used(given: Coefficients, laws: set[LawName]) -> None:

@@ -28,11 +28,6 @@ def newton_seconds(unknowns: float) -> float:
     return 4e-5 * unknowns + 18e-9 * unknowns**2
 
 
-def run_seconds(unknowns: float, states: int, *, linear: bool) -> float:
-    """Return the time s of a static run over `states` load steps."""
-    return linear_seconds(unknowns) if linear else states * newton_seconds(unknowns)
-
-
 def affordable(
     levels: Sequence[_Level], unknowns: Sequence[float], *, budget: bool
 ) -> tuple[_Level, ...]:

@@ -32,7 +32,7 @@ _MODULES = (
     "replay.cards", "replay.compression_cards", "replay.contact_cards", "replay.experiment",
     "replay.inclusion", "replay.measured_cards", "replay.method", "replay.tree",
     "replay.variation", "scene.contact", "scene.geometry", "scene.hollow_block", "scene.laws",
-    "scene.material", "scene.prony", "scene.scene", "scene.select", "scene.tool",
+    "scene.material", "scene.prony", "scene.scene", "scene.select", "scene.sheet", "scene.tool",
     "scene.tracked", "solve.schemes",
 )  # fmt: skip
 _RUNS_PROGRAMS = ("Guest", "GuestLetGo")  # settings whose command would be a stranger's

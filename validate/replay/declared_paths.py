@@ -8,6 +8,7 @@ from validate.errors import UsageError, ValidateError
 from validate.parameters import describe, has_path, nearest_names
 from validate.replay.experiment import Experiment
 from validate.replay.method import Method
+from validate.replay.tree import follows
 from validate.replay.variation import ByPath, Shift, Values
 
 
@@ -42,8 +43,10 @@ def _changes(experiment: Experiment) -> Iterator[tuple[tuple[str, ...], Any]]:
 
 
 def _unknown(method: Method, parameters: Any) -> tuple[str, ...]:
-    scene = method.scene if isinstance(method.scene, ByPath) else ()
-    return tuple(path for path in scene if not has_path(parameters, path))
+    """Paths that a method changes, or takes a value from ("as PATH")."""
+    scene = method.scene if isinstance(method.scene, ByPath) else ByPath({})
+    taken = (value[3:] for value in scene.values() if follows(value))
+    return tuple(path for path in (*scene, *taken) if not has_path(parameters, path))
 
 
 def _line(file: Path, paths: tuple[str, ...]) -> str:

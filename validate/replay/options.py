@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from validate.errors import ComparisonError, UsageError
-from validate.parameters import describe, doubts, has_path, nearest_names, with_given, with_values
+from validate.parameters import describe, doubts, has_path, nearest_names, with_values
 from validate.replay.experiment import Case, Experiment
 from validate.replay.guests import added_guests
 from validate.replay.law_solver import with_declared_law, with_laws
 from validate.replay.method import Method
-from validate.replay.tree import Tree
+from validate.replay.tree import Tree, valued
 from validate.scene.abaqus_lines import files_named
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 
@@ -76,13 +76,17 @@ def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
     values = _split(options.values)[1]
     ours, theirs = _of_scenes(experiment, values)
     changed = dict(with_values(*with_laws(experiment.methods, ours)))
+    given: dict[str, dict[str, str]] = {}
     for path, text in theirs.items():
         name, _, inner = path.partition(".")
-        scene = {**(changed[name].scene or {}), inner: text}
-        with_given(experiment.parameters, scene)
+        if text != (changed[name].scene or {}).get(inner):
+            given.setdefault(name, {})[inner] = text
+    for name, texts in given.items():
+        scene = {**(changed[name].scene or {}), **texts}
+        scene = valued(experiment.parameters, scene, texts)
         changed[name] = replace(changed[name], scene=scene)
-        if inner == "material.law":
-            changed[name] = with_declared_law(name, changed[name], text, experiment.methods)
+        if law := texts.get("material.law"):
+            changed[name] = with_declared_law(name, changed[name], law, experiment.methods)
     return changed
 
 

@@ -15,6 +15,7 @@ from validate.replay.runs import Road
 _POWER = 0.25  # memory of a factor in space goes with the cells along an edge to the fourth
 _MARGIN = 0.9
 _NO_COUNTS = ("order", "halvings")
+_OF_A_BODY = ("body.cells", "body.edge")  # of a declared geometry
 
 
 def require_room(
@@ -40,10 +41,9 @@ def require_room(
 
 def coarser(name: str, parameters: Any, share: float) -> str:
     """The `--set`s that bring memory down to `share` of what it is, as far as parameters called
-    mesh.* or body.cells say how fine the mesh is: counts and lengths of cells."""
+    mesh.*, or those of a declared body, say how fine the mesh is: counts and lengths of cells."""
     by = _MARGIN * share**_POWER
-    found = describe(parameters)
-    mesh = [p for p in found if p.path.startswith("mesh.") or p.path == "body.cells"]
+    mesh = [p for p in describe(parameters) if p.path.startswith("mesh.") or p.path in _OF_A_BODY]
     sets = [f"--set {p.path}={value}" for p in mesh if (value := _coarsened(p, by))]
     return f"such as {' '.join(sets)}" if sets else f"see `validate list {name}`"
 
@@ -53,10 +53,10 @@ def _coarsened(parameter: Parameter, by: float) -> str:
     value, last = parameter.default, parameter.path.rpartition(".")[2]
     if isinstance(value, bool) or last in _NO_COUNTS:
         return ""
-    if parameter.type.startswith("tuple[int") and value:
-        return ",".join(str(max(1, int(by * n))) for n in value)
     if isinstance(value, int):
         return str(max(1, int(by * value)))
+    if isinstance(value, list) and all(isinstance(count, int) for count in value):
+        return ",".join(str(max(1, int(by * count))) for count in value)
     if isinstance(value, float) and parameter.unit == "m" and value > 0:
         return f"{1e3 * value / by:.3g}mm"
     return ""

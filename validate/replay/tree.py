@@ -3,7 +3,7 @@
 The scene's paths have no prefix (`material.E`, `body.cells`), nor have the settings' own.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 
 from validate.errors import ComparisonError
 from validate.files import modified
-from validate.parameters import part, quantity
+from validate.parameters import part, quantity, value_at
 from validate.recording.types import Recording
 from validate.register.as_declared import as_declared
 from validate.register.registered import Registered
@@ -63,12 +63,44 @@ class Built:
     def __call__(
         self, recording: Recording | None, tree: Tree, changes: Mapping[str, Any] | None = None
     ) -> Scene:
-        changed = change_of(changes)(tree) if changes else tree
+        changed = changed_by(tree, changes or {})
         scene: Any = changed.scene
         if not isinstance(scene, Meshless):
             scene = scene.resolved(mesh_of(recording, changed, self.folder))
         built: Scene = scene
         return built
+
+
+def changed_by(tree: Tree, changes: Mapping[str, Any]) -> Tree:
+    """The tree with a method's changes by path; its law keeps what it knows of the coefficients.
+
+    Raises `UsageError` where a change follows a value that stands open.
+    """
+    law = changes.get("material.law")
+    if law and not follows(law):
+        tree = tree.with_scene(material=tree.scene.material.of_law(law))
+    changed: Tree = change_of(changes)(tree)
+    return changed
+
+
+def valued(tree: Tree, changes: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
+    """A method's changes with the texts of the paths `given` as values; what follows another
+    parameter, or is a factor or a step, does so later.
+
+    Raises what `changed_by` does for a path or a value; what stands open may be followed.
+    """
+    own = {path: value for path, value in changes.items() if not follows(value)}
+    changed = changed_by(tree, own)
+    for value in changes.values():
+        if follows(value):
+            value_at(tree, value[3:])
+    fixed = [path for path in given if path in own and own[path][:2] not in ("x ", "+ ", "- ")]
+    return {**changes, **{path: value_at(changed, path)[0] for path in fixed}}
+
+
+def follows(value: Any) -> bool:
+    """Whether a change takes another parameter's value: "as PATH"."""
+    return isinstance(value, str) and value.startswith("as ")
 
 
 @dataclass(frozen=True)

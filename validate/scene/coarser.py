@@ -4,7 +4,9 @@ Where no finer mesh can be solved, an answer on this one bounds the numerical er
 The two are not similar, so that no order can be observed: two sizes, a factor of safety of three.
 """
 
+from contextlib import suppress
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,9 +14,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from validate.arrays import Ints
-from validate.errors import SceneError
+from validate.errors import SceneError, ValidateError
+from validate.places import cache
 from validate.scene.filled import filled
 from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh_file import read_mesh, write_mesh
 
 _EDGE = 2.04  # of the cube root of its volume: the edge of a regular tetrahedron
 _LARGE = 5_000  # nodes: filling takes some 8 s at 27 000, with edges twice as long 17 s
@@ -70,13 +74,24 @@ def _triangles(facets: Ints, bricks: bool) -> Ints:
 
 @lru_cache(maxsize=4)
 def _filling(points: bytes, triangles: bytes, edge: float, within: float) -> Mesh:
-    """The filling of a surface of points (n, 3) m and triangles (t, 3)."""
+    """The filling of a surface of points (n, 3) m and triangles (t, 3), kept in the user's cache:
+    two fillings of one surface are two meshes, and a bound should not change from run to run."""
+    asked = points + triangles + repr((edge, within)).encode()
+    kept = cache("fillings") / f"{sha256(asked).hexdigest()[:32]}.npz"
+    with suppress(ValidateError):
+        return read_mesh(kept)
+    corners = np.frombuffer(points).reshape(-1, 3)
+    faces = np.frombuffer(triangles, np.int64).reshape(-1, 3) + 1
+    lines = ["v {:.17g} {:.17g} {:.17g}".format(*x) for x in corners.tolist()]
+    lines += ["f {} {} {}".format(*face) for face in faces.tolist()]
     with TemporaryDirectory(prefix="validate-") as folder:
         path = Path(folder) / "surface.obj"
-        with path.open("w", encoding="ascii") as file:
-            np.savetxt(file, np.frombuffer(points).reshape(-1, 3), "v %.17g %.17g %.17g")
-            np.savetxt(file, np.frombuffer(triangles, np.int64).reshape(-1, 3) + 1, "f %d %d %d")
-        return filled(path, "m", edge, within).mesh
+        path.write_text("\n".join(lines) + "\n", "ascii")
+        mesh = filled(path, "m", edge, within).mesh
+    with suppress(OSError, ValidateError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        write_mesh(mesh, kept)
+    return mesh
 
 
 def _sets(fine: Mesh, coarse: Mesh) -> dict[str, Ints]:

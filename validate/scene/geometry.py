@@ -6,21 +6,21 @@
     Cone("60 mm", "40 mm", "20 mm", cells=(4, 6))          a quarter, about z
     MeshFile("liver.vtk", unit="mm")                               beside the experiment's file
     SurfaceFile("liver.stl", unit="mm", edge="4 mm")               filled with tetrahedra
+    Sheet(...)                                                     two pads on it (`scene.sheet`)
 
 Every number has a path (`body.cells`), and every geometry has a family of similar ones, which u_num
 is found on.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.parameters import quantity, take_units
+from validate.parameters import known, quantity, take_units
 from validate.scene.box import box, grid
 from validate.scene.coarser import coarser
 from validate.scene.cone import quarter_cone
@@ -118,11 +118,11 @@ class Cylinder:
     """A cylinder about z from the origin up; sets lower_plate, upper_plate, rim.
 
     A quarter has the sets symmetry_x and symmetry_y, which are held, and may be graded towards rim
-    and plates.
+    and plates. Sizes may stay open (None) until a recording states them.
     """
 
-    diameter: float = quantity(0.0, "m", "diameter")
-    height: float = quantity(0.0, "m", "height")
+    diameter: float | None = quantity(None, "m", "diameter", asked=True)
+    height: float | None = quantity(None, "m", "height", asked=True)
     cells: tuple[int, int] = quantity((4, 4), "1", "cells along the radius and the height")
     element: Kind = quantity("tet4", "1", "element")
     part: Literal["whole", "quarter"] = quantity("whole", "1", "what is meshed")
@@ -137,12 +137,13 @@ class Cylinder:
             )
 
     def resolved(self, folder: Path) -> Mesh:
+        size = known(self.diameter, "body.diameter"), known(self.height, "body.height")
         if self.part == "quarter":
-            mesh = quarter_cylinder(self.diameter, self.height, *self.cells, self.grading)
+            mesh = quarter_cylinder(*size, *self.cells, self.grading)
         elif self.element.startswith("hex"):
-            mesh = hexahedral_cylinder(self.diameter, self.height, *self.cells)
+            mesh = hexahedral_cylinder(*size, *self.cells)
         else:
-            mesh = whole_cylinder(self.diameter, self.height, *self.cells)
+            mesh = whole_cylinder(*size, *self.cells)
         return _of_order(mesh, self.element)
 
     def scaled(self, share: float) -> "Cylinder":
@@ -246,10 +247,3 @@ class SurfaceFile:
         if self.edge <= 0:
             raise SceneError(f"{self.file}: body.edge is not set; its meshes are then not similar")
         return replace(self, edge=self.edge / share)
-
-
-@dataclass(frozen=True)
-class Computed:
-    """A mesh that a function of a file beside the declaration makes from the recording."""
-
-    make: Callable[[Any, Any], Mesh]

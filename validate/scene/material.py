@@ -22,7 +22,7 @@ LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"
 class Material:
     """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
 
-    A declaration may leave E open (None). Every law has this E and nu at small strain, which is all
+    A declaration may leave E and nu open (None). Every law has these at small strain, which is all
     that the linear schemes use;
     `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
     whose isochoric stress comes late. At nu = 0.5 mixed cells and static schemes keep the volume
@@ -32,8 +32,10 @@ class Material:
     not know, and those that lose positive energy, with the stretch.
     """
 
-    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain")
-    nu: float = quantity(MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells")
+    E: float = quantity(MISSING, "Pa", "Young's modulus at small strain", opened=True)
+    nu: float = quantity(
+        MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells", opened=True
+    )
     law: LawName = quantity("linear", "1", "linear, or the law at large strain")
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
@@ -47,7 +49,7 @@ class Material:
         take_units(self)
         if self.E is not None and not (np.isfinite(self.E) and self.E > 0):
             raise SceneError(f"modulus E = {self.E:g} Pa: expected a positive number")
-        if not -1 < self.nu <= 0.5:
+        if self.nu is not None and not -1 < self.nu <= 0.5:
             raise SceneError(
                 f"Poisson ratio nu = {self.nu:g}: expected -1 < nu <= 0.5; use at most 0.4999, "
                 "or 0.5 with mixed cells"
@@ -65,7 +67,7 @@ class Material:
                 "Prony series, or use neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
                 "'split'"
             )
-        if self.coefficients.stability == "required" and self.E is not None:
+        if self.coefficients.stability == "required" and None not in (self.E, self.nu):
             self.require_stable()
 
     def require_stable(self) -> None:

@@ -5,12 +5,13 @@
     z=20mm                         those on a plane; "z=20mm~0.5mm" within half a millimetre of it
     box 0,0,18mm to 5mm,5mm,20mm   those inside a box
     near 10mm,0,20mm               the one nearest to a point
+    x1 & z1                        the edges that two sides share
 
 Lengths without a unit are metres. Several places are joined by "+".
 """
 
 from functools import reduce
-from operator import or_
+from operator import and_, or_
 
 import numpy as np
 
@@ -18,10 +19,12 @@ from validate.arrays import Floats
 from validate.errors import SceneError, UsageError
 from validate.parameters import nearest_names
 from validate.scene.mesh import Mesh
-from validate.scene.select import Facing, InBox, Labelled, Nearest, OnPlane, Place, Site
+from validate.scene.select import Both, Facing, InBox, Labelled, Nearest, OnPlane, Place, Site
 from validate.units import in_si, split
 
-GRAMMAR = "a facet set, zmin, zmax, z=20mm, z=20mm~0.5mm, box A to B, near P (points as 1mm,2mm,0)"
+GRAMMAR = (
+    "a facet set, zmin, zmax, z=20mm, z=20mm~0.5mm, box A to B, near P (points as 1mm,2mm,0), A & B"
+)
 _AXES = "xyz"
 _FLAT = 2e-3  # of the body's diagonal: how far the facets of a filled surface lie off its sides
 
@@ -29,6 +32,11 @@ _FLAT = 2e-3  # of the body's diagonal: how far the facets of a filled surface l
 def place_of(text: str, mesh: Mesh) -> Place:
     """The facets that the words choose of a mesh; raises `SceneError` for words that say nothing,
     or choose nothing."""
+    if "&" in text:
+        sides = [_plane_of(_site(part.strip(), mesh)) for part in text.split("&")]
+        edges = reduce(and_, sides).edges
+        edges.entities(mesh)
+        return edges
     sites = [_site(part.strip(), mesh) for part in text.split("+")]
     chosen = reduce(or_, sites).faces
     if len(sites) == 1 and text.strip() in mesh.facets:
@@ -116,6 +124,11 @@ def _require_at(text: str, low: tuple[float, ...], high: tuple[float, ...], mesh
             f"place '{text[:60]}': {1e3 * away:.3g} mm away from a body of {1e3 * size:.3g} "
             "mm; a number without a unit is in metres, write 10mm"
         )
+
+
+def _plane_of(site: Site) -> Site:
+    """A side without the way its faces look, which edges do not have."""
+    return site.first if isinstance(site, Both) else site
 
 
 def _side(mesh: Mesh, axis: int, end: str) -> Site:

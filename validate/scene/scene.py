@@ -4,7 +4,7 @@ Declared, it is the parameter tree of an experiment: its body is a geometry (`sc
 places are words (`scene.named_place`). What is simulated is `resolved` on a mesh of the body.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, replace
 from hashlib import sha256
 from typing import Any, Literal, TypeVar
@@ -163,15 +163,12 @@ class Mass:
 
     name: str
     facets: Place = quantity(MISSING, "1", "where it hangs")
-    mass: float = quantity(MISSING, "kg", "mass")
+    mass: float = quantity(MISSING, "kg", "mass; 0: none hangs there")
 
     def __post_init__(self) -> None:
         take_units(self)
-        if not (np.isfinite(self.mass) and self.mass > 0):
-            raise SceneError(
-                f"mass '{self.name}': {self.mass:g} kg; expected a mass above 0; otherwise "
-                "remove the part"
-            )
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise SceneError(f"mass '{self.name}': {self.mass:g} kg; expected a mass of 0 or above")
 
 
 @dataclass(frozen=True)
@@ -291,12 +288,12 @@ class Scene:
 
     def resolved(self, mesh: Mesh) -> "Scene":
         """The scene on this mesh of its body: words become places, symmetry holds its planes."""
-        held = tuple(getattr(self.body, "held", ()))
+        held, places = tuple(getattr(self.body, "held", ())), getattr(self.body, "places", {})
         sides = tuple(side for f in self.foundations for side in _sides(f))
         bonded = tuple(Support(f.facets, f.components) for f in sides if f.contact == "bonded")
 
         def placed(parts: tuple[P, ...]) -> tuple[P, ...]:
-            return tuple(_placed(part, mesh) for part in parts)
+            return tuple(_placed(part, mesh, places) for part in parts)
 
         return replace(
             self,
@@ -306,7 +303,7 @@ class Scene:
             foundations=placed(tuple(f for f in sides if f.contact == "partial")),
             membranes=placed(tuple(m for m in self.membranes if m.thickness)),
             loads=placed(self.loads),
-            masses=placed(self.masses),
+            masses=placed(tuple(mass for mass in self.masses if mass.mass)),
             cavities=tuple(one for c in self.cavities for one in _each(c, mesh)),
             contacts=placed(self.contacts),
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
@@ -315,6 +312,7 @@ class Scene:
 
     def _check(self) -> None:
         known(self.material.E, "material.E")
+        known(self.material.nu, "material.nu")
         if self.dilatation == "nodal_mean" and self.mesh.order != 1:
             raise SceneError("nodal mean dilatation needs linear elements; use order 1")
         if self.mesh.dimension == 2 and (
@@ -451,12 +449,13 @@ def _sides(foundation: Foundation) -> tuple[Foundation, ...]:
     return tuple(replace(foundation, facets=place.strip()) for place in places)
 
 
-def _placed(part: P, mesh: Mesh) -> P:
-    """A part whose place is words, on the facets that they choose."""
+def _placed(part: P, mesh: Mesh, places: Mapping[str, Place]) -> P:
+    """A part whose place is words, on the facets that they choose; or a place of its geometry."""
     facets = getattr(part, "facets", None)
     if not isinstance(facets, str) or facets in mesh.facets:
         return part
-    return replace(part, facets=place_of(facets, mesh))  # type: ignore[type-var]
+    place = places[facets] if facets in places else place_of(facets, mesh)
+    return replace(part, facets=place)  # type: ignore[type-var]
 
 
 def _each(cavity: Cavity, mesh: Mesh) -> tuple[Cavity, ...]:

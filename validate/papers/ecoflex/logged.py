@@ -7,23 +7,23 @@ from pathlib import Path
 import numpy as np
 
 from validate.identify.modulus import loading
-from validate.papers.ecoflex.cylinder import LoggedCylinder, window
+from validate.papers.ecoflex.cylinder import LoggedCylinder, size, window
 from validate.papers.ecoflex.specimens import material_of, split
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
+from validate.replay.tree import Tree
 
 MATERIAL = "EF30_0T"  # Ecoflex 00-30 without thinner, as the data set calls it
 LOGS = frozenset(f"{MATERIAL}_A{k}" for k in range(1, 6))
 
 
-def follows(
-    experiment: Experiment, recordings: Sequence[Recording], p: LoggedCylinder
-) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """The experiment for the logs given.
 
     Other logs of the printed material are held to its figure, not to our value of the five logs.
     Another material has its own title and limit, and no printed figure.
     """
+    p: LoggedCylinder = tree.settings
     apart = split(recordings, p.judged).apart
     loads = (*((window(p.fit_to),) if apart else ()), window(p.limit_linear))
     judged = tuple(replace(a, loads=loads) for a in experiment.accept)
@@ -36,18 +36,18 @@ def follows(
     if materials == (MATERIAL,):
         own = tuple(replace(f, expected=None, drift=None) for f in experiment.published)
         return replace(experiment, title=title, published=own)
-    return _foreign(replace(experiment, title=title), recordings, p, materials)
+    return _foreign(replace(experiment, title=title), recordings, tree, materials)
 
 
 def _foreign(
     experiment: Experiment,
     recordings: Sequence[Recording],
-    p: LoggedCylinder,
+    tree: Tree,
     materials: tuple[str, ...],
 ) -> Experiment:
     """Another material: nothing of the printed one is taken for its own without saying so."""
-    limit = _tenth(recordings, p)
-    reason = f"a tenth of the force measured at {100 * p.limit_linear:g} % strain, these logs"
+    limit, strain = _tenth(recordings, tree), tree.settings.limit_linear
+    reason = f"a tenth of the force measured at {100 * strain:g} % strain, these logs"
     other = f"printed for {MATERIAL}; not compared with this data ({', '.join(materials)})"
     uncertainty = experiment.uncertainty
     return replace(
@@ -66,11 +66,11 @@ def _foreign(
     )
 
 
-def _tenth(recordings: Sequence[Recording], p: LoggedCylinder) -> float:
+def _tenth(recordings: Sequence[Recording], tree: Tree) -> float:
     """A tenth of the force N at the linear law's strain, mean over the logs."""
     forces = []
     for recording in recordings:
         log = loading(recording)
-        last = int(np.argmax(log.d >= p.limit_linear * p.specimen.size.height))
+        last = int(np.argmax(log.d >= tree.settings.limit_linear * size(tree).height))
         forces.append(float(log.force[last]))
     return 0.1 * float(np.mean(forces))

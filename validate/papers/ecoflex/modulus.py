@@ -7,7 +7,7 @@ apparent modulus as the material's, bonded ones divide it by the stiffening that
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import hypot, sqrt
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,11 +23,10 @@ from validate.identify.modulus import (
 )
 from validate.identify.votes import Votes, by_specimen
 from validate.papers.ecoflex.cylinder import (
-    CylinderModel,
     LoggedCylinder,
-    grid_of,
     model_scene,
     place,
+    size,
     stiffening,
 )
 from validate.papers.ecoflex.specimens import (
@@ -38,10 +37,12 @@ from validate.papers.ecoflex.specimens import (
     split,
     summarised,
 )
+from validate.parameters import with_given
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import CORNER_ORDER, Identified
 from validate.replay.method import Method
+from validate.replay.tree import Tree, changed_by
 from validate.scene.similar_grids import member
 
 T = TypeVar("T")
@@ -50,23 +51,24 @@ LAWS = ("svk_slip", "neo_slip", "neo_bonded")
 
 
 def identified(
-    recordings: Sequence[Recording], parameters: LoggedCylinder, methods: Mapping[str, Method]
+    recordings: Sequence[Recording], tree: Tree, methods: Mapping[str, Method]
 ) -> Identified:
     """The modulus for which each method, on its own mesh, has the measured slope or force of the
     specimens that calibrate."""
-    apart = split(recordings, parameters.judged)
+    p: LoggedCylinder = tree.settings
+    apart = split(recordings, p.judged)
     mine = [r for r in recordings if apart.calibrates(r)]
-    p, size = replace(parameters, judged=None), parameters.specimen.size
-    fits = [fit_modulus(r, size, (p.fit_from, p.fit_to)) for r in recordings]
+    every_log, own_size = with_given(tree, {"judged": None}), size(tree)
+    fits = [fit_modulus(r, own_size, (p.fit_from, p.fit_to)) for r in recordings]
     every, names = ([specimen_of(r) for r in logs] for logs in (recordings, mine))
     calibrating = [f for f, s in zip(fits, every, strict=True) if s in apart.calibrating]
     found = summarised(calibrating, names)
     own = by_specimen([f.E_apparent for f in calibrating], names)
-    factors = {name: _stiffening(p, methods[name].scene) for name in ("slip", "bonded")}
-    laws = {name: _law_fit(mine, p, methods[name]) for name in LAWS}
+    factors = {name: _stiffening(tree, methods[name]) for name in ("slip", "bonded")}
+    laws = {name: _law_fit(mine, every_log, methods[name]) for name in LAWS}
     moduli = {name: found.mean / factor for name, (factor, _) in factors.items()}
     moduli |= {name: fit.scale for name, (fit, _) in laws.items()}
-    scores = _scores(found, factors, gent_correction(size.diameter, size.height))
+    scores = _scores(found, factors, gent_correction(own_size.diameter, own_size.height))
     for name, (fit, mesh) in laws.items():
         votes = len(own.means) if len(own.means) > 1 else len(mine)
         scores += _law_scores(name, methods[name].label, fit, mesh, votes)
@@ -76,71 +78,71 @@ def identified(
         f"{_span(moduli['bonded'], found, factors['bonded'])} (bonded plates) and "
         f"{_span(moduli['slip'], found, factors['slip'])} (slipping); force alone cannot decide"
     )
-    squat = replace(p, specimen=replace(p.specimen, height=size.height / 2))
-    half = stiffening(squat, methods["bonded"].scene) / factors["bonded"][0]
-    notes = (*apart_notes(apart, own, p.ranges.specimen), *_notes(found, moduli, half, size.height))
+    squat = with_given(tree, {"body.height": own_size.height / 2})
+    half = stiffening(squat, methods["bonded"]) / factors["bonded"][0]
+    notes = (
+        *apart_notes(apart, own, p.ranges.specimen),
+        *_notes(found, moduli, half, own_size.height),
+    )
     fitted = p.material.E_slip is None or p.material.E_bonded is None
     calibrated = ("force@5pct",) if fitted and not apart.apart else ()
-    return Identified(_used(p, moduli, found, own, apart), scores, notes, headline, calibrated)
+    return Identified(_used(tree, moduli, found, own, apart), scores, notes, headline, calibrated)
 
 
 def _used(
-    p: LoggedCylinder,
+    tree: Tree,
     moduli: Mapping[str, float],
     found: ModulusSummary,
     own: Votes,
     apart: HeldOut,
-) -> LoggedCylinder:
+) -> Any:
     """The parameters with what was identified where nothing was set, and how sure that is."""
-    chosen = {f"E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
-    ranges = replace(
-        p.ranges,
-        specimen=p.ranges.specimen if own.between is None else own.between / own.mean,
-        modulus=p.ranges.modulus or found.sd_mean / found.mean,
+    p: LoggedCylinder = tree.settings
+    chosen = {f"material.E_{k}": getattr(p.material, f"E_{k}") or v for k, v in moduli.items()}
+    scatter = p.ranges.specimen if own.between is None else own.between / own.mean
+    certain = p.ranges.modulus or found.sd_mean / found.mean
+    return with_given(
+        tree,
+        {**chosen, "ranges.specimen": scatter, "ranges.modulus": certain, "judged": apart.judged},
     )
-    material = replace(p.material, **chosen)
-    return replace(p, material=material, ranges=ranges, judged=apart.judged)
 
 
 Factor = tuple[float, float]  # apparent over true modulus, and its uncertainty from the mesh
 
 
-def _stiffening(p: LoggedCylinder, model: CylinderModel) -> Factor:
-    return _meshed(p, model, lambda m: stiffening(p, m), float)
+def _stiffening(tree: Tree, method: Method) -> Factor:
+    return _meshed(tree, method, lambda m: stiffening(tree, m), float)
 
 
-def _law_fit(
-    recordings: Sequence[Recording], p: LoggedCylinder, method: Method
-) -> tuple[LawFit, float]:
+def _law_fit(recordings: Sequence[Recording], tree: Tree, method: Method) -> tuple[LawFit, float]:
     """The law's modulus over its whole range, by the method's own mesh, and the mesh's share Pa."""
-    model: CylinderModel = method.scene
-    return _meshed(
-        p, model, lambda m: _fitted(recordings, p, replace(method, scene=m)), lambda f: f.scale
-    )
+    return _meshed(tree, method, lambda m: _fitted(recordings, tree, m), lambda f: f.scale)
 
 
 def _meshed(
-    p: LoggedCylinder,
-    model: CylinderModel,
-    solve: Callable[[CylinderModel], T],
+    tree: Tree,
+    method: Method,
+    solve: Callable[[Method], T],
     value: Callable[[T], float],
 ) -> tuple[T, float]:
-    """What `solve` finds on the model's mesh, and the mesh's share from a similar one of about 2/3
+    """What `solve` finds on the method's mesh, and the mesh's share from a similar one of about 2/3
     the elements, of 3/2 where two of them are the least."""
-    own = grid_of(p, model)
+    changes = {**(method.scene or {}), "material.E": 1.0}
+    own = changed_by(tree, changes).scene.body.cells
     radial, axial = member(own, 2 / 3 if min(own) > 2 else 3 / 2)
-    found, again = solve(model), solve(replace(model, radial=radial, axial=axial))
+    changes["body.cells"] = (radial, axial)
+    found, again = solve(method), solve(replace(method, scene=changes))
     ratio = sqrt(own[0] * own[1] / (radial * axial))
     return found, mesh_share(value(found), value(again), ratio, CORNER_ORDER)
 
 
-def _fitted(recordings: Sequence[Recording], p: LoggedCylinder, method: Method) -> LawFit:
-    scene = model_scene(p, method.scene, 1.0)
+def _fitted(recordings: Sequence[Recording], tree: Tree, method: Method) -> LawFit:
+    scene = model_scene(tree, method, E=1.0)
     stepper = method.settings.prepare(build_system(scene))
     curves: dict[str, list[Floats]] = {}
     forces: dict[str, list[Floats]] = {}
     for recording in recordings:
-        seen = place(recording, p, scene)
+        seen = place(recording, tree, scene)
         states = [stepper.step(stepper.rest(), q) for q in seen.inputs]
         good = [s.failure is None for s in states]
         found = [s.numbers["stage.force"] for s in states if s.failure is None]

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,21 +22,21 @@ from validate.papers.gel.box import (
     FACES,
     GelBoxes,
     GelFaces,
-    GelGrid,
-    GelIndentation,
     Same,
     faces_of,
     inside_of,
     neighbours_of,
 )
 from validate.papers.gel.pair import motion
+from validate.parameters import with_given
 from validate.register.scattered import noise
+from validate.replay.tree import Tree
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 from validate.scene.select import nodes_of
 
 SMOOTHINGS = (0.5, 1.0, 2.0)
-_CELLS = GelGrid(along=6, up=3)  # a third of the nominal mesh's unknowns: no ratio moves by .01
+_CELLS = (6, 3)  # a third of the nominal mesh's unknowns: no ratio moves by .01
 RATIOS = (0.0, 0.1, 0.2, 0.27, 0.33, 0.38, 0.42, 0.445, 0.465, 0.48, 0.49, 0.4975)
 _FINE, _STEP = 40, 1e-3  # ratios tried at once; step of the second difference at the best
 
@@ -59,7 +60,8 @@ def between(whose: Same, box: GelBoxes) -> tuple[GelRatio, ...]:
     and those that reach beyond the particles, are left out."""
     found: list[GelRatio] = []
     x, _ = motion(whose.recording)
-    for k, (name, other) in enumerate(_around(replace(box, which="lower"))):
+    lower = replace(box, which="lower", cells=_CELLS, element="hex27")
+    for k, (name, other) in enumerate(_around(lower)):
         low, high = other.ends()
         if k and ((low < x.min(axis=0)) | (high > x.max(axis=0))).any():
             continue
@@ -92,12 +94,10 @@ def _around(box: GelBoxes) -> Iterator[tuple[str, GelBoxes]]:
 
 
 def _fitted(whose: Same, name: str, box: GelBoxes) -> list[GelRatio]:
-    seen = inside_of(whose, box, _CELLS, 2)
-    moved = []
+    seen = inside_of(whose, box)
     count = neighbours_of(whose, box)
-    for times in SMOOTHINGS:
-        mesh, u = faces_of(whose, box, GelFaces(count, times), _CELLS, 2)
-        moved.append(u)
+    moved = [faces_of(whose, box, GelFaces(count, times)) for times in SMOOTHINGS]
+    mesh = box.resolved(Path())
     held = nodes_of(mesh, FACES)
     fields = np.stack([solved(Scene(mesh, Material(1.0, nu)), held, moved) for nu in RATIOS])
     floor, sd = noise(seen.points, seen.u)
@@ -143,10 +143,11 @@ def best_ratio(errors: Floats, sd: Floats) -> tuple[float, float | None, float]:
     return nu, math.sqrt(2 * least / errors[0].size / bend), left
 
 
-OTHER_BOXES = f"absolute material.between, at least {RATIOS[0]:g}, at most {RATIOS[-1]:g}"
+OTHER_BOXES = f"absolute between, at least {RATIOS[0]:g}, at most {RATIOS[-1]:g}"
 
 
-def smoothed(p: GelIndentation, z: float) -> GelIndentation:
+def smoothed(tree: Tree, z: float) -> Tree:
     """Half as many neighbours at the faces at z = -sqrt(3), twice as many at sqrt(3)."""
     by = 2 ** (z / math.sqrt(3))
-    return replace(p, faces=replace(p.faces, smoothing=p.faces.smoothing * by))
+    smoothed: Tree = with_given(tree, {"faces.smoothing": tree.settings.faces.smoothing * by})
+    return smoothed

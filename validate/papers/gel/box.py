@@ -1,11 +1,11 @@
-"""Boxes in the gel whose faces move as was measured: parameters, scene and registration."""
+"""Boxes in the gel whose faces move as was measured: geometry, settings, scene and registration."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, reduce
 from operator import or_
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,24 +14,25 @@ from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError, UsageError
 from validate.fem.locate import barycentric_rows
 from validate.papers.gel.pair import files, linked_pair, motion, side_of
-from validate.parameters import part, quantity
+from validate.parameters import known, quantity
 from validate.recording.types import Recording
 from validate.register.displacements import DisplacementObservation
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.scattered import best_neighbours, local_fit, noise
 from validate.register.signals import SignalObservation
+from validate.replay.tree import Built, Tree
 from validate.scene.box import grid
-from validate.scene.laws import Coefficients
-from validate.scene.material import LawName, Material
-from validate.scene.mesh import Mesh, quadratic
-from validate.scene.scene import Drive, DriveShape, Scene
+from validate.scene.mesh import Kind, Mesh, quadratic
+from validate.scene.scene import DriveShape, Scene
 from validate.scene.select import Chosen, Labelled, Site, nodes_of
+from validate.scene.similar_grids import member
 
 Which = Literal["lower", "upper"]
 
 _SIDES: list[Site] = [Labelled(f"{axis}{end}") for axis in "xyz" for end in (0, 1)]
 FACES: Chosen = reduce(or_, _SIDES).faces
+_SIZES = ("x", "y", "side", "bottom", "middle", "top")
 _FEWEST = 50  # particles to compare
 _SMALL, _LARGE = 0.06, 0.2  # strain norms a spacing below the tops of the boxes
 _COUNTS = (40, 80, 160, 320, 640)  # neighbours tried at the faces
@@ -42,20 +43,11 @@ _DEEPEST = 0.03  # share of the discs whose middle is the axis
 
 
 @dataclass(frozen=True)
-class GelMaterial:
-    E: float = quantity(
-        1000.0, "Pa", "modulus; no displacement depends on it, so any value is valid"
-    )
-    nu: float | None = quantity(None, "1", "Poisson ratio; none: identified in the lower box")
-    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
-    between: float = quantity(
-        0.0, "1", "standard deviation of nu between boxes; 0: found by fitting it in several"
-    )
-
-
-@dataclass(frozen=True)
 class GelBoxes:
-    """One square column, cut at three heights into a lower and an upper box."""
+    """The geometry of a scene: one of two boxes, lower and upper, that a square column is cut into.
+
+    Its mesh begins at the origin, with the sides x0, x1, y0, y1, z0, z1 as facet sets.
+    """
 
     which: Which = quantity("upper", "1", "the box that is predicted")
     x: float | None = quantity(None, "m", "axis of the column; none: where the gel sinks most")
@@ -71,13 +63,24 @@ class GelBoxes:
     clear: float = quantity(
         1.0, "1", "distance from the faces, in spacings, from which particles are compared"
     )
+    cells: tuple[int, int] = quantity((8, 4), "1", "cells along a horizontal edge, and upwards")
+    element: Kind = quantity("hex27", "1", "hex27 or hex8")
+
+    def resolved(self, folder: Path) -> Mesh:
+        low, high = self.ends()
+        along, up = self.cells
+        mesh = grid(tuple((high - low).tolist()), (along, along, up))
+        return quadratic(mesh) if self.element == "hex27" else mesh
+
+    def scaled(self, share: float) -> "GelBoxes":
+        along, up = member(self.cells, share)
+        return replace(self, cells=(along, up))
 
     def ends(self) -> tuple[Floats, Floats]:
         """Corners (3,) m of the box; raises `UsageError` for one without volume."""
         x, y, side, bottom, middle, top = (
-            float(v) for v in (self.x, self.y, self.side, self.bottom, self.middle, self.top)
-            if v is not None
-        )  # fmt: skip
+            known(getattr(self, name), f"body.{name}") for name in _SIZES
+        )
         z = (bottom, middle) if self.which == "lower" else (middle, top)
         low = np.array([x - side / 2, y - side / 2, z[0]])
         high = np.array([x + side / 2, y + side / 2, z[1]])
@@ -85,7 +88,7 @@ class GelBoxes:
             um = [f"{1e6 * v:.1f}" for v in (side, bottom, middle, top)]
             raise UsageError(
                 f"the {self.which} box has no volume: side {um[0]} um, heights "
-                f"{', '.join(um[1:])} um; they must rise: --set box.middle=50um"
+                f"{', '.join(um[1:])} um; they must rise: --set body.middle=50um"
             )
         return low, high
 
@@ -106,36 +109,22 @@ class GelFaces:
 
 
 @dataclass(frozen=True)
-class GelGrid:
-    along: int = quantity(8, "1", "cells along a horizontal edge")
-    up: int = quantity(4, "1", "cells along the vertical one")
-
-
-@dataclass(frozen=True)
 class GelIndentation:
     """`data` is a folder with a pair of MATLAB files; none: the data set's own."""
 
-    material: GelMaterial = GelMaterial()
-    box: GelBoxes = GelBoxes()
     faces: GelFaces = GelFaces()
-    mesh: GelGrid = GelGrid()
+    between: float = quantity(
+        0.0, "1", "standard deviation of nu between boxes; 0: found by fitting it in several"
+    )
     data: str | None = quantity(None, "1", "folder of the pair; none: VALIDATE_SHARED_DATA")
     before: str | None = quantity(None, "1", "its file before; none: the first of two")
     after: str | None = quantity(None, "1", "its file after; none: the second of two")
     voxel: float | None = quantity(None, "m", "side of a pixel; none: as the data's source says")
 
 
-@dataclass(frozen=True)
-class GelModel:
-    """What a method's scene is built with."""
-
-    law: LawName = quantity("linear", "1", "law of the material")
-    order: int = quantity(2, "1", "of the hexahedra")
-
-
-def load(parameters: GelIndentation, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The linked particles of the whole volume."""
-    p = parameters
+    p: GelIndentation = tree.settings
     before, after = files(p.data, (p.before, p.after), folder)
     return (linked_pair(before, after, side_of(p.voxel, before)),)
 
@@ -164,11 +153,11 @@ def stated(recording: Recording) -> Mapping[str, float]:
         raise RegistrationError(
             f"heights of {1e6 * bottom:.1f} to {1e6 * top:.1f} um, where the strain norm reaches "
             f"{_LARGE:g}: no room for two boxes of {_ROOM:g} spacings of {1e6 * spacing:.1f} um; "
-            "set box.bottom, box.middle and box.top"
+            "set body.bottom, body.middle and body.top"
         )
     names = {"x": float(axis[0]), "y": float(axis[1]), "side": side}
     names |= {"bottom": bottom, "middle": middle, "top": top}
-    return {f"box.{name}": value for name, value in names.items()}
+    return {f"body.{name}": value for name, value in names.items()}
 
 
 def _axis(x: Floats, u: Floats, low: Floats, high: Floats, reach: float) -> Floats:
@@ -200,32 +189,30 @@ def strain_norms(slopes: Floats) -> Floats:
     return np.asarray(np.linalg.norm((slopes + slopes.swapaxes(1, 2)) / 2, axis=(1, 2)))
 
 
-def build(recording: Recording, parameters: GelIndentation, model: GelModel) -> Scene:
-    """The box with its lower corner at the origin; all its faces move as the particles there."""
-    p = parameters
-    if p.material.nu is None:
-        raise UsageError("material.nu is not set: identify it, or --set material.nu=0.45")
-    mesh, moved = faces_of(Same(recording), p.box, p.faces, p.mesh, model.order)
-    material = Material(
-        p.material.E, p.material.nu, model.law,
-        coefficients=p.material.coefficients.known_to(model.law),
-    )  # fmt: skip
-    faces = Drive(
-        "faces", FACES, (0.0, 0.0, 1.0), shape=DriveShape(moved / float(np.abs(moved).max()))
-    )
-    return Scene(mesh, material, drives=(faces,), force_unit="force unit")
+def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None) -> Scene:
+    """The declared scene; all faces of the box move as the particles there."""
+    scene = Built()(recording, tree, changes)
+    moved = faces_of(Same(recording), _meshed(tree, scene), tree.settings.faces)
+    shape = DriveShape(moved / float(np.abs(moved).max()))
+    return replace(scene, drives=tuple(replace(drive, shape=shape) for drive in scene.drives))
 
 
-def place(recording: Recording, parameters: GelIndentation, scene: Scene) -> Registered:
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """The faces' largest motion drives; the particles inside are compared, under the box's name."""
-    p, end, whose = parameters, np.array([1.0]), Same(recording)
-    _, moved = faces_of(whose, p.box, p.faces, p.mesh, scene.mesh.order)
+    box, end, whose = _meshed(tree, scene), np.array([1.0]), Same(recording)
+    moved = faces_of(whose, box, tree.settings.faces)
     most = np.array([[float(np.abs(moved).max())]])
     faces = SignalObservation("faces", "drives", end, most, "m", 0.0)
-    seen = inside_of(whose, p.box, p.mesh, scene.mesh.order)
-    hold = Selection(p.box.which, end, "after indentation")
-    told = (_links(recording), _corners(p, whose))
+    seen = inside_of(whose, box)
+    hold = Selection(box.which, end, "after indentation")
+    told = (_links(recording), _corners(box, tree.settings.faces, whose))
     return Registered((faces, seen), (hold,), findings=told)
+
+
+def _meshed(tree: Tree, scene: Scene) -> GelBoxes:
+    """The box with the elements of a method's scene."""
+    box: GelBoxes = tree.scene.body
+    return replace(box, element=scene.mesh.kind)
 
 
 @dataclass(frozen=True)
@@ -240,27 +227,19 @@ class Same:
         object.__setattr__(self, "sha256", self.recording.source.sha256)
 
 
-def _mesh(box: GelBoxes, cells: GelGrid, order: int) -> Mesh:
-    low, high = box.ends()
-    mesh = grid(tuple((high - low).tolist()), (cells.along, cells.along, cells.up))
-    return quadratic(mesh) if order == 2 else mesh
-
-
 @lru_cache(maxsize=8)
-def faces_of(
-    whose: Same, box: GelBoxes, faces: GelFaces, cells: GelGrid, order: int
-) -> tuple[Mesh, Floats]:
-    """The mesh, and displacements (k, 3) m of its faces' nodes: local quadratics of the particles
+def faces_of(whose: Same, box: GelBoxes, faces: GelFaces) -> Floats:
+    """Displacements (k, 3) m of the nodes of the box's faces: local quadratics of the particles
     around."""
     x, u = motion(whose.recording)
     if any(faces.draws):
         _, sd = noise(x, u)
         for seed, share in enumerate(faces.draws, 1):
             u = u + share * sd * np.random.default_rng(seed).standard_normal(u.shape)
-    mesh, (low, _) = _mesh(box, cells, order), box.ends()
+    mesh, (low, _) = box.resolved(Path()), box.ends()
     at = mesh.nodes[nodes_of(mesh, FACES)] + low
     count = round((faces.neighbours or neighbours_of(whose, box)) * faces.smoothing)
-    return mesh, local_fit(x, u, at, count, robust=True).values
+    return local_fit(x, u, at, count, robust=True).values
 
 
 @lru_cache(maxsize=32)
@@ -274,7 +253,7 @@ def neighbours_of(whose: Same, box: GelBoxes) -> int:
 
 
 @lru_cache(maxsize=8)
-def inside_of(whose: Same, box: GelBoxes, cells: GelGrid, order: int) -> DisplacementObservation:
+def inside_of(whose: Same, box: GelBoxes) -> DisplacementObservation:
     """The linked particles in the box, as far off its faces as is asked for.
 
     Raises `RegistrationError` for too few.
@@ -284,7 +263,7 @@ def inside_of(whose: Same, box: GelBoxes, cells: GelGrid, order: int) -> Displac
     clear = box.clear * float(whose.recording.record("linking")["spacing_m"])
     inside = ((x > low + clear) & (x < high - clear)).all(axis=1)
     _require(int(inside.sum()), box, clear)
-    at, mesh = x[inside] - low, _mesh(box, cells, order)
+    at, mesh = x[inside] - low, box.resolved(Path())
     _, sd = noise(x[inside], u[inside])
     return DisplacementObservation(
         "particles", "validates", np.array([1.0]), at, u[inside], barycentric_rows(mesh, at), sd,
@@ -296,7 +275,7 @@ def _require(count: int, box: GelBoxes, clear: float) -> None:
     if count < _FEWEST:
         raise RegistrationError(
             f"{count} linked particles in the {box.which} box more than {1e6 * clear:.1f} um off "
-            f"its faces, {_FEWEST} are needed; make it larger: --set box.side=200um"
+            f"its faces, {_FEWEST} are needed; make it larger: --set body.side=200um"
         )
 
 
@@ -309,10 +288,10 @@ def _links(recording: Recording) -> str:
     )
 
 
-def _corners(p: GelIndentation, whose: Same) -> str:
+def _corners(box: GelBoxes, faces: GelFaces, whose: Same) -> str:
     ends = ", ".join(
         f"{axis} {1e6 * a:.1f} to {1e6 * b:.1f}"
-        for axis, a, b in zip("xyz", *p.box.ends(), strict=True)
+        for axis, a, b in zip("xyz", *box.ends(), strict=True)
     )
-    count = p.faces.neighbours or neighbours_of(whose, p.box)
-    return f"The {p.box.which} box: {ends} µm; its faces are fitted with {count} neighbours."
+    count = faces.neighbours or neighbours_of(whose, box)
+    return f"The {box.which} box: {ends} µm; its faces are fitted with {count} neighbours."

@@ -16,12 +16,13 @@ from validate.register.displacements import DisplacementObservation
 from validate.replay.experiment import Progress, Told
 from validate.replay.followed import Cases, Followed
 from validate.replay.method import Method
+from validate.replay.tree import Tree
 
 _OVER = "rms errors of displacement vectors over the"
 
 
 def tell(
-    parameters: GelIndentation,
+    tree: Tree,
     cases: Cases,
     progress: Progress,
     *,
@@ -30,17 +31,16 @@ def tell(
 ) -> Told:
     """Tables and maps of the particles judged, and the ratios of prediction to floor. `methods`
     are those of the lower box; `home` is the experiment's folder."""
-    p = parameters
-    whose = Same(load(p, home)[0])
+    whose, box = Same(load(tree, home)[0]), tree.scene.body
     main = {name: f for name, f in cases[""].items() if f.run.finished}
     (seen,) = next(iter(main.values())).seen.of(DisplacementObservation)
     errors = {name: _errors(f) for name, f in main.items()}
-    judged = GelErrors(seen, errors, strains(whose, p.box, seen))
+    judged = GelErrors(seen, errors, strains(whose, box, seen))
     progress("errors inside")
     shown = (
-        _inside(judged, p.box.which, main),
-        _calibrated(in_lower(whose, p, methods), between(whose, p.box)),
-        _linked(whose, p, home, progress),
+        _inside(judged, box.which, main),
+        _calibrated(in_lower(whose, tree, methods), between(whose, box)),
+        _linked(whose, tree.settings, home, progress),
     )
     return Told(shown, {f"ratio.{n}": rms(e) / rms(judged.floor) for n, e in errors.items()})
 

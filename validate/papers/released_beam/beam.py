@@ -11,7 +11,6 @@ their median is a part of the measurement's uncertainty instead.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,33 +19,24 @@ from validate.arrays import Floats, rms
 from validate.fem.locate import standing_rows
 from validate.papers.released_beam.cards import (
     BASE,
-    FEET,
     LAYOUT,
     TIPS,
-    BeamModel,
-    BeamSize,
-    G,
     ReleasedBeam,
 )
 from validate.papers.released_beam.expected import doubted
 from validate.papers.released_beam.gaps import over
 from validate.papers.released_beam.recorded import REST, SWING
 from validate.papers.released_beam.swing import LABEL, Swing
-from validate.parameters import known
 from validate.recording.types import Markers, Recording
+from validate.register.as_declared import given_inputs
 from validate.register.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import Deviation, Selection, Simulated
 from validate.register.registered import Registered
-from validate.register.signals import SignalObservation
-from validate.replay.cards import require_used
 from validate.replay.experiment import Identified
 from validate.replay.method import Method
-from validate.scene.box import grid
-from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
-from validate.scene.prony import Prony
-from validate.scene.scene import Mass, Probe, Scene, Support, Weight
-from validate.scene.select import Chosen, OnPlane
+from validate.replay.tree import Built, Tree
+from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
 
 SETTLED = "settled"
 _STANDS = 0.012  # m: how far off the beam a marker of the layout may stand, and then some
@@ -61,52 +51,13 @@ TOGETHER = (
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def build(recording: Recording, parameters: ReleasedBeam, model: BeamModel) -> Scene:
-    """Clamped at x = 0, x along the beam, z up; the markers of the tip are probes on stalks."""
-    p, s = parameters, parameters.size
-    hung = (Mass("load", _upper_edge(s), p.load.mass),) if p.load.mass else ()
-    across = model.across or p.mesh.across
-    return Scene(
-        _mesh(s, (model.along or p.mesh.along, across, across), model.order),
-        _material(p, model),
-        (Support("x0", (0, 1, 2)),),
-        loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
-        masses=hung,
-        probes=(
-            *(Probe(name, LAYOUT[name], stands=True) for name in TIPS),
-            *(Probe(name, at) for name, at in FEET.items()),
-        ),
-        dilatation="mixed" if model.mixed else "pointwise",
-    )
-
-
-def _material(p: ReleasedBeam, model: BeamModel) -> Material:
-    """Where a model has Rayleigh's damping, that is in place of the series."""
-    card = p.material
-    relaxes = model.law not in ("linear", "svk") and not model.damping
-    return Material(
-        known(card.E, "material.E"),
-        card.nu if model.nu is None else model.nu,
-        model.law,
-        card.rho,
-        stiffness_damping=model.damping,
-        coefficients=card.coefficients.known_to(model.law),
-        prony=card.relaxation.prony if relaxes else Prony(),
-    )
-
-
-def _upper_edge(s: BeamSize) -> Chosen:
-    end, top = (
-        OnPlane((s.length, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        OnPlane((0.0, 0.0, s.height), (0.0, 0.0, 1.0)),
-    )
-    return (end & top).edges
-
-
-@lru_cache(maxsize=8)
-def _mesh(size: BeamSize, cells: tuple[int, int, int], order: int) -> Mesh:
-    mesh = grid((size.length, size.width, size.height), cells)
-    return quadratic(mesh) if order == 2 else mesh
+def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None) -> Scene:
+    """The declared scene. Where a method has Rayleigh's damping, that is in place of the series."""
+    scene = Built()(recording, tree, changes)
+    material = scene.material
+    if material.law in ("linear", "svk") or material.stiffness_damping:
+        return scene
+    return replace(scene, material=replace(material, prony=tree.settings.relaxation.prony))
 
 
 # --- the recording in it --------------------------------------------------------------------------
@@ -119,11 +70,12 @@ class Resting(MarkerObservation):
         return super().deviations(run, selection) if selection.label == SETTLED else ()
 
 
-def place(recording: Recording, parameters: ReleasedBeam, scene: Scene) -> Registered:
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """Six markers fitted to the layout, once, at rest; those of the tip are compared from where
     they were seen to stand, so that the layout's own errors do not enter displacements. Models of
     the linear law are filters', which are given the swing sample by sample."""
-    p, still, moving = parameters, recording.marker(REST), recording.marker(SWING)
+    p: ReleasedBeam = tree.settings
+    still, moving = recording.marker(REST), recording.marker(SWING)
     layout = {name: np.array(at) for name, at in LAYOUT.items()}
     whole = observe_markers(still, layout, scene.mesh, how=p.registration, stands=_STANDS)
     if scene.material.law == "linear":
@@ -138,11 +90,7 @@ def place(recording: Recording, parameters: ReleasedBeam, scene: Scene) -> Regis
         Selection(SETTLED, np.array([end]), "means over a second of rest"),
         Selection(LABEL, seen.t[seen.compared], "every sample of the swing"),
     )
-    return Registered((_gravity(t), Resting(**vars(tips)), seen), selections)
-
-
-def _gravity(t: Floats) -> SignalObservation:
-    return SignalObservation("gravity", "drives", t, np.full((len(t), 1), G), "m/s^2", 0.0)
+    return Registered((*given_inputs(scene, t), Resting(**vars(tips)), seen), selections)
 
 
 def _swing(whole: MarkerObservation, moving: Markers, p: ReleasedBeam, until: float) -> Swing:
@@ -187,7 +135,8 @@ def _tracked(
         positions=standing_rows(scene.mesh, rest), sd=_noise(_moved(whole, moving)), axis_sd=(),
         tre=np.full(len(TIPS), np.sqrt(3) * p.ranges.repeats),
     )  # fmt: skip
-    return Registered((_gravity(tips.t), tips), (Selection("tracked", tips.t, "every sample"),))
+    inputs = given_inputs(scene, tips.t)
+    return Registered((*inputs, tips), (Selection("tracked", tips.t, "every sample"),))
 
 
 def _from_where_they_stand(
@@ -216,20 +165,19 @@ def _from_where_they_stand(
 
 
 def heeded(
-    recordings: Sequence[Recording], p: ReleasedBeam, methods: Mapping[str, Method]
+    recordings: Sequence[Recording], tree: Tree, methods: Mapping[str, Method]
 ) -> Identified:
-    """Nothing is identified here: coefficients that no law knows are refused, what the base did is
-    told, and a mass that does not ring like the recording is doubted."""
-    require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
+    """Nothing is identified here: what the base did is reported, and a mass that does not ring like
+    the recording is doubted."""
     moving = recordings[0].marker(SWING)
     base = base_moved(moving.x - moving.x[0])
     said = (
         f"The base is held still in the models; in the median of its markers it stirred by "
         f"{1e3 * base:.2f} mm rms after the release, which is in u_D."
     )
-    return Identified(p, (), (said,), doubts=doubted(recordings[0], p))
+    return Identified(tree, (), (said,), doubts=doubted(recordings[0], tree))
 
 
-def sets(parameters: ReleasedBeam, seen: Registered) -> dict[str, Any]:
+def sets(tree: Tree, seen: Registered) -> dict[str, Any]:
     """The step of whatever steps through the swing."""
     return {"dt": float(seen.t[0])}

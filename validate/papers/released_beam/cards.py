@@ -1,18 +1,17 @@
-"""What a user decides of the silicone beam of srl-ethz/diffPD_sim2real, with units and sources."""
+"""What the scene of the silicone beam of srl-ethz/diffPD_sim2real does not hold, with units and
+sources."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from validate.errors import UsageError
-from validate.parameters import Ranges, part, quantity
+from validate.parameters import Ranges, quantity
 from validate.register.fitting import MarkerFit
-from validate.scene.laws import Coefficients
-from validate.scene.material import LawName
+from validate.replay.tree import Tree
 from validate.scene.prony import Prony
 
 DATA_SET = "srl-ethz/diffPD_sim2real 825e7b7 (MIT)"
 FOLDER = "markers/silicone-beam"
-G = 9.80709  # m/s2, as the data set declares it
 #: Markers m in the frame of the beam, x from the clamp, z up, as the data set places them.
 LAYOUT: Mapping[str, tuple[float, float, float]] = {
     "Tip - 1": (0.1, 0.015, 0.036),
@@ -63,39 +62,6 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
-class BeamSilicone:
-    E: float | None = quantity(
-        263_824.0, "Pa", "relaxed modulus, as the data set declares it; none: identified"
-    )
-    nu: float = quantity(0.499, "1", "Poisson ratio that the data set declares")
-    rho: float = quantity(1070.0, "kg/m3", "density that the data set declares")
-    coefficients: Coefficients = part(Coefficients(), "what the models' laws have beyond E and nu")
-    relaxation: Relaxation = Relaxation()
-
-
-@dataclass(frozen=True)
-class BeamSize:
-    length: float = quantity(0.1, "m", "from the clamp to the free end")
-    width: float = quantity(0.03, "m", "across, horizontally")
-    height: float = quantity(0.03, "m", "across, vertically")
-
-
-@dataclass(frozen=True)
-class BeamGrid:
-    along: int = quantity(5, "1", "cells along the beam")
-    across: int = quantity(2, "1", "cells across it, both ways")
-
-
-@dataclass(frozen=True)
-class HungMass:
-    mass: float = quantity(0.0, "kg", "mass at the upper edge of the free end; 0: none")
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.mass < 10:
-            raise UsageError(f"load.mass = {self.mass:g} kg: from 0 to 10 kg; 52 g are 0.052")
-
-
-@dataclass(frozen=True)
 class SwingTimes:
     """What is simulated and compared of the swing."""
 
@@ -128,32 +94,18 @@ class BeamRanges(Ranges):
 
 @dataclass(frozen=True)
 class ReleasedBeam:
-    """`recording` is a file that any reader takes; none: the data set's own under gravity."""
+    """The recording is a file that any reader takes; none: the data set's own under gravity."""
 
-    material: BeamSilicone = BeamSilicone()
-    size: BeamSize = BeamSize()
-    mesh: BeamGrid = BeamGrid()
-    load: HungMass = HungMass()
+    relaxation: Relaxation = Relaxation()
     swing: SwingTimes = SwingTimes()
     ranges: BeamRanges = BeamRanges()
     registration: MarkerFit = MarkerFit(sd=(0.8e-3,))
-    recording: str | None = quantity(None, "1", "the recording; none: VALIDATE_SHARED_DATA")
-    calibration: str | None = quantity(
-        None, "1", "the recording under gravity alone that calibrates; none: that of the data set"
+    calibration: str = quantity(
+        "", "1", "the recording under gravity alone that calibrates; empty: that of the data set"
     )
     unit: str | None = quantity(None, "1", "unit of length where the recording states none")
 
 
-@dataclass(frozen=True)
-class BeamModel:
-    """What a method's scene is built with."""
-
-    law: LawName = quantity("neo_hooke", "1", "law of the material")
-    order: int = quantity(2, "1", "of the hexahedra")
-    mixed: bool = quantity(True, "1", "with independent pressure, which avoids locking")
-    along: int | None = quantity(None, "1", "cells along the beam; none: the mesh's")
-    across: int | None = quantity(None, "1", "cells across it; none: the mesh's")
-    damping: float = quantity(0.0, "s", "Rayleigh's beta, instead of relaxation")
-    nu: float | None = quantity(
-        None, "1", "Poisson ratio of cells that lock; none: that of the material"
-    )
+def hung(tree: Tree) -> float:
+    """The mass kg at the upper edge of the free end; 0 without one."""
+    return sum(mass.mass for mass in tree.scene.masses)

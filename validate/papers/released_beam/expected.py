@@ -9,49 +9,51 @@ import numpy as np
 
 from validate.errors import ComparisonError
 from validate.identify.ringing import ringing
-from validate.papers.released_beam.cards import TIPS, ReleasedBeam
+from validate.papers.released_beam.cards import TIPS, ReleasedBeam, hung
 from validate.papers.released_beam.recorded import SWING, fallen
 from validate.parameters import known
 from validate.recording.types import Recording
+from validate.replay.tree import Tree
 
 _OWN = 33 / 140  # of the beam's mass swings at its end
 _FAR = 0.15  # relative: relaxation stiffens by some 5 %, a modulus is uncertain by as much
 
 
-def stiffness(p: ReleasedBeam) -> float:
+def stiffness(tree: Tree) -> float:
     """N/m at the free end."""
-    s = p.size
-    return known(p.material.E, "material.E") * s.width * s.height**3 / (4 * s.length**3)
+    length, width, height = tree.scene.body.size
+    E = known(tree.scene.material.E, "material.E")
+    return float(E * width * height**3 / (4 * length**3))
 
 
-def swinging(p: ReleasedBeam) -> float:
+def swinging(tree: Tree) -> float:
     """kg of the beam's own that swing at its end."""
-    s = p.size
-    return _OWN * p.material.rho * s.length * s.width * s.height
+    length, width, height = tree.scene.body.size
+    return float(_OWN * known(tree.scene.material.rho, "material.rho") * length * width * height)
 
 
-def expected(p: ReleasedBeam) -> float:
+def expected(tree: Tree) -> float:
     """Hz at which the beam should ring with what hangs there."""
-    return float(np.sqrt(stiffness(p) / (swinging(p) + p.load.mass)) / (2 * np.pi))
+    return float(np.sqrt(stiffness(tree) / (swinging(tree) + hung(tree))) / (2 * np.pi))
 
 
-def doubted(recording: Recording, p: ReleasedBeam) -> tuple[str, ...]:
+def doubted(recording: Recording, tree: Tree) -> tuple[str, ...]:
     """A sentence where the recording rings far from what is expected; none where it does not
     ring."""
-    seen = _ringing(recording, p)
-    if seen is None or abs(seen / expected(p) - 1) <= _FAR:
+    seen = _ringing(recording, tree.settings)
+    if seen is None or abs(seen / expected(tree) - 1) <= _FAR:
         return ()
-    mass = stiffness(p) / (2 * np.pi * seen) ** 2 - swinging(p)
-    none = mass < -_FAR * swinging(p)
+    mass = stiffness(tree) / (2 * np.pi * seen) ** 2 - swinging(tree)
+    none = mass < -_FAR * swinging(tree)
     meant = (
         "no mass gives this frequency, but a stiffer beam does"
         if none
         else (f"{1e3 * max(mass, 0):.0f} g would")
     )
     return (
-        f"{recording.name} rings at {seen:.2f} Hz, where a beam with load.mass = "
-        f"{1e3 * p.load.mass:g} g should at {expected(p):.2f} Hz; {meant}: check load.mass, "
-        "material.E, size",
+        f"{recording.name} rings at {seen:.2f} Hz, where a beam with masses.load.mass = "
+        f"{1e3 * hung(tree):g} g should at {expected(tree):.2f} Hz; {meant}: check "
+        "masses.load.mass, material.E, body.size",
     )
 
 

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from validate.compare.published import Figure
-from validate.papers.released_beam.cards import DATA_SET, FEET, ReleasedBeam
+from validate.papers.released_beam.cards import DATA_SET, FEET, hung
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
+from validate.replay.tree import Tree
 
 _LENGTH = 0.1
 _WITHIN = 1e-4  # m
@@ -43,8 +44,6 @@ def _figure(foot: str, axis: str, at: float, mass: float) -> Figure:
     )  # fmt: skip
 
 
-def follows(
-    experiment: Experiment, recordings: Sequence[Recording], parameters: ReleasedBeam
-) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """The figures are those of the load that hangs there."""
-    return replace(experiment, published=figures(parameters.load.mass))
+    return replace(experiment, published=figures(hung(tree)))

@@ -14,10 +14,11 @@ import numpy as np
 from validate.arrays import Floats
 from validate.datasets.home import found
 from validate.errors import RecordingError
-from validate.papers.released_beam.cards import FOLDER, LAYOUT, TIPS, ReleasedBeam
+from validate.papers.released_beam.cards import FOLDER, LAYOUT, TIPS
 from validate.papers.released_beam.gaps import over
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording
+from validate.replay.tree import Tree
 
 REST, SWING = "markers", "swing"  # streams: two instants of rest; the samples from the release on
 _MOVED = 5e-4  # m: of the tip, when the beam has been let go
@@ -27,10 +28,11 @@ _SETTLING = 1.5  # s from the release to where rest may begin
 _SAME, _STILL = 1e-3, 1e-4  # m: how far positions wander at rest, at most, and where it is sure
 
 
-def load(parameters: ReleasedBeam, folder: Path) -> tuple[Recording, ...]:
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The recording as its two states of rest and its swing."""
-    path = found(FOLDER, "beam_gravity_V2_b.c3d", folder, parameters.recording)
-    options = {"unit": parameters.unit} if parameters.unit else {}
+    path = found(FOLDER, "beam_gravity_V2_b.c3d", folder, tree.recording or None)
+    unit = tree.settings.unit
+    options = {"unit": unit} if unit else {}
     return (released(recognised(path).read(path, options)),)
 
 

@@ -9,13 +9,14 @@ from scipy.stats import t as student
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.papers.skin_pads.files import FORCE
-from validate.papers.skin_pads.placed import binned
-from validate.papers.skin_pads.sheet import PulledSkin
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Experiment, Told
 from validate.replay.followed import MAIN, Cases, Followed
+from validate.replay.tree import Tree
+
+from .files import FORCE
+from .placed import binned
 
 _HEADINGS = (
     "law", f"E x thickness / {FORCE}/m", "95 % ±", f"fitted: rms / {FORCE}",
@@ -23,7 +24,7 @@ _HEADINGS = (
 )  # fmt: skip
 
 
-def exhibits(parameters: PulledSkin, cases: Cases, progress: Any) -> Told:
+def exhibits(tree: Tree, cases: Cases, progress: Any) -> Told:
     """Every law's fit beside its prediction, with the interval that the fit leaves."""
     ended = [f for f in cases[MAIN].values() if f.whole]
     rows = {f.label: _row(f) for f in ended}
@@ -69,9 +70,9 @@ def _share(force: Floats, measured: Floats) -> float:
     return float(student.ppf(0.975, freedom)) * scatter / float(np.linalg.norm(force))
 
 
-def follows(experiment: Experiment, recordings: Sequence[Recording], p: PulledSkin) -> Experiment:
+def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """Limits in proportion to what was measured: a unit nobody stated has no scale."""
-    largest = float(np.abs(binned(recordings[0], p).force).max())
+    largest = float(np.abs(binned(recordings[0], tree.settings).force).max())
     accept = tuple(
         replace(a, limit=0.1 * largest) if a.quantity == "force" else a for a in experiment.accept
     )

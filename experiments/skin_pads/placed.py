@@ -7,14 +7,16 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.papers.skin_pads.files import FORCE, jitter
-from validate.papers.skin_pads.sheet import PADS, PulledSkin
 from validate.recording.types import Markers, Recording
 from validate.register.markers import Together, observe_markers
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
+from validate.replay.tree import Tree
 from validate.scene.scene import Scene
+
+from .files import FORCE, jitter
+from .skin import PADS, PulledSkin
 
 TOGETHER = (
     Together("field.axial", (0,), "displacement of the points along the pull"),
@@ -37,11 +39,12 @@ class ForceSteps:
     left_out: int
 
 
-def place(recording: Recording, parameters: PulledSkin, scene: Scene) -> Registered:
+def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """Pads drive; force calibrates in the window "fitted" and is judged in "predicted" and at the
     "end"; the points of the images are judged where the pads had come apart by the holds."""
-    p, law = parameters, scene.material.law
-    curve = binned(recording, replace(p, predict_to=p.limit_svk) if law == "svk" else p)
+    p: PulledSkin = tree.settings
+    svk = scene.material.law == "svk"
+    curve = binned(recording, replace(p, predict_to=p.limit_svk) if svk else p)
     images = Images(recording)
     points, holds, left = images.held(p.field)
     at = np.argsort(np.concatenate([curve.t, points.t]), kind="stable")

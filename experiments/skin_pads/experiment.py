@@ -9,24 +9,45 @@ images, the pads can follow the edges of the field: `--set pads.follow=edges --s
 
 from validate.compare.expected import Expected
 from validate.compare.verdict import Accept
-from validate.papers.skin_pads.laws import exhibits, follows
-from validate.papers.skin_pads.placed import place
-from validate.papers.skin_pads.sheet import PulledSkin, build, load, stated
-from validate.papers.skin_pads.sheet import SheetModel as Model
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, MeshLadder, Uncertainty, vary
 from validate.replay.method import Method
+from validate.replay.tree import CellSize
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.scene.sheet import Sheet
 from validate.solve.newton import StaticNewton
 from validate.solve.proportional import Proportional
 
+from .files import FORCE
+from .laws import exhibits, follows
+from .placed import place
+from .skin import PulledSkin, build, load, stated
+
+# Pads are driven apart and let nothing turn.
+PADS = (Support("left_pad", (1,)), Support("right_pad", (1,)))
+FAR = tuple(Support(side, (0, 1)) for side in ("x0", "x1", "y0", "y1"))
 LINEAR, LARGE = Proportional(), Proportional(StaticNewton("none", tolerance=1e-7))
+OGDEN = {"material.law": "ogden", "material.ogden_alpha": (8.0,), "material.stretches": (0.5, 2.0)}
 METHODS = {
-    "neo_hooke": Method("neo-Hooke", LARGE, Model()),
-    "linear": Method("linear", LINEAR, Model("linear", "linear")),
-    "svk": Method("St. Venant-Kirchhoff", LARGE, Model("svk", "svk")),
-    "yeoh": Method("Yeoh, cubic term assumed", LARGE, Model("yeoh", "yeoh")),
-    "ogden": Method("Ogden, power assumed", LARGE, Model("ogden", "ogden")),
-    "held": Method("neo-Hooke, far boundary held", LARGE, Model(stiffness="held", far="held")),
+    "neo_hooke": Method("neo-Hooke", LARGE, {"material.E": "as material.E_neo"}),
+    "linear": Method(
+        "linear", LINEAR, {"material.law": "linear", "material.E": "as material.E_linear"}
+    ),
+    "svk": Method(
+        "St. Venant-Kirchhoff", LARGE, {"material.law": "svk", "material.E": "as material.E_svk"}
+    ),
+    "yeoh": Method(
+        "Yeoh, cubic term assumed",
+        LARGE,
+        {"material.law": "yeoh", "material.E": "as material.E_yeoh"},
+    ),
+    "ogden": Method("Ogden, power assumed", LARGE, {**OGDEN, "material.E": "as material.E_ogden"}),
+    "held": Method(
+        "neo-Hooke, far boundary held",
+        LARGE,
+        {"supports": (*FAR, *PADS), "material.E": "as material.E_held"},
+    ),
 }
 WHERE = "assumed: five decades"
 HELPS = "a force with a known unit, and the skin's thickness by ultrasound,"
@@ -40,32 +61,21 @@ CALIBRATIONS = tuple(
                          ("yeoh", "yeoh"), ("ogden", "ogden"), ("held", "held"))
 )  # fmt: skip
 NONE = "assumed; the data set gives none"
-UNCERTAINTY = Uncertainty(
-    # Order: the corners of the pads are singular.
-    MeshLadder(
-        (
-            {"mesh.cells": "- 1"},
-            {"mesh.cells": "+ 1"},
-        ),
-        lambda p: p.pads.width / p.mesh.cells,
-        order=1.2,
-    ),
-    (
-        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu", NONE),
-        vary(("pads.length", "pads.width"), "absolute ranges.pads", "pads",
-              "length and width of the pads", "assumed; drawn 8 mm, the window is 24 mm"),
-        vary("pads.gap", "absolute ranges.gap", "distance",
-              "between the pads at rest", "assumed; unknown in the authors' scripts"),
-    ),
-    surrogate="neo_hooke",
-)  # fmt: skip
 
 EXPERIMENT = Experiment(
     name="skin_pads",
     needs="skin-pads",
     title="Skin in vivo between two pads",
     source="aflahelouneg/inverse_identification_soft_tissue e9c7a1c (MIT)",
-    parameters=PulledSkin(),
+    scene=Scene(
+        body=Sheet(),
+        material=Material(None, 0.45, "neo_hooke"),  # per metre of thickness
+        supports=PADS,
+        drives=(Drive("moving", "left_pad", (-1.0, 0.0)), Drive("fixed", "right_pad", (1.0, 0.0))),
+        plane="stress",
+        force_unit=FORCE,
+    ),
+    settings=PulledSkin(),
     methods=METHODS,
     accepted=("neo_hooke", "linear"),
     accept=(
@@ -85,11 +95,21 @@ EXPERIMENT = Experiment(
     build=build,
     place=place,
     stated=stated,
-    uncertainty=UNCERTAINTY,
+    # Order: the corners of the pads are singular.
+    uncertainty=Uncertainty(
+        MeshLadder(({"body.cells": "- 1"}, {"body.cells": "+ 1"}), CellSize(), order=1.2),
+        surrogate="neo_hooke",
+    ),
+    variations=(
+        vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio", "nu", NONE),
+        vary(("body.pad_length", "body.pad_width"), "absolute ranges.pads", "pads",
+             "length and width of the pads", "assumed; drawn 8 mm, the window is 24 mm"),
+        vary("body.gap", "absolute ranges.gap", "distance",
+             "between the pads at rest", "assumed; unknown in the authors' scripts"),
+    ),
     calibrations=CALIBRATIONS,
     exhibits=exhibits,
     follows=follows,
     axis="x",
     locates=("data",),
-)
-"""Skin in vivo between two pads: what a force to 4 mm says of one to 8.4 mm."""
+)  # fmt: skip

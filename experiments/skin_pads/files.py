@@ -31,9 +31,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.files import buffered, read_bytes, read_text
-from validate.papers.skin_pads.edge_points import Marks, Points, edges, named_points
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.units import SYMBOLIC
+
+from .edge_points import Marks, Points, edges, named_points
 
 FORCE = SYMBOLIC[0]
 Follow = Literal["marks", "edges"]
@@ -43,8 +44,8 @@ WINDOW = (
 _LARGEST = 64_000_000  # bytes of a file of numbers
 _POINTS = ("x0.dat", "y0.dat", "xt.dat", "yt.dat")
 _MARKS = ("x0", "y0", "xt", "yt")
-_GEO = {"L": "sheet.length", "H": "sheet.width", "l_pad": "pads.length", "h_pad": "pads.width",
-        "dL_pad": "pads.gap"}  # fmt: skip
+_GEO = {"L": "body.length", "H": "body.width", "l_pad": "body.pad_length",
+        "h_pad": "body.pad_width", "dL_pad": "body.gap"}  # fmt: skip
 
 
 @dataclass(frozen=True)

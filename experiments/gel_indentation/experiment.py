@@ -12,39 +12,50 @@ from pathlib import Path
 from validate.compare.expected import Expected
 from validate.compare.verdict import Accept
 from validate.papers.gel.between import OTHER_BOXES, smoothed
-from validate.papers.gel.box import GelIndentation, build, load, place, stated
-from validate.papers.gel.box import GelModel as Model
+from validate.papers.gel.box import GelBoxes, GelIndentation, build, load, place, stated
 from validate.papers.gel.exhibits import tell
 from validate.papers.gel.lower import fitted_box
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty, vary
+from validate.replay.experiment import Experiment, Input, Uncertainty, vary
 from validate.replay.method import Method
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene
 from validate.solve.harmonic import Harmonic
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
 STATIC = StaticNewton("none", tolerance=1e-6)
+LINEAR = {"material.law": "linear"}
 METHODS = {
-    "linear": Method("linear law", QuasiStatic(), Model()),
-    "neo_hooke": Method("neo-Hooke at large strain", STATIC, Model("neo_hooke")),
-    "svk": Method("St. Venant-Kirchhoff at large strain", STATIC, Model("svk")),
-    "laplace": Method("Laplace's equation: no mechanics", Harmonic(), Model()),
+    "linear": Method("linear law", QuasiStatic(), LINEAR),
+    "neo_hooke": Method("neo-Hooke at large strain", STATIC),
+    "svk": Method("St. Venant-Kirchhoff at large strain", STATIC, {"material.law": "svk"}),
+    "laplace": Method("Laplace's equation: no mechanics", Harmonic(), LINEAR),
 }
 AXES = tuple(f"inside.{axis}" for axis in "xyz")
-IN_LOWER = {"box.which": "lower"}
+IN_LOWER = {"body.which": "lower"}
 DRAWS = tuple(
     vary(f"faces.{name}", f"absolute {1 / math.sqrt(3)}", f"faces, {name} draw",
           "noise of the particles that move the faces; three draws, their mean square counts",
           "their residuals about local fits")
     for name in ("first", "second", "third")
 )  # fmt: skip
-UNCERTAINTY = Uncertainty(
-    MeshLadder(
-        ({"mesh.along": 4, "mesh.up": 2}, {"mesh.along": 6, "mesh.up": 3}),
-        lambda p: (p.box.side or 1e-4) / p.mesh.along,
-        order=3.0,
+
+EXPERIMENT = Experiment(
+    name="gel_indentation",
+    needs="gel-indentation",
+    title="Particles in an indented gel",
+    source="FranckLab/SerialTrack fdb01c6 (MIT); Yang et al. (2022), SoftwareX 19, 101204",
+    scene=Scene(
+        body=GelBoxes(),
+        # No displacement depends on E: any value is valid. nu is identified in the lower box.
+        material=Material("1 kPa", None, "neo_hooke"),
+        drives=(Drive("faces", "x0+x1+y0+y1+z0+z1", (0.0, 0.0, 1.0)),),
+        force_unit="force unit",
     ),
-    (
+    settings=GelIndentation(),
+    variations=(
+        vary("body.cells", "x 0.5 0.75, order 3"),
         *DRAWS,
         Input("smoothing", smoothed,
               "neighbours of the fits at the faces, half to twice", "assumed"),
@@ -52,14 +63,6 @@ UNCERTAINTY = Uncertainty(
               "Poisson ratio of another lower box, or of other faces",
               "scatter of ratios fitted in several boxes"),
     ),
-    surrogate="linear",
-)  # fmt: skip
-EXPERIMENT = Experiment(
-    name="gel_indentation",
-    needs="gel-indentation",
-    title="Particles in an indented gel",
-    source="FranckLab/SerialTrack fdb01c6 (MIT); Yang et al. (2022), SoftwareX 19, 101204",
-    parameters=GelIndentation(),
     methods=METHODS,
     accepted=("linear", "neo_hooke"),
     accept=tuple(
@@ -82,7 +85,7 @@ EXPERIMENT = Experiment(
             (Calibrates(tuple(f"{axis}@lower" for axis in AXES), IN_LOWER, "this one lower box"),),
         ),
     ),
-    uncertainty=UNCERTAINTY,
+    uncertainty=Uncertainty(surrogate="linear"),
     identify=fitted_box,
     exhibits=partial(tell, methods=METHODS, home=Path(__file__).parent),
     locates=("data", "before", "after"),

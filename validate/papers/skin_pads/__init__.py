@@ -1,1 +1,0 @@
-"""Skin in vivo pulled between two pads: tracked points, pad force in a unit nobody stated."""
