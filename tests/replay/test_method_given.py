@@ -230,16 +230,3 @@ def test_an_experiment_is_named_as_its_file(tmp_path: Path) -> None:
     (tmp_path / "other.py").write_text(f"{head}EXPERIMENT = Experiment('bar', 'A bar', 'made')\n")
     with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'bar', not the file's name"):
         load_file(tmp_path / "other.py")
-
-
-def test_a_file_of_the_old_form_is_refused_with_the_command_that_writes_it_anew(
-    tmp_path: Path,
-) -> None:
-    """Parameters of a class of its own, and a function that builds a scene from them."""
-    (tmp_path / "bar.py").write_text(
-        "from validate.replay.experiment import Experiment\n"
-        "from validate.replay.cards import TimeSteps\n"
-        "EXPERIMENT = Experiment('bar', 'A bar', 'made', TimeSteps(), build=lambda *_: None)\n"
-    )
-    with pytest.raises(UsageError, match="a TimeSteps, not a scene; .* validate new bar --from"):
-        load_file(tmp_path / "bar.py")

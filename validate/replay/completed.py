@@ -7,7 +7,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.tree import Tree
 
@@ -44,15 +43,8 @@ def of_a_kind(experiment: Experiment) -> bool:
 
 def completed(experiment: Experiment, path: Path) -> Experiment:
     """The experiment declared in that file, with what its kind adds."""
-    own = of_a_kind(experiment)
-    if own and not experiment.complete:
+    if of_a_kind(experiment) and not experiment.complete:
         given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
         make = kinds()[type(experiment.parameters)]
         experiment = make(**given, folder=path.resolve().parent)
-    elif not own and not isinstance(experiment.parameters, Tree):
-        raise UsageError(
-            f"{path} is of the old form: its parameters are a "
-            f"{type(experiment.parameters).__name__}, not a scene; write it anew: validate new "
-            f"{experiment.name} --from RECORDING --force"
-        )
     return experiment.at(path)

@@ -48,7 +48,19 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     methods = all_methods(experiment, options)
     added = added_guests(methods, options.guests)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
-    return with_values(parameters, mine), {name: methods[name] for name in chosen}
+    picked = {name: methods[name] for name in chosen}
+    _require_read(mine, picked)
+    return with_values(parameters, mine), picked
+
+
+def _require_read(values: Mapping[str, str], methods: Mapping[str, Method]) -> None:
+    """Raises `UsageError` for a value of the scene that every method replaces by its own."""
+    for path in values:
+        own = [_changed(m).get(path) for m in methods.values()]
+        if own and not any(v is None or str(v)[:2] in ("x ", "+ ", "- ") for v in own):
+            followed = sorted({str(v)[3:] for v in own if str(v).startswith("as ")})
+            instead = ", ".join((*followed, *(() if followed else (f"methods.NAME.{path}",))))
+            raise UsageError(f"{path}: every method has a value of its own; set {instead}")
 
 
 def chosen_cases(experiment: Experiment, options: Options) -> tuple[Case, ...]:
