@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.compare.verdict import Accept
 from validate.fem.system import build as build_system
-from validate.parameters import quantity
+from validate.parameters import quantity, with_given
 from validate.recording.types import Recording
 from validate.register.markers import placed_markers
 from validate.register.registered import Registered
@@ -21,8 +21,8 @@ from validate.register.signals import driving, holds_at, validating
 from validate.replay.calibration import Calibrates, Calibration, Free
 from validate.replay.experiment import Experiment, Twin
 from validate.replay.method import Method
-from validate.scene.box import box
-from validate.scene.laws import Coefficients
+from validate.replay.tree import Built, Tree
+from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.march import march, output_frames
@@ -36,31 +36,20 @@ BULGES = {"right": (SIDE, SIDE / 2, SIDE / 2), "left": (0.0, SIDE / 2, SIDE / 3)
 
 
 @dataclass(frozen=True)
-class Block:
-    E: float | None = quantity(None, "Pa", "modulus; none: identified")
-    nu: float | None = quantity(None, "1", "Poisson ratio; none: identified")
-    C01: float | None = quantity(None, "Pa", "Mooney-Rivlin; none: identified")
+class Second:
+    """What the law has beyond E and nu, as a parameter that may stand open."""
+
+    second: float | None = quantity(None, "Pa", "Mooney-Rivlin's C01; none: identified")
 
 
-TRUE = Block(20e3, 0.42, 1e3)
+TRUE = {"material.E": 20e3, "material.nu": 0.42, "second": 1e3}
+METHODS = {
+    "newton": Method("Mooney-Rivlin, static", StaticNewton("none"), {"material.C01": "as second"})
+}
 
 
-def scene(p: Block) -> Scene:
-    assert p.E is not None
-    assert p.nu is not None
-    assert p.C01 is not None
-    coefficients = Coefficients(C01=p.C01)
-    return Scene(
-        box((SIDE,) * 3, (CELLS,) * 3),
-        Material(p.E, p.nu, "mooney_rivlin", 1000.0, coefficients=coefficients),
-        (Support("z0", (0, 1, 2)), Support("z1", (0, 1))),
-        drives=(Drive("stage", "z1", (0.0, 0.0, -1.0)),),
-        probes=tuple(Probe(name, at) for name, at in BULGES.items()),
-    )
-
-
-def record(p: Block, progress: Callable[[str], None]) -> Recording:
-    true = scene(TRUE)
+def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
+    true = Built()(None, with_given(tree, TRUE), METHODS["newton"].scene)
     stepper = StaticNewton("none").prepare(build_system(true))
     y, t = np.array(HOLDS)[:, None], np.arange(1.0, len(HOLDS) + 1)
     run = march("twin", stepper, t, y, output_frames(len(HOLDS), 3), 0.0)
@@ -80,28 +69,34 @@ def place(recording: Recording, p: Any, its: Scene) -> Registered:
     return Registered((stage, placed_markers(recording, its.mesh), cell), tuple(holds), rest)
 
 
-def load(p: Block, folder: Path) -> tuple[Recording, ...]:
-    return (record(TRUE, print),)
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return (record(tree, print),)
 
 
 EXPERIMENT = Experiment(
     name="identified_block",
     title="Block between plates it sticks to",
     source="this file",
-    parameters=Block(),
-    methods={"newton": Method("Mooney-Rivlin, static", StaticNewton("none"))},
+    scene=Scene(
+        body=Box((SIDE,) * 3, cells=(CELLS,) * 3),
+        material=Material(None, None, "mooney_rivlin", 1000.0),
+        supports=(Support("z0"), Support("z1", (0, 1))),
+        drives=(Drive("stage", "z1", "-z"),),
+        probes=tuple(Probe(name, at) for name, at in BULGES.items()),
+    ),
+    settings=Second(),
+    methods=METHODS,
     accepted=("newton",),
     accept=(Accept("left", 1e-4, "ours"),),
     load=load,
-    build=lambda recording, p, model: scene(p),
     place=place,
     calibrations=(
         Calibration(
             "newton",
             (
-                Free("E", 2e3, 2e5, "assumed"),
-                Free("nu", 0.2, 0.49, "assumed", "the bulge"),
-                Free("C01", 0.0, 2e3, "assumed", "force at larger strain"),
+                Free("material.E", 2e3, 2e5, "assumed"),
+                Free("material.nu", 0.2, 0.49, "assumed", "the bulge"),
+                Free("second", 0.0, 2e3, "assumed", "force at larger strain"),
             ),
             (Calibrates(("force", "right")),),
         ),

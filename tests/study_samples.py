@@ -20,7 +20,8 @@ from validate.replay.experiment import Experiment, Twin
 from validate.replay.followed import Truth
 from validate.replay.method import Method
 from validate.replay.remade import stamped
-from validate.scene.box import box
+from validate.replay.tree import Built
+from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
@@ -41,7 +42,7 @@ class TwinCard:
 
 
 @dataclass(frozen=True)
-class Parameters:
+class Settings:
     twin: TwinCard = TwinCard()
 
 
@@ -67,25 +68,28 @@ class Filter:
                      smooth=self.smooth).prepare(system, looks)
 
 
-def scene(E):
-    return Scene(box((0.02, 0.02, 0.02), (2, 2, 2)),
-                 Material(E, 0.4, "linear", 1000.0, 0.0, 0.02), (Support("z0", (0, 1, 2)),),
-                 loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
-                 probes=(Probe("top", (0.01, 0.01, 0.02)), Probe("side", (0.0, 0.01, 0.01))))
+SCENE = Scene(
+    Box(("20 mm", "20 mm", "20 mm"), cells=(2, 2, 2)),
+    Material("10 kPa", 0.4, "linear", "1000 kg/m3", stiffness_damping="0.02 s"),
+    (Support("z0"),),
+    loads=(Load("pull", "z1", "+z"),),
+    probes=(Probe("top", (0.01, 0.01, 0.02)), Probe("side", (0.0, 0.01, 0.01))),
+)
 
 
 def run(p):
     t = DT * np.arange(1, STEPS + 1)
     force = 0.2 * np.sin(9 * t)[:, None]
-    made = scene(1e4 * p.twin.stiffness)
+    made = Built()(None, p, {"material.E": f"x {p.settings.twin.stiffness}"})
     stepper = Newmark(DT).prepare(build_system(made))
     return made, march("twin", stepper, t, force, np.array([0]), 0.0)
 
 
 def record(p, progress):
     made, done = run(p)
-    camera = Camera(float(np.sqrt(p.twin.noise)), missing=p.twin.missing, still=10_000)
-    return record_tracked(Origin("pulled", p.twin.seed, True), points_of(done, made), FIXED,
+    twin = p.settings.twin
+    camera = Camera(float(np.sqrt(twin.noise)), missing=twin.missing, still=10_000)
+    return record_tracked(Origin("pulled", twin.seed, True), points_of(done, made), FIXED,
                           camera, {"pull": Reading(done.traces["pull.force"].y, "N")})
 
 
@@ -96,12 +100,12 @@ def truth(p, seen):
 
 
 EXPERIMENT = Experiment(
-    name="pulled", title="A pulled block", source="made for tests", parameters=Parameters(),
+    name="pulled", title="A pulled block", source="made for tests", scene=SCENE,
+    settings=Settings(),
     methods={"kf": Method("filter", Filter(), markers=("top",)),
              "plain": Method("solver", Newmark())},
     accepted=("kf",), accept=(Accept("top", 1e-3, "made for tests"),),
     load=lambda p, folder: (stamped(record(p, lambda _: None), p),),
-    build=lambda recording, p, model: scene(1e4),
     place=lambda recording, p, made: follow_signal(recording, made.mesh, "pull", "N"),
     sets=lambda p, seen: {"dt": DT}, axis="z", reference="plain",
     twin=Twin(record, truth, kind="same model", seed=5),

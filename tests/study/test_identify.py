@@ -27,8 +27,8 @@ def block(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path:
     text = (project_root / "benchmarks" / "identified_block.py").read_text("utf-8")
     for one, other in (
         ("SIDE, CELLS = 0.03, 11", "SIDE, CELLS = 0.03, 2"),
-        ("nu: float | None = quantity(None", "nu: float | None = quantity(0.42"),
-        ("C01: float | None = quantity(None", "C01: float | None = quantity(1e3"),
+        ("Material(None, None,", "Material(None, 0.42,"),
+        ("second: float | None = quantity(None", "second: float | None = quantity(1e3"),
     ):
         assert one in text
         text = text.replace(one, other)
@@ -50,14 +50,14 @@ def test_what_stands_open_is_identified_reported_and_kept(block: Path, out: Path
     told = json.loads(printed)["study"]
     (one,) = told["calibrations"]
     (E,) = one["parameters"]
-    assert (E["name"], E["unit"], E["identified"]) == ("E", "Pa", True)
+    assert (E["name"], E["unit"], E["identified"]) == ("material.E", "Pa", True)
     assert E["low"] < 20e3 < E["high"]
     assert E["value"] == pytest.approx(20e3, rel=0.02)
     assert max(E["rise"]) > 3.4
     assert len(one["starts"]) == 4
     assert told["reused"] == 0
     page = next(out.glob("identified_block/study-identify*/report.html")).read_text("utf-8")
-    assert "Fitted: E = " in page
+    assert "Fitted: material.E = " in page
     assert "E: profile" in page
     again = json.loads(here(*command, VALIDATE_NO_GL="1")[1])["study"]
     assert again["reused"] == 7  # four starts, two sides
@@ -71,10 +71,13 @@ def test_run_identifies_with_the_same_cells_and_opens_with_what_was_fitted(
     before = len(list(out.glob("identified_block/study-identify/cells/*.json")))
     code, printed, _ = here("run", str(block), "--quick", "--out", str(out), VALIDATE_NO_GL="1")
     assert code == 0
-    assert "Identified, with 95 % intervals\n  E  " in printed or "no check is evidence" in printed
+    assert (
+        "Identified, with 95 % intervals\n  material.E  " in printed
+        or "no check is evidence" in printed
+    )
     assert len(list(out.glob("identified_block/study-identify/cells/*.json"))) == before
     (page,) = out.glob("identified_block+quick*/report.html")
-    assert "Fitted: E = " in page.read_text("utf-8")
+    assert "Fitted: material.E = " in page.read_text("utf-8")
 
 
 @pytest.mark.slow
@@ -83,11 +86,11 @@ def test_bounds_make_any_number_free_and_what_is_not_identified_is_told(
 ) -> None:
     """Bounds so near that the recording says nothing between them."""
     code, printed, errors = here(
-        "identify", str(block), "--quick", "-v", "--parameters", "C01=900:1100", "--seeds", "2",
+        "identify", str(block), "--quick", "-v", "--parameters", "second=900:1100", "--seeds", "2",
         "--out", str(tmp_path), *ALONE, VALIDATE_NO_GL="1",
     )  # fmt: skip
     assert code == 1, errors
-    assert "C01" in printed
+    assert "second" in printed
     assert "not identifiable" in printed
     assert "force at larger strain would identify it" in " ".join(printed.split())
     assert "correlations: " in printed
@@ -97,12 +100,12 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
     common = ("identify", str(block), "--out", str(tmp_path), *ALONE)
     line = refused(*common, "--parameters", "mu")
     assert "unknown parameter 'mu'" in line
-    line = refused(*common, "--parameters", "E=1kPa")
-    assert "expected E=LOW:HIGH" in line
-    line = refused(*common, "--parameters", "E=1e5:1e3")
+    line = refused(*common, "--parameters", "material.E=1kPa")
+    assert "expected material.E=LOW:HIGH" in line
+    line = refused(*common, "--parameters", "material.E=1e5:1e3")
     assert "bounds 100000 to 1000" in line
-    line = refused(*common, "--parameters", "E,E")
-    assert "E is given twice" in line
+    line = refused(*common, "--parameters", "material.E,material.E")
+    assert "material.E is given twice" in line
     line = refused(*common, "--parameters", "methods.newton.tolerance=1e-9:1e-3")
     assert "a setting of a method cannot be identified" in line
     line = refused(*common, "--seeds", "0")
@@ -111,10 +114,14 @@ def test_what_cannot_be_asked_is_one_line(block: Path, tmp_path: Path) -> None:
 
 def test_a_parameter_that_is_not_declared_needs_bounds(block: Path, tmp_path: Path) -> None:
     bare = tmp_path / "identified_block.py"
-    kept = [line for line in block.read_text("utf-8").splitlines() if 'Free("nu"' not in line]
+    kept = [
+        line for line in block.read_text("utf-8").splitlines() if 'Free("material.nu"' not in line
+    ]
     bare.write_text("\n".join(kept), "utf-8")
-    line = refused("identify", str(bare), "--parameters", "nu", "--out", str(tmp_path), *ALONE)
-    assert "--parameters nu: no bounds; declared: E, C01" in line
+    line = refused(
+        "identify", str(bare), "--parameters", "material.nu", "--out", str(tmp_path), *ALONE
+    )
+    assert "--parameters material.nu: no bounds; declared: material.E, second" in line
 
 
 @pytest.mark.slow

@@ -92,8 +92,15 @@ def test_levels_are_those_that_differ(own_phantom: OwnBody) -> None:
 # --- over time ------------------------------------------------------------------------------------
 
 
+def of_a_mesh(experiment: Experiment) -> Experiment:
+    """Its body as a mesh, which has no cells to set."""
+    tree = experiment.parameters
+    mesh = tree.scene.body.resolved(Path())
+    return replace(experiment, parameters=tree.with_scene(body=mesh))
+
+
 def test_a_body_without_such_a_parameter_is_refined_itself(pulled: Experiment) -> None:
-    trial = trial_of(pulled, quick=True)
+    trial = trial_of(of_a_mesh(pulled), quick=True)
     assert dict(trial.meshes) == {"P1": (100, 200), "MD": (100, 200), "P2": (100,)}
     assert trial.reference == ("P2", 200)
     assert trial.size(200) == pytest.approx(trial.size(100) / 2)
@@ -112,7 +119,7 @@ def test_a_body_without_such_a_parameter_is_refined_itself(pulled: Experiment) -
 def test_its_stability_body_has_all_of_its_own_material(pulled: Experiment) -> None:
     body = body_of(pulled)
     assert body is not None
-    assert body.meshes == (100, 200)
+    assert body.meshes == (100, 140, 200)
     assert (body.base.E, body.base.stiffness_damping) == (1e4, 0.02)
     scene = body.build(replace(body.base, E=2e4, nu=0.3, mesh=100))
     assert (scene.material.E, scene.material.nu) == (2e4, 0.3)
@@ -130,7 +137,7 @@ def test_a_body_that_cannot_be_coarsened_says_what_to_do(
 ) -> None:
     monkeypatch.setattr("validate.replay.ladder_default.LARGEST", 50)
     with pytest.raises(UsageError, match="number of cells as a parameter"):
-        body_of(pulled)
+        body_of(of_a_mesh(pulled))
 
 
 def _at_one_instant(experiment: Experiment) -> Experiment:
