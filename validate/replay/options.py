@@ -49,8 +49,9 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     added = added_guests(methods, options.guests)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     picked = {name: methods[name] for name in chosen}
+    given = with_values(parameters, mine)
     _require_read(mine, picked)
-    return with_values(parameters, mine), picked
+    return given, picked
 
 
 def _require_read(values: Mapping[str, str], methods: Mapping[str, Method]) -> None:
