@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from validate.compare.inputs import joint, joint_draws
+from validate.compare.inputs import difference, joint, joint_draws
 from validate.compare.residual import Residual
 from validate.compare.verdict import Sensitivity
+from validate.errors import ComparisonError
 
 
 def scalar(value: float) -> Residual:
@@ -39,3 +40,22 @@ def test_inputs_that_act_together_are_seen_only_by_the_sample() -> None:
     found = joint(scalar(0.0), parts, [scalar(a * b) for a, b in table])
     assert (found.first_order, found.percent) == (0.0, None)
     assert found.sampled == pytest.approx(np.sqrt(np.mean(table[:, 0] ** 2 * table[:, 1] ** 2)))
+
+
+def window(measured: list[float], off: float) -> Residual:
+    reference = np.array(measured)[:, None]
+    values = off * reference
+    return Residual("force", "fit", values, 0.0, 0.0, "N", "force", reference=reference)
+
+
+def test_an_input_that_moves_a_windows_ends_is_compared_at_the_samples_of_both() -> None:
+    """A height moves strains, so that samples enter or leave at the ends of a window."""
+    base = window([2.0, 3.0, 4.0, 5.0], 0.1)
+    earlier = difference(window([0.0, 1.0, 2.0, 3.0, 4.0], 0.2), base)
+    assert earlier[:, 0] == pytest.approx([0.2, 0.3, 0.4, 0.4])  # the last as its neighbour
+    more = difference(window([2.0, 3.0, 4.0, 5.0, 6.0], 0.2), base)
+    assert more[:, 0] == pytest.approx([0.2, 0.3, 0.4, 0.5])
+    fewer = difference(window([3.0, 4.0, 5.0], 0.2), base)
+    assert fewer[:, 0] == pytest.approx([0.3, 0.3, 0.4, 0.5])
+    with pytest.raises(ComparisonError, match="4 samples, 3 with an input moved"):
+        difference(window([7.0, 8.0, 9.0], 0.2), base)

@@ -112,3 +112,13 @@ def test_outline_that_crosses_itself_is_refused(measure) -> None:  # type: ignor
         measure(SQUARE[[0, 1, 3, 2]])
     with pytest.raises(ComparisonError, match="outline of 3 points is not a simple curve"):
         measure(np.array([[0.0, 0], [1, 0], [2, 0]]))
+
+
+def test_points_at_one_angle_have_finite_radii() -> None:
+    """A notch along a ray, and a polygon that ends where it began: no division by their angle."""
+    notched = np.array([(1.0, -1), (1, 0), (0.9, 0), (1, 1), (-1, 1), (-1, -1.0)])
+    closed = np.vstack([SQUARE, SQUARE[:1]])
+    for outline in (notched, closed):
+        about = angular_points(outline, np.deg2rad(np.arange(0, 360, 5)))
+        assert np.isfinite(about).all()
+    assert angular_points(closed, np.deg2rad([45.0])) == pytest.approx(np.array([[1, 1]]))

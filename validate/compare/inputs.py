@@ -13,6 +13,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.residual import Residual
 from validate.compare.verdict import Sensitivity
+from validate.errors import ComparisonError
 
 REACH = float(np.sqrt(3.0))  # an input lies uniformly within so many standard uncertainties
 _ROUNDING = 1e-9
@@ -67,7 +68,33 @@ def joint(base: Residual, parts: Sequence[Sensitivity], drawn: Sequence[Residual
     What a range does on one side only (plates cannot rub less than not at all) is an error too.
     """
     first = float(np.sqrt(sum(rms(p.change.values) ** 2 for p in parts)))
-    sampled = rms(np.array([[rms(one.values - base.values)] for one in drawn]))
+    sampled = rms(np.array([[rms(difference(one, base))] for one in drawn]))
     least = _ROUNDING * rms(base.values)  # an input that moves nothing leaves rounding
     first, sampled = (u if u > least else 0.0 for u in (first, sampled))
     return Joint(base.name, base.unit, first, sampled, len(drawn))
+
+
+def difference(moved: Residual, base: Residual) -> Floats:
+    """What an input changed of a residual, for every point of the `base` (k, c).
+
+    An input that moves the ends of a window (a height, of strains) lets samples in or out. Those
+    that both have are found by what was measured; at an end that only the base has, the change is
+    that of the next sample. Raises `ComparisonError` where no samples are the same.
+    """
+    if moved.values.shape == base.values.shape:
+        return np.asarray(moved.values - base.values)
+    a = np.zeros((0, 1)) if moved.reference is None else moved.reference
+    b = np.zeros((0, 1)) if base.reference is None else base.reference
+    starts = range(1 - len(b), len(a)) if len(a) and len(b) else range(0)
+    for start in sorted(starts, key=abs):
+        rows = np.arange(len(base.values)) + start
+        both = (rows >= 0) & (rows < len(moved.values))
+        if 2 * both.sum() > len(rows) and np.array_equal(a[rows[both]], b[both]):
+            first, last = np.flatnonzero(both)[[0, -1]]
+            change = moved.values[rows[both]] - base.values[both]
+            edges = (first, len(rows) - 1 - last)
+            return np.asarray(np.pad(change, (edges, (0, 0)), mode="edge"))
+    raise ComparisonError(
+        f"{base.name}: {len(base.values)} samples, {len(moved.values)} with an input moved, and "
+        "they are not the same ones; its uncertainty cannot be found"
+    )

@@ -97,7 +97,8 @@ def angular_weights(outline: Floats, angles: Floats) -> Floats:
     order of their polar angles."""
     _, at, _ = _rays(outline)
     ahead = np.mod(angles[:, None] - at, _TURN)
-    rows, before = np.arange(len(angles)), ahead.argmin(axis=1)
+    # Of points at one angle (repeated, or on one ray) the last: the next one lies ahead of it.
+    rows, before = np.arange(len(angles)), len(at) - 1 - ahead[:, ::-1].argmin(axis=1)
     after = (before + 1) % len(at)
     share = ahead[rows, before] / np.mod(at[after] - at[before], _TURN)
     weights = np.zeros(ahead.shape)

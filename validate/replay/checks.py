@@ -10,7 +10,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Numerical
 from validate.compare.effects import Effect, effect
-from validate.compare.inputs import Joint, joint, joint_draws
+from validate.compare.inputs import Joint, difference, joint, joint_draws
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
 from validate.compare.verdict import (
@@ -159,7 +159,7 @@ def _sensitivities(road: Road, judged: str = "") -> dict[str, list[Sensitivity]]
         base = road.main(Variant(by)).residuals
         moved = road.main(source.at(by, 1.0)).residuals
         for key in base.keys() & moved.keys():
-            step = replace(base[key], values=moved[key].values - base[key].values, sd=0.0)
+            step = replace(base[key], values=difference(moved[key], base[key]), sd=0.0)
             found.setdefault(key, []).append(Sensitivity(source.name, step))
     return found
 

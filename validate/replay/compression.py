@@ -24,7 +24,7 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.cards import beside, scaled
 from validate.replay.compression_cards import Compression, Pressed, stated_sizes
-from validate.replay.cost import affordable
+from validate.replay.cost import INPUTS, affordable, linear_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
@@ -122,19 +122,23 @@ def compression(
 def _affordable(
     experiment: Experiment, recordings: Sequence[Recording], p: Compression
 ) -> Experiment:
-    """The experiment with those halvings of a mesh file that fit into memory and `mesh.budget`."""
+    """The experiment with those halvings of a mesh file that fit into memory and `mesh.budget`;
+    where its inputs are dear, they are moved one by one only."""
     if p.specimen.mesh is None:
         return experiment
     assert experiment.uncertainty is not None
     first = experiment.methods[experiment.accepted[0]].scene
     scene = _build(recordings[0], p, first)
-    finer = [8 * scene.mesh.nodes.size, 64 * scene.mesh.nodes.size]
+    N, declared = scene.mesh.nodes.size, experiment.uncertainty
+    finer = [8 * N, 64 * N]
     levels = affordable((_level(None, 1), _level(None, 2)), finer, budget=p.mesh.budget)
     levels = levels or (_level(None, -1),)
     ladder = replace(_MESHES, levels=levels)
+    runs = 1 + len(declared.inputs) + declared.draws
+    dear = p.mesh.budget and runs * linear_seconds(N) > INPUTS
     return replace(
         experiment,
-        uncertainty=replace(experiment.uncertainty, mesh=ladder),
+        uncertainty=replace(declared, mesh=ladder, draws=0 if dear else declared.draws),
         identify=partial(cast("partial[Any]", experiment.identify), ladder=ladder),
     )
 
