@@ -56,9 +56,10 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
 
 def _require_read(values: Mapping[str, str], methods: Mapping[str, Method]) -> None:
     """Raises `UsageError` for a value of the scene that every method replaces by its own."""
-    for path in values:
+    for path, text in values.items():
         own = [_changed(m).get(path) for m in methods.values()]
-        if own and not any(v is None or str(v)[:2] in ("x ", "+ ", "- ") for v in own):
+        read = (v is None or str(v) == text or str(v)[:2] in ("x ", "+ ", "- ") for v in own)
+        if own and not any(read):
             followed = sorted({str(v)[3:] for v in own if str(v).startswith("as ")})
             instead = ", ".join((*followed, *(() if followed else (f"methods.NAME.{path}",))))
             raise UsageError(f"{path}: every method has a value of its own; set {instead}")
