@@ -19,7 +19,7 @@ from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
 
 from .exhibits import tell_cone
-from .seen import FILE, PressedCone, place, record, sets, truth
+from .registration import FILE, PressedCone, place, record, sets, truth
 
 PROBES = (
     Probe("node_A", ("0 mm", "0 mm", "28 mm")),

@@ -25,7 +25,7 @@ from validate.replay.remade import stamped
 
 pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
 
-cone_exhibits, SEEN = beside("ekf_cone", "exhibits"), beside("ekf_cone", "seen")
+cone_exhibits, SEEN = beside("ekf_cone", "exhibits"), beside("ekf_cone", "registration")
 SOME = ("plate_p2", "plate_mean", "plate_p1", "nfem", "reduced_pod")
 COARSE = {"twin.radial": "3", "twin.axial": "3", "body.cells": "3,3"}
 
