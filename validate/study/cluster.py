@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from time import sleep
 from typing import Any
 
 import dask
@@ -27,6 +28,7 @@ from validate.study.store import Record
 TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a task vanish in it
 CONNECT_S = 10.0  # s until a scheduler counts as absent
 _MOMENT = 1.0  # s between looks at which workers are there
+_REST = 0.2  # s, where no task is out
 _DEATHS = 4  # of workers under one cell alone
 _AHEAD = 2  # tasks a worker: one that runs and one that waits
 
@@ -184,7 +186,13 @@ class _Drain:
                     self._bury(one)
 
     def _wait(self, futures: list[Any]) -> None:
-        """Until one of them ends, or a moment, after which who is there is looked at again."""
+        """Until one of them ends, or a moment, after which who is there is looked at again.
+
+        Workers that start anew need the processor: without futures nothing is asked meanwhile.
+        """
+        if not futures:
+            sleep(_REST)
+            return
         try:
             _dask.wait(futures, timeout=_MOMENT, return_when="FIRST_COMPLETED")
         except TimeoutError:
