@@ -1,6 +1,8 @@
 """Scenes refuse impossible materials and sets that are not there, with the numbers."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
 from validate.scene.box import box
+from validate.scene.geometry import Box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Cavity, Drive, Foundation, Scene, Support
@@ -96,3 +99,17 @@ def test_a_needle_touches_faces_of_simplices() -> None:
 def test_damping_is_a_number_of_at_least_zero(name: str, value: float) -> None:
     with pytest.raises(SceneError, match=f"{name} damping {value:g}: expected a number >= 0"):
         Material(1.0, 0.3, **{f"{name}_damping": value})  # type: ignore[arg-type]
+
+
+def test_what_rests_on_a_plate_keeps_its_middle_and_does_not_turn() -> None:
+    declared = Scene(Box(("1 m", "1 m", "1 m"), cells=(2, 2, 2)), Material(1.0, 0.3),
+                     (Support("z0", (2,), rests=True),))  # fmt: skip
+    scene = declared.resolved(declared.body.resolved(Path()))
+    assert [pin.components for pin in scene.pins] == [(0, 1), (1,)]
+    assert scene.pins[0].point == pytest.approx((0.5, 0.5, 0.0))
+    assert scene.pins[1].point[1:] == pytest.approx((0.5, 0.0))
+    aside = box((1.0, 1.0, 1.0), (1, 1, 1))
+    with pytest.raises(SceneError, match="no node within 250 mm of its middle"):
+        declared.resolved(aside)
+    with pytest.raises(SceneError, match="rests on z0 along one axis"):
+        replace(declared, supports=(Support("z0", rests=True),)).resolved(scene.mesh)

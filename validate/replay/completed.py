@@ -16,8 +16,8 @@ DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "acc
 
 @cache
 def kinds() -> Mapping[type, Callable[..., Experiment]]:
-    """What makes an experiment, by the class of its parameters; they read all formats, so that they
-    are imported where one is asked for."""
+    """What makes an experiment, by the class of its settings (or of parameters without a scene);
+    they read all formats, so that they are imported where one is asked for."""
     from validate.replay.compression import compression
     from validate.replay.compression_cards import Compression
     from validate.replay.inclusion import InclusionTest, inclusion_test
@@ -35,16 +35,21 @@ def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment
     return lambda *, folder, **given: make(**given)
 
 
-def of_a_kind(experiment: Experiment) -> bool:
-    """Whether its parameters say all that is declared of it."""
+def kind_of(experiment: Experiment) -> type:
+    """The class that says what the experiment measures: of its settings beside a scene."""
     parameters = experiment.parameters
-    return not isinstance(parameters, Tree) and type(parameters) in kinds()
+    return type(parameters.settings if isinstance(parameters, Tree) else parameters)
+
+
+def of_a_kind(experiment: Experiment) -> bool:
+    """Whether its scene and settings say all that is declared of it."""
+    return kind_of(experiment) in kinds()
 
 
 def completed(experiment: Experiment, path: Path) -> Experiment:
     """The experiment declared in that file, with what its kind adds."""
     if of_a_kind(experiment) and not experiment.complete:
         given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
-        make = kinds()[type(experiment.parameters)]
+        make = kinds()[kind_of(experiment)]
         experiment = make(**given, folder=path.resolve().parent)
     return experiment.at(path)

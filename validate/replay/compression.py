@@ -51,7 +51,6 @@ from validate.scene.mesh_file import read_mesh
 from validate.scene.plates import Contact
 from validate.scene.refine import of_element, refined
 from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
-from validate.scene.slippery import resting_pins
 from validate.solve.fluid import ExactPressure, NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.tabulated import Tabulated
@@ -198,8 +197,7 @@ def between(contact: Contact) -> tuple[Support, ...]:
 
 
 def _pins(mesh: Mesh) -> tuple[Pin, ...]:
-    x = mesh.nodes[mesh.facet_nodes("lower_plate")]
-    return resting_pins(x, 0, 1, "lower_plate", "mesh the file with more cells")
+    return Support("lower_plate", (2,), rests=True).pins(mesh)
 
 
 # --- the recording in it --------------------------------------------------------------------------

@@ -424,8 +424,8 @@ class Experiment:
 
     @property
     def complete(self) -> bool:
-        """Whether it says how its scene is built: what a kind of the library adds is there."""
-        return isinstance(self.parameters, Tree) or not isinstance(self.build, Built)
+        """Whether what a kind of the library adds is there: how the recording is registered."""
+        return self.place is not placed_by_names
 
     def at(self, path: Path) -> "Experiment":
         """Declared in that file."""

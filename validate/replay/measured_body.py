@@ -62,9 +62,7 @@ from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.named_place import axis_of, place_of
 from validate.scene.refine import of_element
 from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
-from validate.scene.select import nodes_of
 from validate.scene.similar_grids import fitting, member
-from validate.scene.slippery import resting_pins
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
@@ -201,10 +199,7 @@ def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
     if not p.held.slides:
         return ()
     across = slides_across(p.held.slides, mesh)
-    one, other = (c for c in range(3) if c != across)
-    x = mesh.nodes[nodes_of(mesh, place_of(p.held.slides, mesh))]
-    place = f"held.slides = {p.held.slides}"
-    return resting_pins(x, one, other, place, "--set body.halvings=1")
+    return Support(place_of(p.held.slides, mesh), (across,), rests=True).pins(mesh)
 
 
 def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[str, Any]:

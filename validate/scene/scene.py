@@ -19,6 +19,7 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of, box_of, place_of
 from validate.scene.select import Place, kind_of, nodes_of
+from validate.scene.slippery import resting_points
 from validate.scene.tool import Needle, require_usable
 from validate.scene.tracked import Prescribed
 from validate.units import SYMBOLIC
@@ -30,10 +31,27 @@ Contact = Literal["slip", "partial", "bonded"]
 
 @dataclass(frozen=True)
 class Support:
-    """Displacement components held at zero on a facet set, or on faces, edges or points."""
+    """Displacement components held at zero on a facet set, or on faces, edges or points.
+
+    What `rests` on a slippery plate is held normal to it; its middle stays there and cannot turn.
+    """
 
     facets: Place = quantity(MISSING, "1", "where the body is held")
     components: tuple[int, ...] = quantity((0, 1, 2), "1", "0, 1, 2: held along x, y, z")
+    rests: bool = quantity(False, "1", "whether its middle stays, on a slippery plate")
+
+    def pins(self, mesh: Mesh) -> "tuple[Pin, ...]":
+        """What keeps the body from sliding off and turning; raises `SceneError` where no node is
+        near the middle of the place."""
+        if not self.rests:
+            return ()
+        if len(self.components) != 1:
+            raise SceneError(f"a body rests on {self.facets} along one axis, not {self.components}")
+        one, other = (c for c in range(3) if c not in self.components)
+        x = mesh.nodes[nodes_of(mesh, self.facets)]
+        place = self.facets if isinstance(self.facets, str) else "the place it rests on"
+        middle, beside = resting_points(x, one, other, place)
+        return Pin(tuple(middle), (one, other)), Pin(tuple(beside), (other,))
 
 
 @dataclass(frozen=True)
@@ -298,7 +316,8 @@ class Scene:
         return replace(
             self,
             body=mesh,
-            supports=placed((*self.supports, *held, *bonded)),
+            supports=(supports := placed((*self.supports, *held, *bonded))),
+            pins=(*self.pins, *(pin for s in supports for pin in s.pins(mesh))),
             drives=placed(self.drives),
             foundations=placed(tuple(f for f in sides if f.contact == "partial")),
             membranes=placed(tuple(m for m in self.membranes if m.thickness)),
