@@ -28,12 +28,10 @@ from validate.fem.condense import condense
 from validate.fem.system import build
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
-from validate.scene.plates import Plates, between_plates
-from validate.scene.scene import Cavity, Drive, Support
+from validate.scene.scene import Cavity, Pin, Scene, Support
 
 PAPER_HZ = 3000.0
 SIZES = (82, 200, 400, 800, 1500, 3000)  # nodes
-PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
 
 
 @dataclass(frozen=True)
@@ -58,12 +56,9 @@ def phantom() -> Loop:
     """The phantom's condensed system, two nodes of its upper side beside the cavity's."""
     block = Block(0.060, 0.045, 0.070)
     mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
-    scene = between_plates(mesh, Material(15.2e3, 0.485), "slip", PLATES,
-                           cavities=(Cavity("inclusion", "cavity"),))  # fmt: skip
-    fixed = type(scene)(
-        mesh, scene.material, (*scene.supports, Support("x1", (0,))), scene.pins, (),
-        scene.cavities,
-    )  # fmt: skip
+    held = (Support("x0", (0,)), Support("y0", (1,)), Support("x1", (0,)))
+    pins, cavities = (Pin((0.0, 0.0, 0.035), (2,)),), (Cavity("inclusion", "cavity"),)
+    fixed = Scene(mesh, Material(15.2e3, 0.485), held, pins, cavities=cavities)
     system = build(fixed)
     top = [mesh.nearest_node(np.array([0.03, 0.045, z])) for z in (0.030, 0.040)]
     small = condense(system, np.array(top))

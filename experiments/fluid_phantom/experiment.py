@@ -10,13 +10,14 @@ from collections.abc import Mapping, Sequence
 
 from validate.compare.effects import Sensor
 from validate.compare.verdict import Accept
-from validate.papers.fluid_inclusion.effects import EFFECTS, INPUTS, MESHES
+from validate.papers.fluid_inclusion.effects import EFFECTS, INPUTS
 from validate.papers.fluid_inclusion.figures import FIGURES
 from validate.papers.fluid_inclusion.friction import friction_from_rise
 from validate.papers.fluid_inclusion.ladder import LADDER
 from validate.papers.fluid_inclusion.phantom import Phantom, load, place, read, record
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty
+from validate.replay.inclusion import MESHES
 from validate.replay.method import Method
 from validate.replay.tree import Tree
 from validate.solve.fluid import ExactPressure, NoFluid

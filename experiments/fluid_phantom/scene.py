@@ -4,12 +4,12 @@ Frame "phantom": x from the probe plate (0) to the stage plate, y up, z lateral;
 inclusion follows from the recording.
 """
 
-from validate.papers.fluid_inclusion.phantom import PhantomBody
+from validate.replay.inclusion_body import BlockWithInclusion
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Foundation, Membrane, Pin, Scene, Support
 
 SCENE = Scene(
-    body=PhantomBody(0.060, 0.045, 0.070, cells=(8, 9, 14)),
+    body=BlockWithInclusion("60 mm", "45 mm", "70 mm", cells=(8, 9, 14)),
     material=Material("15.2 kPa", 0.485),
     supports=(Support("x0", (0,)), Support("y0", (1,))),
     pins=(Pin(("0 mm", "0 mm", "35 mm"), (2,)),),

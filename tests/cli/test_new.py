@@ -43,7 +43,7 @@ def log(name: str = "gel", **specimen: str) -> Recording:
                      metadata={"specimen": {"test": "compression"} | specimen})  # fmt: skip
 
 
-BLOCK = {"block.x": "0.06", "block.y": "0.045", "block.z": "0.07"}
+BLOCK = {"body.x": "0.06", "body.y": "0.045", "body.z": "0.07"}
 SIZES = {"diameter_m": repr(DIAMETER), "height_m": repr(HEIGHT)}
 
 
@@ -373,10 +373,10 @@ def test_outlines_stage_and_markers_become_an_experiment(
     listed = json.loads(in_folder(tmp_path, "list", "mine", "--json")[1])
     defaults = {p["path"]: p["default"] for p in listed["parameters"]}
     assert defaults["loads"] == [0.003, 0.006, 0.009]
-    assert [defaults[f"block.{axis}"] for axis in "xyz"] == [None] * 3
+    assert [defaults[f"body.{axis}"] for axis in "xyz"] == [None] * 3
     code, message = in_folder(tmp_path, "run", "mine")
     assert (code, message.count("(m) is not set"), message.count("mine.py:")) == (2, 3, 3)
-    coarse = BLOCK | {"mesh.nodes_x": "7", "mesh.nodes_y": "8", "mesh.nodes_z": "11"}
+    coarse = BLOCK | {"body.cells": "6,7,10"}
     mine = load_file(tmp_path / "experiments" / "mine.py")
     assert mine.declared_kind == "twin"  # as the recording says of itself
     result = compare(mine, coarse, methods=("p1_fluid", "p1_dry"))

@@ -6,22 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beside import experiment
 
 from validate.arrays import Floats
 from validate.papers.fluid_inclusion.twin import IMAGE_POSE, PhantomTwin, record_phantom
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.scene.inclusion import Block
-from validate.scene.material import Material
 from validate.twin.sensors import StageProfile, streams
 
 COARSE = PhantomTwin(nodes_x=7, nodes_y=8, nodes_z=11)
-SIZE, GELATIN = Block(0.060, 0.045, 0.070), Material(15_200.0, 0.485)
+DECLARED = experiment("fluid_phantom").parameters.scene
 
 
 def made(settings: PhantomTwin = COARSE) -> Recording:
-    return record_phantom(settings, SIZE, GELATIN, lambda _: None)
+    return record_phantom(settings, DECLARED, lambda _: None)
 
 
 @pytest.fixture(scope="module")

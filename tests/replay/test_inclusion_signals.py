@@ -9,23 +9,29 @@ from validate.errors import RecordingError, RegistrationError, ValidateError
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
 from validate.replay.experiment import Experiment
-from validate.replay.inclusion import (
-    BlockCard,
-    BlockGrid,
-    InclusionTest,
-    Streams,
-    filled,
-    inclusion_test,
+from validate.replay.inclusion import InclusionTest, Streams, inclusion_test
+from validate.replay.inclusion_body import BlockWithInclusion
+from validate.replay.method import Method
+from validate.replay.tree import Tree
+from validate.scene.material import Material
+from validate.scene.scene import Cavity, Drive, Foundation, Scene, Support
+from validate.solve.fluid import ExactPressure
+
+SCENE = Scene(
+    BlockWithInclusion(0.060, 0.045, 0.070, (6, 7, 10)),
+    Material(15e3, 0.485),
+    (Support("x0", (0,)), Support("y0", (1,))),
+    drives=(Drive("stage", "x1", "-x"),),  # type: ignore[arg-type]
+    cavities=(Cavity("inclusion", "cavity"),),
+    foundations=(Foundation("x0 + x1", (1, 2), 0.0, "slip", "plates"),),
 )
 
 
 def declared(*signals: str) -> Experiment:
-    parameters = InclusionTest(
-        block=BlockCard(0.060, 0.045, 0.070), mesh=BlockGrid(7, 8, 11),
-        streams=Streams(signals=signals), loads=(0.003,),
-    )  # fmt: skip
-    models = {"p1": filled("P1", order=1)}
-    return inclusion_test("mine", "A block", "this test", parameters, models, ("p1",), ())
+    settings = InclusionTest(streams=Streams(signals=signals), loads=(0.003,))
+    models = {"p1": Method("P1", ExactPressure())}
+    tree = Tree(scene=SCENE, settings=settings)
+    return inclusion_test("mine", "A block", "this test", tree, models, ("p1",), ())
 
 
 def placed(recording: Recording, *signals: str) -> tuple[str, ...]:

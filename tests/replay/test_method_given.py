@@ -154,11 +154,9 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
         refined._solved(road, own)  # type: ignore[arg-type]
 
 
-def test_an_inclusion_without_loads_compares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inclusion, "driving", lambda *_: None)
-    streams = SimpleNamespace(stage="stage")
+def test_an_inclusion_without_loads_compares_nothing() -> None:
     with pytest.raises(ComparisonError, match="no loads: nothing can be compared; set stage po"):
-        inclusion.placed(None, None, None, None, streams, {}, (), ())  # type: ignore[arg-type]
+        inclusion.placed(None, None, None, (), ())  # type: ignore[arg-type]
 
 
 def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:

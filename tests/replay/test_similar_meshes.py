@@ -29,7 +29,7 @@ from validate.scene.similar_grids import divided, fitting, member, similarity
 from validate.solve.quasi_static import QuasiStatic
 
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
-_COUNTS = ("along", "across", "up", "radial", "axial", "nodes_x", "nodes_y", "nodes_z", "plane",
+_COUNTS = ("along", "across", "up", "radial", "axial", "plane",
            "solid", "squares", "cells", "halvings", "divisions")  # fmt: skip
 # What only the data tell.
 SKIN = {"length": "100mm", "width": "50mm", "pad_length": "8mm", "pad_width": "8mm", "gap": "30mm"}

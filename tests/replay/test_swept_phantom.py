@@ -12,12 +12,13 @@ from sweeps import LeaningCapsule, sweep_frames
 from validate.errors import UsageError, ValidateError
 from validate.fem.cavity import cavity_surface, volume_of
 from validate.papers.fluid_inclusion.effects import INPUTS
-from validate.papers.fluid_inclusion.phantom import InclusionCard, inclusion, place, read
-from validate.papers.fluid_inclusion.swept import POSITION, SWEEP, swept
+from validate.papers.fluid_inclusion.phantom import place, read
 from validate.parameters import with_given
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.sweep import stacked
+from validate.replay.inclusion_body import MeshedInclusion, inclusion
+from validate.replay.inclusion_sweep import POSITION, SWEEP, swept
 from validate.replay.tree import Built, Tree
 from validate.scene.inclusion import Capsule
 from validate.twin.ultrasound import Scanner
@@ -116,7 +117,7 @@ def test_sweeps_that_mean_nothing_are_refused_in_one_line(
 
 def test_what_is_set_of_a_capsule_is_no_setting_of_a_sweep() -> None:
     with pytest.raises(UsageError, match=r"inclusion\.radius applies to a capsule"):
-        InclusionCard(shape="sweep", radius=0.008)
+        MeshedInclusion(shape="sweep", radius=0.008)
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """The ranges of shipped experiments: each says where it comes from, and moves what it names."""
 
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,13 +10,11 @@ import pytest
 from validate.compare.residual import Residual
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
-from validate.papers.fluid_inclusion.effects import rubbed as phantom_rubbed
 from validate.parameters import with_given
-from validate.replay.cards import rubbed
 from validate.replay.checks import joint_inputs
 from validate.replay.experiment import Input, Variant
 from validate.replay.find import find
-from validate.replay.inclusion import BlockCard, GelCard, InclusionRanges, InclusionTest
+from validate.replay.inclusion import InclusionRanges, rubbed
 from validate.scene.plates import plates_of_share, rubbing_share
 
 
@@ -33,7 +30,6 @@ def test_a_range_without_a_source_is_refused() -> None:
         Input("modulus", rubbed, "E", " ")
 
 
-TEST = InclusionTest(block=BlockCard(0.060, 0.045, 0.070), material=GelCard(15_200.0))
 PHANTOM = find("fluid_phantom", Path(__file__)).parameters
 
 
@@ -41,21 +37,17 @@ def test_plates_rub_by_the_models_own_share() -> None:
     """One standard uncertainty from slipping is the stiffness that friction is identified by, not a
     share of the response of bonded plates, which is 1.4 to 2.3 times less."""
     k = 4 * 15_200 / 0.060 * 0.03 / 0.97
-    assert (rubbed(TEST, 1.0).plates, rubbed(TEST, 1.0).friction) == ("partial", pytest.approx(k))
-    assert rubbed(TEST, -1.0) == rubbed(TEST, 1.0)
-    (plates,) = phantom_rubbed(PHANTOM, 1.0).scene.foundations
+    (plates,) = rubbed(PHANTOM, 1.0).scene.foundations
     assert (plates.contact, plates.stiffness) == ("partial", pytest.approx(k))
-    assert phantom_rubbed(PHANTOM, -1.0) == phantom_rubbed(PHANTOM, 1.0)
+    assert rubbed(PHANTOM, -1.0) == rubbed(PHANTOM, 1.0)
 
 
 def test_bonded_and_partial_plates_are_uncertain_too() -> None:
     path, (contact, friction) = "foundations.plates.", plates_of_share(0.5, 15_200, 0.060)
     half = {f"{path}contact": contact, f"{path}stiffness": friction}
     for own, more in (({f"{path}contact": "bonded"}, 0.97), (half, 0.53)):
-        card = {"plates": own[f"{path}contact"], "friction": own.get(f"{path}stiffness", 0.0)}
-        (plates,) = phantom_rubbed(with_given(PHANTOM, own), 1.0).scene.foundations
-        for k in (plates.stiffness, rubbed(replace(TEST, **card), 1.0).friction):  # type: ignore[arg-type]
-            assert rubbing_share("partial", k, 15_200, 0.060) == pytest.approx(more)
+        (plates,) = rubbed(with_given(PHANTOM, own), 1.0).scene.foundations
+        assert rubbing_share("partial", plates.stiffness, 15_200, 0.060) == pytest.approx(more)
 
 
 def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
@@ -63,9 +55,8 @@ def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
     template = files("validate.cli").joinpath("new_inclusion.py.txt").read_text("utf-8")
     assert "ranges=InclusionRanges(E=0.05, nu=0.005, friction=0.03)," in template
     assert InclusionRanges() == InclusionRanges(E=0.05, nu=0.005, friction=0.03)
-    assert rubbing_share("partial", rubbed(TEST, 1.0).friction, 15_200, 0.060) == (
-        pytest.approx(0.03)
-    )
+    (plates,) = rubbed(PHANTOM, 1.0).scene.foundations
+    assert rubbing_share("partial", plates.stiffness, 15_200, 0.060) == pytest.approx(0.03)
 
 
 def test_an_inputs_standard_uncertainty_is_its_own_range() -> None:

@@ -1,6 +1,7 @@
 """A block with a fluid-filled inclusion, from outlines, a stage and markers."""
 
 from collections.abc import Sequence
+from dataclasses import fields as dataclass_fields
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from validate.arrays import Floats
 from validate.cli.asking import Answers, Question
 from validate.cli.new_kind import NewKind, quantity_in
 from validate.recording.types import Recording, Signal
+from validate.replay.inclusion import Streams
 
 
 def _fits(recording: Recording) -> bool:
@@ -22,7 +24,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     along = {"x": "length (fixed to moving plate)", "y": "height", "z": "lateral size"}
     return [
         Question(
-            f"block.{c}", f"{what} of the block, in m or as 60mm; empty: left open", check=length
+            f"body.{c}", f"{what} of the block, in m or as 60mm; empty: left open", check=length
         )
         for c, what in along.items()
     ]
@@ -37,8 +39,9 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     reached = np.interp(contours.t, stage.t, stage.y[:, 0])
     loads = tuple(sorted({round(float(x), 4) for x in reached if abs(x) > 1e-4}))
     tracker = next((k for k, record in recording.metadata.items() if "up" in record), "pen")
+    default = {f.name: f.default for f in dataclass_fields(Streams)}
     named = {"stage": stage_topic, "outline": outline, "markers": topic, "tracker": tracker}
-    streams = [f"{key}={value!r}" for key, value in named.items() if key != value]
+    streams = [f"{key}={value!r}" for key, value in named.items() if value != default[key]]
     streams.append(f"signals={_scalars(recording)!r}")
     return {
         "highest": f"{float(places[:, 1].max()):.6g}",
@@ -46,12 +49,12 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "side_z": f"{_side(places[:, 2]):.6g}",
         "loads": repr(loads),
         "streams": ", ".join(streams),
-        **{f"block_{c}": _size(found.get(f"block.{c}", "")) for c in "xyz"},
+        **{f"size_{c}": _size(found.get(f"body.{c}", "")) for c in "xyz"},
     }
 
 
 def _size(answer: str) -> str:
-    return f"{quantity_in('m')(answer):.6g}" if answer else "None"
+    return repr(f"{1e3 * quantity_in('m')(answer):.6g} mm") if answer else "None"
 
 
 def _stage(recording: Recording) -> tuple[str, Signal]:

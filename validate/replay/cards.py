@@ -12,7 +12,6 @@ from validate.recording.types import Recording
 from validate.replay.experiment import Change
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
-from validate.scene.plates import plates_of_share, rubbing_share
 from validate.scene.similar_grids import member
 from validate.twin.tracked import Camera, require_noise
 
@@ -51,15 +50,6 @@ class TrackedTwin:
 def beside(parameters: Any, folder: Path) -> tuple[Recording, ...]:
     """The one recording that lies beside the experiment's own file, under the name it gives."""
     return (read_recording(folder / parameters.recording),)
-
-
-def rubbed(p: Any, z: float) -> Any:
-    """A block whose plates rub by z `ranges.friction` more; what lies beyond slipping or bonded is
-    mirrored back."""
-    E, apart = p.material.E, p.block.size.size_x
-    share = abs(rubbing_share(p.plates, p.friction, E, apart) + z * p.ranges.friction)
-    plates, friction = plates_of_share(min(share, 2 - share), E, apart)
-    return replace(p, plates=plates, friction=friction)
 
 
 def scaled(share: float | None, *counts: str) -> Change:

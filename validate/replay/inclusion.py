@@ -1,83 +1,48 @@
 """A block with a fluid-filled inclusion between two plates, from outlines, markers and a stage:
-what a file of one's own declares, and the experiment that follows.
+what a file declares beside its scene, and the experiment that follows.
 
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
-from validate.parameters import Ranges, known, quantity
-from validate.recording.types import Contours, Recording
+from validate.parameters import Ranges, quantity, with_given
+from validate.recording.types import Recording
 from validate.register.clock import clock_sd
 from validate.register.fitting import MarkerFit
-from validate.register.inclusion import outlined_capsule
-from validate.register.markers import Together, placed_markers
-from validate.register.observation import nearest_sample
+from validate.register.markers import Sampling, Together, placed_markers
 from validate.register.outlines import Corner, observe_outlines
-from validate.register.plane import SurfaceSampler, cavity_sampler
+from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
-from validate.replay.cards import beside, rubbed
-from validate.replay.experiment import Change, Experiment, Input, MeshLadder, Uncertainty, vary
+from validate.replay.experiment import Experiment, Input, Uncertainty, vary
+from validate.replay.inclusion_body import (
+    WITHIN,
+    inclusion,
+    measured_inclusion,
+    shifted,
+    sweep_stack,
+)
+from validate.replay.inclusion_sweep import off_circles, outlined_sweep
 from validate.replay.method import Method
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
-from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
-from validate.scene.plates import Contact, Plates, between_plates
-from validate.scene.scene import Cavity, Dilatation, Drive, Scene, Support
-from validate.scene.similar_grids import member
-from validate.solve.fluid import ExactPressure, NoFluid
+from validate.replay.tree import Tree, beside, changed_by
+from validate.scene.inclusion_shape import InclusionShape
+from validate.scene.plates import plates_of_share, rubbing_share
+from validate.scene.scene import Scene
 
-# The stage presses towards the fixed plate; the block stands on a table.
-PLATES = Plates(Drive("stage", "x1", (-1.0, 0.0, 0.0)), "x0", Support("y0", (1,)))
-CAVITIES = (Cavity("inclusion", "cavity"),)
-_WITHIN = 0.1e-3  # m: the stage stood at a load
 _TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
 _PLANE = (
     Together("marker.inplane", (0, 2), "position along the stage and sideways"),
     Together("marker.vertical", (1,), "position along the vertical"),
 )
-
-
-@dataclass(frozen=True)
-class BlockCard:
-    x: float | None = quantity(None, "m", "distance from the fixed to the moving plate", asked=True)
-    y: float | None = quantity(None, "m", "height", asked=True)
-    z: float | None = quantity(None, "m", "lateral size", asked=True)
-
-    @property
-    def size(self) -> Block:
-        """Raises `UsageError` while a size is not set."""
-        return Block(known(self.x, "block.x"), known(self.y, "block.y"), known(self.z, "block.z"))
-
-
-@dataclass(frozen=True)
-class GelCard:
-    E: float = quantity(15_000.0, "Pa", "Young's modulus; affects only forces and pressures")
-    nu: float = quantity(0.485, "1", "Poisson ratio")
-
-
-@dataclass(frozen=True)
-class BlockNodes:
-    nodes_x: int = quantity(9, "1", "nodes along x (9 x 10 x 15 gives the 1328 of paper 000)")
-    nodes_y: int = quantity(10, "1", "nodes along y")
-    nodes_z: int = quantity(15, "1", "nodes along z")
-
-    @property
-    def nodes(self) -> tuple[int, int, int]:
-        return (self.nodes_x, self.nodes_y, self.nodes_z)
-
-
-@dataclass(frozen=True)
-class BlockGrid(BlockNodes):
-    finer: float = quantity(1.25, "1", "how many times finer the finest mesh is, for u_num")
 
 
 @dataclass(frozen=True)
@@ -99,33 +64,51 @@ class Streams:
 
 
 @dataclass(frozen=True)
-class InclusionTest:
-    """Everything a user decides; `recording` lies beside the file."""
+class InclusionRegistration(MarkerFit):
+    """Of markers, and of the image that shows the inclusion."""
 
-    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
-    block: BlockCard = BlockCard()
-    material: GelCard = GelCard()
-    mesh: BlockGrid = BlockGrid()
-    ranges: InclusionRanges = InclusionRanges()
-    streams: Streams = Streams()
-    registration: MarkerFit = MarkerFit()
-    plates: Contact = quantity("slip", "1", "contact of both plates")
-    friction: float = quantity(0.0, "N/m3", "tangential stiffness of the plates, if partial")
-    loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
+    sampling: Sampling = quantity("barycentric", "1", "markers to nodes")
+    wall: Literal["measured", "facets", "nearest_node"] = quantity(
+        "measured", "1", "wall on the measured circle, on the mesh's facets, or by nearest node"
+    )
+    image_shift_x: float = quantity(0.0, "m", "correction of the image pose along x")
+    image_shift_z: float = quantity(0.0, "m", "correction of the image pose along z")
 
 
 @dataclass(frozen=True)
-class Filled:
-    """What a method's scene is built with."""
+class InclusionTest:
+    """What no scene holds of such a test."""
 
-    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
-
-
-def filled(label: str, *, order: Literal[1, 2] = 2, fluid: bool = True) -> Method:
-    """A linear model with fluid of constant volume in the inclusion, or with an empty one."""
-    return Method(label, ExactPressure() if fluid else NoFluid(), Filled(order))
+    streams: Streams = Streams()
+    registration: InclusionRegistration = InclusionRegistration()
+    ranges: InclusionRanges = InclusionRanges()
+    loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
 
 
+def rubbing(tree: Tree, share: float) -> Tree:
+    """The plates rub by a share, from 0 (they slip) to 1 (bonded)."""
+    contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
+    path = "foundations.plates."
+    changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
+    return changed
+
+
+def rubbed(tree: Tree, z: float) -> Tree:
+    """Plates that rub by z `ranges.friction` more; what lies beyond slipping or bonded is mirrored
+    back."""
+    plates = next(f for f in tree.scene.foundations if f.name == "plates")
+    share = rubbing_share(
+        plates.contact, plates.stiffness, tree.scene.material.E, tree.scene.body.x
+    )
+    share = abs(share + z * tree.settings.ranges.friction)
+    return rubbing(tree, min(share, 2 - share))
+
+
+FINER = 1.25  # times the cells along every edge: the finest mesh of `MESHES`
+#: More than three meshes: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells
+#: have no common factor: within 5 % the grids are similar. Order 2: corners at the plates and
+#: facets on the wall limit that of quadratic elements.
+MESHES = vary("body.cells", f"x 0.625 0.75 0.875 {FINER}, order 2")
 #: The inputs that every such experiment has, with the fields of `InclusionRanges`.
 INPUTS = (
     vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
@@ -139,39 +122,79 @@ def inclusion_test(
     name: str,
     title: str,
     source: str,
-    parameters: InclusionTest,
+    parameters: Tree,
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
     kind: Kind = "measured",
 ) -> Experiment:
-    """The experiment; the last method, the cheapest, is the one that inputs are varied with."""
+    """The experiment; inputs are varied with the first method of linear elements (none: the last),
+    which is cheap."""
+    cheap = [n for n, m in methods.items() if _linear(parameters, m)]
     return Experiment(
-        name, title, source, parameters, methods, accepted, accept, beside, _build, _place,
-        kind=kind,
-        uncertainty=Uncertainty(
-            mesh=BLOCK_MESHES,
-            inputs=INPUTS,
-            surrogate=next(n for n, m in methods.items() if m.scene == Filled(1)),
-        ),
+        name, title, source, parameters, methods, accepted, accept, load,
+        place=_place, kind=kind, variations=(MESHES, *INPUTS),
+        uncertainty=Uncertainty(surrogate=(*cheap, *reversed(list(methods)))[0]),
     )  # fmt: skip
 
 
-def _build(recording: Recording, p: InclusionTest, model: Filled) -> Scene:
-    capsule = measured_capsule(recording, recording.contour(p.streams.outline), p.streams)
-    mesh = block_with_inclusion(p.block.size, p.mesh.nodes, capsule)
-    return pressed_block(
-        mesh, Material(p.material.E, p.material.nu), p.plates, model.order, friction=p.friction
-    )
+def _linear(tree: Tree, method: Method) -> bool:
+    return bool(changed_by(tree, method.scene or {}).scene.body.element == "linear")
 
 
-def _place(recording: Recording, p: InclusionTest, scene: Scene) -> Registered:
-    contours = recording.contour(p.streams.outline)
-    wall = cavity_sampler(scene.mesh, "cavity", measured_capsule(recording, contours, p.streams))
-    units = {topic: _unit(recording, topic) for topic in p.streams.signals}
-    return placed(
-        recording, contours, scene, wall, p.streams, units, p.loads, _PLANE, how=p.registration
-    )
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return tuple(outlined(recording, tree) for recording in beside(tree, folder))
+
+
+def outlined(recording: Recording, tree: Tree) -> Recording:
+    """The recording with the outlines in the images of its sweep, where the body is meshed from
+    it."""
+    return outlined_sweep(recording) if tree.scene.body.inclusion.shape == "sweep" else recording
+
+
+def _place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+    return placed(recording, tree, scene, tree.settings.loads, _PLANE)
+
+
+# --- what a paper's own block of this kind uses too -----------------------------------------------
+
+
+def placed(
+    recording: Recording, tree: Tree, scene: Scene, loads: tuple[float, ...],
+    together: tuple[Together, ...], corners: tuple[Corner, ...] = (),
+) -> Registered:  # fmt: skip
+    """Stage, outlines, markers and signals at rest and at `loads` m.
+
+    Raises `ComparisonError` without loads, `RegistrationError` for a signal that falls as the
+    plates close, and what the parts raise.
+    """
+    if not loads:
+        raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
+    streams, how = tree.settings.streams, tree.settings.registration
+    contours = shifted(recording.contour(streams.outline), tree)
+    measured = measured_inclusion(recording, tree)
+    shape = None if how.wall == "facets" else measured
+    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
+    stage = driving(recording, streams.stage, "m")
+    signals = []
+    for topic in streams.signals:
+        unit = _unit(recording, topic)
+        name, trace = _TRACES[unit]
+        signals.append(validating(recording, topic, unit, quantity=name, trace=trace))
+        require_rising(stage, signals[-1])
+    rest, *holds = holds_at(stage, contours.t, loads, within=WITHIN)
+    outline = observe_outlines(
+        contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
+        sd_t=clock_sd(recording, streams.outline),
+    )  # fmt: skip
+    markers = placed_markers(
+        recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
+        up=(0.0, 1.0, 0.0), how=how, sampling=how.sampling,
+    )  # fmt: skip
+    swept = tree.scene.body.inclusion.shape == "sweep"
+    said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
+    said = (*said, *_misplaced(measured, inclusion(recording, tree)))
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
 
 
 def _unit(recording: Recording, topic: str) -> str:
@@ -180,85 +203,14 @@ def _unit(recording: Recording, topic: str) -> str:
     return found.unit if found is not None and found.unit in _TRACES else "N"
 
 
-# --- what a paper's own block of this kind uses too -----------------------------------------------
-
-
-def measured_capsule(
-    recording: Recording, contours: Contours, streams: Streams, allowance: float = 0.0
-) -> Capsule:
-    """Centre x, z and radius of the rest outline; height and length from record 'inclusion'.
-
-    `allowance` m and what is raised: `outlined_capsule`.
-    """
-    rest = holds_at(driving(recording, streams.stage, "m"), contours.t, (), within=_WITHIN)[0]
-    index = nearest_sample(contours.t, instant(rest), "outlines")
-    return outlined_capsule(contours, index, recording.record("inclusion"), allowance)
-
-
-def pressed_block(
-    mesh: Mesh, material: Material, contact: Contact, order: Literal[1, 2],
-    dilatation: Dilatation = "nodal_mean", **more: Any,
-) -> Scene:  # fmt: skip
-    """The block of linear cells, made of `order`, between its plates; `dilatation` is of order 1,
-    `more` goes to `between_plates`."""
-    return between_plates(
-        mesh if order == 1 else quadratic(mesh), material, contact, PLATES,
-        "pointwise" if order == 2 else dilatation, cavities=CAVITIES, **more,
-    )  # fmt: skip
-
-
-def placed(
-    recording: Recording, contours: Contours, scene: Scene, wall: SurfaceSampler, streams: Streams,
-    units: Mapping[str, str], loads: tuple[float, ...], together: tuple[Together, ...], *,
-    corners: tuple[Corner, ...] = (), **registration: Any,
-) -> Registered:  # fmt: skip
-    """Stage, outlines, markers and signals (`units` by topic, N or Pa) at rest and at `loads` m.
-
-    `registration` goes to `placed_markers`. Raises `RegistrationError` for a signal that falls as
-    the plates close, and what the parts raise.
-    """
-    stage = driving(recording, streams.stage, "m")
-    signals = []
-    for topic, unit in units.items():
-        measured, trace = _TRACES[unit]
-        signals.append(validating(recording, topic, unit, quantity=measured, trace=trace))
-        require_rising(stage, signals[-1])
-    if not loads:
-        raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
-    rest, *holds = holds_at(stage, contours.t, loads, within=_WITHIN)
-    outline = observe_outlines(
-        contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
-        sd_t=clock_sd(recording, streams.outline),
-    )  # fmt: skip
-    markers = placed_markers(
-        recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
-        up=(0.0, 1.0, 0.0), **registration,
-    )  # fmt: skip
-    return Registered((stage, outline, markers, *signals), tuple(holds), rest)
-
-
-def gridded(share: float | None) -> Change:
-    """The most similar grid with about `share` of the cells along every edge (none: its own
-    `finer`)."""
-
-    def change(p: Any) -> Any:
-        g = p.mesh
-        by = g.finer if share is None else share
-        cells = member([n - 1 for n in g.nodes], by)
-        names = ("nodes_x", "nodes_y", "nodes_z")
-        return replace(p, mesh=replace(g, **{k: n + 1 for k, n in zip(names, cells, strict=True)}))
-
-    return change
-
-
-def _cell(p: Any) -> float:
-    """The edge m of a cube as large as a mean cell."""
-    cells = np.prod(np.array(p.mesh.nodes) - 1)
-    return float(np.cbrt(np.prod(p.block.size.sizes) / cells))
-
-
-# More than three: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells have no
-# common factor: within 5 % the grids are similar. Order 2: corners at the plates and facets on the
-# wall limit that of quadratic elements.
-_COARSER = (0.625, 0.75, 0.875)
-BLOCK_MESHES = MeshLadder(tuple(gridded(share) for share in (*_COARSER, None)), _cell)
+def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:
+    """A word where the meshed inclusion is not where the rest outline lies."""
+    off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
+    wide = meshed.radius - measured.radius
+    if off < 0.5e-3 and abs(wide) < 0.5e-3:
+        return ()
+    return (
+        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
+        f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
+        "show this.",
+    )

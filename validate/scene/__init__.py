@@ -31,7 +31,6 @@ _HOMES = {
     "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
     "cylinder": ("quarter_cylinder",),
     "inclusion": ("Block", "Capsule", "block_with_inclusion"),
-    "plates": ("Plates", "between_plates"),
     "refine": ("refined",),
     "tracked": ("Prescribed",),
     "select": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),

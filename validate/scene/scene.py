@@ -56,13 +56,31 @@ class Support:
 
 @dataclass(frozen=True)
 class Pin:
-    """One node, the nearest to `point` m, held in some components."""
+    """One node, the nearest to `point` m, held in some components.
 
-    point: tuple[float, ...] = quantity(MISSING, "m", "near the pinned node")
+    Declared, it may be the one nearest to the middle of a place instead: of a body whose sizes are
+    open, or change.
+    """
+
+    point: tuple[float, ...] = quantity((), "m", "near the pinned node")
     components: tuple[int, ...] = quantity((0, 1, 2), "1", "0, 1, 2: held along x, y, z")
+    middle_of: str = quantity("", "1", "instead of a point: place whose middle is pinned")
 
     def __post_init__(self) -> None:
         take_units(self)
+        if bool(self.point) == bool(self.middle_of):
+            raise SceneError(
+                f"pin at {self.point or 'no point'}, in the middle of '{self.middle_of}': expected "
+                "one of the two"
+            )
+
+    def placed(self, mesh: Mesh, places: Mapping[str, Place]) -> "Pin":
+        """At a point."""
+        if not self.middle_of:
+            return self
+        named = _placed(Support(self.middle_of), mesh, places).facets
+        x = mesh.nodes[nodes_of(mesh, named)]
+        return Pin(tuple((0.5 * (x.min(axis=0) + x.max(axis=0))).tolist()), self.components)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +335,10 @@ class Scene:
             self,
             body=mesh,
             supports=(supports := placed((*self.supports, *held, *bonded))),
-            pins=(*self.pins, *(pin for s in supports for pin in s.pins(mesh))),
+            pins=(
+                *(pin.placed(mesh, places) for pin in self.pins),
+                *(pin for s in supports for pin in s.pins(mesh)),
+            ),
             drives=placed(self.drives),
             foundations=placed(tuple(f for f in sides if f.contact == "partial")),
             membranes=placed(tuple(m for m in self.membranes if m.thickness)),
@@ -376,6 +397,12 @@ class Scene:
                 raise SceneError(
                     f"foundation '{ground.name or ground.facets}': contact '{ground.contact}' is "
                     "of a declared scene; on a mesh use a support, or no foundation"
+                )
+        for pin in self.pins:
+            if pin.middle_of:
+                raise SceneError(
+                    f"pin in the middle of '{pin.middle_of}' is of a declared scene; on a mesh "
+                    "give its point"
                 )
         for cavity in self.cavities:
             self.mesh.facet_nodes(cavity.facets)

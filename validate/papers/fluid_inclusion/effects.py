@@ -5,49 +5,24 @@ from typing import Any
 
 from validate.parameters import with_given
 from validate.replay.experiment import Change, EffectSpec, Input, Variant, vary
+from validate.replay.inclusion import FINER
+from validate.replay.inclusion import INPUTS as SHARED
 from validate.replay.tree import ScaledBody, Tree
 from validate.replay.variation import change_of
-from validate.scene.plates import plates_of_share, rubbing_share
 
-FINEST = ScaledBody(1.25)
-#: More than three meshes: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells
-#: have no common factor: within 5 % the grids are similar. Order 2: corners at the plates and
-#: facets on the wall limit that of quadratic elements.
-MESHES = vary("body.cells", f"x 0.625 0.75 0.875 {FINEST.share}, order 2")
-
-
-def rubbing(tree: Tree, share: float) -> Tree:
-    """The plates rub by a share, from 0 (they slip) to 1 (bonded)."""
-    contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
-    path = "foundations.plates."
-    changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
-    return changed
-
-
-def rubbed(tree: Tree, z: float) -> Tree:
-    """Plates that rub by z `ranges.friction` more; what lies beyond slipping or bonded is mirrored
-    back."""
-    plates = tree.scene.foundations[0]
-    share = rubbing_share(
-        plates.contact, plates.stiffness, tree.scene.material.E, tree.scene.body.x
-    )
-    share = abs(share + z * tree.settings.ranges.friction)
-    return rubbing(tree, min(share, 2 - share))
+FINEST = ScaledBody(FINER)
 
 
 def _rounder(tree: Tree, z: float) -> Tree:
-    card = tree.scene.body.inclusion
-    if card.shape == "capsule":
+    inclusion = tree.scene.body.inclusion
+    if inclusion.shape == "capsule":
         return tree
-    changed: Tree = with_given(tree, {"body.inclusion.free": card.free + z})
+    changed: Tree = with_given(tree, {"body.inclusion.free": inclusion.free + z})
     return changed
 
 
 INPUTS = (
-    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
-    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
-         "nu within its declared uncertainty"),
-    Input("plate friction", rubbed, "share of the way from slipping to bonded plates", "assumed"),
+    *SHARED,
     vary("registration.image_shift_x", "absolute ranges.pose", "image pose x",
          "image plane along the stage; the meshed inclusion follows"),
     vary("registration.image_shift_z", "absolute ranges.pose", "image pose z",

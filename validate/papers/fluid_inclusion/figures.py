@@ -13,11 +13,9 @@ from validate.arrays import Floats
 from validate.compare.published import Figure, Values
 from validate.fem.system import Responses, build, responses
 from validate.papers.fluid_inclusion.square import square_with_hole
-from validate.replay.inclusion import CAVITIES, PLATES
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
-from validate.scene.plates import between_plates
-from validate.scene.scene import Cavity, Scene, Support
+from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
 from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
 from validate.solve.pressure_loop import PressureLoop
 
@@ -43,8 +41,15 @@ def _fig_4() -> Responses:
 def _phantom() -> Responses:
     block = Block(0.060, 0.045, 0.070)
     mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
-    material = Material(15.2e3, 0.485)
-    return responses(build(between_plates(mesh, material, "slip", PLATES, cavities=CAVITIES)))
+    scene = Scene(
+        mesh,
+        Material(15.2e3, 0.485),
+        (Support("x0", (0,)), Support("y0", (1,))),
+        (Pin((0.0, 0.0, 0.035), (2,)),),
+        (Drive("stage", "x1", (-1.0, 0.0, 0.0)),),
+        (Cavity("inclusion", "cavity"),),
+    )
+    return responses(build(scene))
 
 
 def _largest_pressure(_: Values) -> float:

@@ -8,10 +8,11 @@ from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
 from validate.identify.interval import SAFETY, Interval, profile_interval
-from validate.papers.fluid_inclusion.effects import FINEST, MESHES, rubbing
+from validate.papers.fluid_inclusion.effects import FINEST
 from validate.parameters import with_given
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment, Identified
+from validate.replay.inclusion import MESHES, rubbing
 from validate.replay.method import Method
 from validate.replay.solved import solve
 from validate.replay.tree import Tree

@@ -6,21 +6,20 @@ is off-centre, so that a mirrored image cannot pass; a pressure transducer sits 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import build
-from validate.papers.fluid_inclusion.swept import POSITION, SWEEP
 from validate.parameters import quantity
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
-from validate.replay.inclusion import CAVITIES, PLATES
+from validate.replay.inclusion_sweep import POSITION, SWEEP
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
-from validate.scene.plates import between_plates
+from validate.scene.scene import Scene
 from validate.solve.fluid import ExactPressure
 from validate.solve.march import march
 from validate.solve.newton import StaticNewton
@@ -69,14 +68,20 @@ class PhantomTwin:
 
 
 def record_phantom(
-    twin: PhantomTwin, size: Block, material: Material, progress: Callable[[str], None]
+    twin: PhantomTwin, declared: Scene, progress: Callable[[str], None]
 ) -> Recording:
-    """The twin's recording: seeded, the same on every machine to 1e-9."""
+    """The twin's recording: seeded, the same on every machine to 1e-9.
+
+    Of the models' `declared` scene it has the block, material, supports and drive, with the twin's
+    law and inclusion; its plates slip, and no membrane covers the wall.
+    """
+    size, material = declared.body.block, replace(declared.material, law=twin.law)
     capsule = Capsule((twin.centre_x, twin.centre_y, twin.centre_z), twin.radius, twin.length)
     progress("mesh")
     grid = (twin.nodes_x, twin.nodes_y, twin.nodes_z)
     mesh = quadratic(block_with_inclusion(size, grid, capsule))
-    scene = between_plates(mesh, material, "slip", PLATES, cavities=CAVITIES)
+    slipping = replace(declared, material=material, foundations=(), membranes=())
+    scene = replace(slipping, dilatation="pointwise").resolved(mesh)
     progress(f"factorise {mesh.nodes.size} unknowns")
     stepper = _scheme(material).prepare(build(scene))
     t, stage, middles = PROFILE.positions()
