@@ -128,7 +128,8 @@ def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
     """Not names of parts, arrays, and parts of which there are none."""
     if isinstance(value, tuple) and get_origin(hint) is tuple:
         return "unit" in meta and not _is_of_parts(hint)
-    plain = value is None or isinstance(value, str | int | float | tuple)
+    absent = value is None and is_dataclass(hint)
+    plain = not absent and (value is None or isinstance(value, str | int | float | tuple))
     return plain and ("unit" in meta or isinstance(hint, type))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrating import NU, OPEN, E, Open
+from calibrating import NU, OPEN, OPENED, E, Sensed, known
 
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
@@ -14,11 +14,13 @@ from validate.errors import ComparisonError, UsageError
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
 from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Input, Uncertainty
+from validate.replay.experiment import Input, Uncertainty, vary
 from validate.replay.options import Options
 from validate.replay.own_body import own_body
 from validate.replay.reused import rests_on
 from validate.replay.road import compare, set_out
+from validate.replay.tree import Tree
+from validate.replay.variation import change_of
 
 
 def test_bounds_are_two_finite_numbers_in_order() -> None:
@@ -38,7 +40,7 @@ def test_a_calibration_names_parameters_and_residuals_each_once() -> None:
         Calibration("fem", (), on)
     with pytest.raises(UsageError, match="1 parameters on 0 quantities"):
         Calibration("fem", (E,), (Calibrates(()),))
-    with pytest.raises(UsageError, match=r"E is free twice"):
+    with pytest.raises(UsageError, match=r"material\.E is free twice"):
         Calibration("fem", (E, E), on)
 
 
@@ -49,15 +51,16 @@ def test_a_calibration_names_parameters_and_residuals_each_once() -> None:
 def test_what_stands_open_is_identified_and_what_calibrated_is_fitted() -> None:
     result = compare(OPEN, Options({}))
     (modulus,) = result.identified
-    assert modulus.name == "E"
+    assert modulus.name == "material.E"
     assert modulus.value == pytest.approx(10e3, rel=0.05)
-    assert {p.path: p.origin for p in result.parameters}["E"] == "identified"
-    assert result.sentence.startswith("Fitted: E = ")
+    assert {p.path: p.origin for p in result.parameters}["material.E"] == "identified"
+    assert result.sentence.startswith("Fitted: material.E = ")
     assert (
         "with 'fem' on force@0.1mm of moved; predicted: force@0.3mm has an error of"
         in result.sentence
     )
-    assert {i.name: i.source for i in result.inputs}["identified E"].startswith("identified on")
+    sources = {i.name: i.source for i in result.inputs}
+    assert sources["identified material.E"].startswith("identified on")
 
 
 @pytest.mark.slow
@@ -79,7 +82,7 @@ def test_the_covariance_of_what_was_identified_is_uncertain_input() -> None:
 
 
 def test_a_value_is_taken_as_it_is_and_then_nothing_is_fitted() -> None:
-    result = compare(replace(OPEN, parameters=Open(E=9e3)), Options({}))
+    result = compare(replace(OPEN, parameters=known(E=9e3)), Options({}))
     assert result.identified == ()
     assert not result.sentence.startswith("Fitted")
     assert all(c.verdict != "fitted" for c in result.checks)
@@ -95,14 +98,14 @@ def test_a_figure_that_would_serve_twice_is_an_error() -> None:
 
 
 def test_the_judged_recording_under_another_name_serves_once_too() -> None:
-    on = Calibrates(("force@0.3mm",), lambda p: replace(p, nu=0.3), "another")
+    on = Calibrates(("force@0.3mm",), change_of({"material.nu": 0.3}), "another")
     twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (on,)),))
     hashed = replace(twice, load=_hashed)
     with pytest.raises(ComparisonError, match="the checks use the same recording"):
         compare(hashed, Options({}))
 
 
-def _hashed(p: Open, folder: Path) -> tuple[Recording, ...]:
+def _hashed(p: Tree, folder: Path) -> tuple[Recording, ...]:
     return tuple(
         replace(r, source=replace(r.source, sha256="ab" * 32)) for r in OPEN.load(p, folder)
     )
@@ -113,13 +116,15 @@ def test_what_is_not_identifiable_blocks_the_prediction_unless_anyway() -> None:
     """With the top moved and its force alone, Poisson ratio and modulus are one number."""
     both = replace(
         OPEN,
-        parameters=Open(nu=None),
+        parameters=known(nu=None),
         calibrations=(Calibration("fem", (E, NU), (Calibrates(("force@0.1mm", "force@0.2mm")),)),),
     )
-    with pytest.raises(ComparisonError, match=r"nu is not identifiable .*the sides' motion would"):
+    with pytest.raises(
+        ComparisonError, match=r"material.nu is not identifiable .*the sides' motion would"
+    ):
         compare(both, Options({}))
     result = compare(both, Options({}, anyway=True))
-    assert any("nu is not identifiable" in note for note in result.notes)
+    assert any("material.nu is not identifiable" in note for note in result.notes)
 
 
 def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
@@ -131,7 +136,7 @@ def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
 def test_a_load_that_is_not_there_is_named_with_those_that_are() -> None:
     """Beside one that is there, too: it compared nothing, and nothing is said of how far off."""
     absent = replace(OPEN, accept=(Accept("force", 0.1, "ours", ("0.3mm", "9mm")),))
-    result = compare(absent, Options({"E": "10kPa"}))
+    result = compare(absent, Options({"material.E": "10kPa"}))
     (there, not_there) = result.checks
     assert there.name == "force@0.3mm"
     assert (not_there.name, not_there.count) == ("force@9mm", 0)
@@ -141,7 +146,7 @@ def test_a_load_that_is_not_there_is_named_with_those_that_are() -> None:
 
 
 def test_a_marker_that_is_never_seen_calibrates_nothing() -> None:
-    def unseen(p: Open, folder: Path) -> tuple[Recording, ...]:
+    def unseen(p: Tree, folder: Path) -> tuple[Recording, ...]:
         (recording,) = OPEN.load(p, folder)
         markers = recording.markers["markers"]
         x = markers.x.copy()
@@ -167,7 +172,7 @@ def test_a_sensor_is_identified_beside_the_material() -> None:
     bias = Free("cell.bias", -1.0, 1.0, "assumed")
     on = Calibrates(("force@0.1mm", "force@0.2mm"))
 
-    def off(p: Open, folder: Path) -> tuple[Recording, ...]:
+    def off(p: Tree, folder: Path) -> tuple[Recording, ...]:
         (recording,) = OPEN.load(p, folder)
         cell = recording.signal("cell", "N")
         signals = {**recording.signals, "cell": replace(cell, y=cell.y + 0.2)}
@@ -176,12 +181,12 @@ def test_a_sensor_is_identified_beside_the_material() -> None:
     biased = replace(
         OPEN,
         load=off,
-        parameters=Open(cell=ForceSensing(bias=None)),
+        parameters=replace(OPENED, settings=Sensed(ForceSensing(bias=None))),
         calibrations=(Calibration("fem", (E, bias), (on,)),),
     )
     found = {s.name: s.value for s in compare(biased, Options({})).identified}
     assert found["cell.bias"] == pytest.approx(0.2, abs=5e-4)
-    assert found["E"] == pytest.approx(10e3, rel=0.05)
+    assert found["material.E"] == pytest.approx(10e3, rel=0.05)
 
 
 def test_a_body_alone_has_what_stands_open_fitted() -> None:
@@ -191,10 +196,10 @@ def test_a_body_alone_has_what_stands_open_fitted() -> None:
 
 
 def test_a_recording_that_only_calibrates_is_named_among_the_files() -> None:
-    on = Calibrates(("force@0.1mm",), lambda p: replace(p, nu=0.3), "another")
+    on = Calibrates(("force@0.1mm",), change_of({"material.nu": 0.3}), "another")
     apart = replace(OPEN, calibrations=(Calibration("fem", (E,), (on,)),))
     assert [f.role for f in rests_on(apart, Options({})).files][-1] == "calibrates"
-    taken = replace(apart, parameters=Open(E=1e4))
+    taken = replace(apart, parameters=known(E=1e4))
     assert "calibrates" not in [f.role for f in rests_on(taken, Options({})).files]
 
 
@@ -202,7 +207,7 @@ def test_a_recording_that_only_calibrates_is_named_among_the_files() -> None:
 def test_several_recordings_calibrate_at_once() -> None:
     """Two looks at one force with independent noise halve the variance of one."""
     once = Calibrates(("force@0.1mm",))
-    again = Calibrates(("force@0.1mm",), lambda p: replace(p, nu=0.3), "a repeat")
+    again = Calibrates(("force@0.1mm",), change_of({"material.nu": 0.3}), "a repeat")
     one, two = (
         compare(replace(OPEN, calibrations=(Calibration("fem", (E,), on),)), Options({}))
         for on in ((once,), (once, again))
@@ -215,15 +220,20 @@ def test_several_recordings_calibrate_at_once() -> None:
 @pytest.mark.slow
 def test_a_declared_range_of_what_was_identified_gives_way_to_its_covariance() -> None:
     """A range that moves anything besides stays, and so does one of what was not identified."""
+
+    def both(p: Tree, z: float) -> Tree:
+        m = p.scene.material
+        return known(E=m.E * (1 + 0.1 * z), nu=m.nu + 0.01 * z)
+
     ranges = (
-        Input("modulus", lambda p, z: replace(p, E=p.E * (1 + 0.1 * z)), "E", "assumed"),
-        Input("both", lambda p, z: replace(p, E=p.E * (1 + z), nu=p.nu + z), "both", "assumed"),
-        Input("Poisson ratio", lambda p, z: replace(p, nu=p.nu + 0.01 * z), "nu", "assumed"),
+        vary("material.E", "relative 0.1", "modulus"),
+        Input("both", both, "both", "assumed"),
+        vary("material.nu", "absolute 0.01", "Poisson ratio"),
     )
     asked = replace(OPEN, uncertainty=Uncertainty(None, ranges, "fem"))
     kept = [i.name for i in set_out(asked, Options({})).experiment.uncertainty.inputs]
-    assert kept == ["both", "Poisson ratio", "identified E"]
-    given = set_out(replace(asked, parameters=Open(E=9e3)), Options({}))
+    assert kept == ["both", "Poisson ratio", "identified material.E"]
+    given = set_out(replace(asked, parameters=known(E=9e3)), Options({}))
     assert given.experiment.uncertainty.inputs == ranges
 
 

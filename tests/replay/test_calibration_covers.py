@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrating import NU, OPEN, E, Open, built
+from calibrating import NU, OPEN, OPENED, E, known
 from tiny import FIDUCIALS, LOADS, STEPS
 
 from validate.fem.system import build
@@ -23,7 +23,7 @@ TRUTH = (10e3, 0.3)
 STAGE = np.linspace(0, LOADS[-1], STEPS + 1)[1:]
 BOTH = replace(
     OPEN,
-    parameters=Open(nu=None),
+    parameters=known(nu=None),
     calibrations=(Calibration("fem", (E, NU), (Calibrates(("force", "node_B")),)),),
 )
 
@@ -45,8 +45,9 @@ def recorded(true: Scene, run: Run, seed: int) -> Recording:
 @pytest.mark.slow
 def test_intervals_hold_the_truth_of_two_hundred_twins_of_a_body() -> None:
     """Force on the stage and a marker's motion; 190 and 194 of 200."""
-    (shipped,) = OPEN.load(Open(), Path())
-    true = built(shipped, Open(*TRUTH), None)
+    (shipped,) = OPEN.load(OPENED, Path())
+    true = OPEN.build(shipped, known(E=TRUTH[0], nu=TRUTH[1]), None)
+    assert isinstance(true, Scene)
     run, held = moved(true), np.zeros(2)
     first = recorded(true, run, 0)
     problem = problem_of(BOTH, 0, (E, NU), BOTH.parameters, BOTH.methods, (first,))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny import TINY, Card, record, scene
+from tiny import DECLARED, TINY, record
 
 from validate.cli import checking, running
 from validate.cli.run_screen import show_run
@@ -15,12 +15,13 @@ from validate.compare.expected import Expected
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
+from validate.parameters import with_given
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Identified, MeshLadder, Twin, Uncertainty
+from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty, vary
 from validate.replay.options import Options
 from validate.replay.remade import stamped
 from validate.replay.road import compare
-from validate.replay.variation import change_of
+from validate.replay.tree import Built, Tree
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
@@ -31,14 +32,13 @@ FEM = {"fem": TINY.methods["fem"]}
 def other_model(**more: Any) -> Experiment:
     """The block and its twin, declared as made by another model; the twin is a file."""
     twin = replace(TINY.twin or Twin(record), kind="twin", remake=("twin.", "sd"))
-    levels = tuple(change_of({"cells": n}) for n in (6, 9))
-    uncertainty = Uncertainty(MeshLadder(levels, lambda card: 0.01 / card.cells))
+    uncertainty = Uncertainty(vary("body.cells", "x 2 3"))
     own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
     return replace(own, **more)
 
 
-def shipped(card: Card, folder: Path) -> tuple[Recording, ...]:
-    return (stamped(record(Card(), print), Card()),)
+def shipped(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return (stamped(record(DECLARED, print), DECLARED),)
 
 
 def judged(experiment: Experiment, **values: str) -> Result:
@@ -48,8 +48,8 @@ def judged(experiment: Experiment, **values: str) -> Result:
 def test_a_mesh_that_no_level_changes_shows_no_convergence() -> None:
     """Its answers differ by nothing; that is no u_num of 0."""
 
-    def build(recording: Recording, card: Card, model: None) -> Scene:
-        return scene(card.E, 3)
+    def build(recording: Recording, tree: Tree, changes: None) -> Scene:
+        return Built()(recording, tree, {"body.cells": (3, 3, 3)})
 
     (check,) = judged(other_model(build=build)).checks
     assert (check.verdict, check.u_num) == ("undecided", float("inf"))
@@ -66,7 +66,7 @@ def test_the_same_model_repeats_itself_and_predicts_nothing() -> None:
 
 
 def test_a_same_model_that_differs_has_failed() -> None:
-    result = judged(replace(TINY, cases=(), load=shipped), E="9e4")
+    result = judged(replace(TINY, cases=(), load=shipped), **{"material.E": "9e4"})
     assert [(c.validation, c.verdict) for c in result.checks] == [("differs", "not good enough")]
     assert not result.passed
 
@@ -87,15 +87,15 @@ def test_a_twin_made_again_from_own_parameters_cannot_agree() -> None:
     assert "simulated again with this run's parameters" in result.checks[0].why
 
 
-def unsaid(card: Card, folder: Path) -> tuple[Recording, ...]:
+def unsaid(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The twin's file without a word of what made it."""
-    return (record(Card(), print),)
+    return (record(DECLARED, print),)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("files", [1, 2])
 def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(files: int) -> None:
-    silent = other_model(load=lambda card, folder: files * unsaid(card, folder))
+    silent = other_model(load=lambda tree, folder: files * unsaid(tree, folder))
     assert [c.verdict for c in judged(silent).checks] == ["good enough"]
     with pytest.raises(
         UsageError, match=r"--set sd=0\.0001 would have no effect: .*validate record"
@@ -105,8 +105,8 @@ def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(f
 
 @pytest.mark.slow
 def test_a_setting_that_the_record_does_not_know_is_refused() -> None:
-    def older(card: Card, folder: Path) -> tuple[Recording, ...]:
-        made = stamped(record(Card(), print), Card())
+    def older(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+        made = stamped(record(DECLARED, print), DECLARED)
         known = {k: v for k, v in made.record("made_with").items() if k != "twin.stiffness"}
         return (replace(made, metadata={**made.metadata, "made_with": known}),)
 
@@ -118,7 +118,7 @@ def test_a_setting_that_the_record_does_not_know_is_refused() -> None:
 def test_a_twin_made_again_is_read_like_one_that_was_loaded() -> None:
     seen: list[Recording] = []
 
-    def read(recording: Recording, card: Card) -> Recording:
+    def read(recording: Recording, tree: Tree) -> Recording:
         seen.append(recording)
         return recording
 
@@ -138,8 +138,8 @@ def test_every_shipped_recording_says_what_made_it(name: str) -> None:
 def test_an_undeclared_uncertainty_is_no_excuse_for_a_measurement() -> None:
     """A measured recording put into a same-model experiment is not judged as its own model."""
 
-    def measured(card: Card, folder: Path) -> tuple[Recording, ...]:
-        made = record(card, print)
+    def measured(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+        made = record(tree, print)
         told = {k: v for k, v in made.metadata.items() if k != "provenance"}
         return (replace(made, metadata=told),)
 
@@ -149,8 +149,8 @@ def test_an_undeclared_uncertainty_is_no_excuse_for_a_measurement() -> None:
 
 @pytest.mark.parametrize("name", ["node_B", "node_B@all"])
 def test_data_that_served_to_identify_are_fitted(name: str) -> None:
-    def identify(recordings: Any, card: Card, methods: Any) -> Identified:
-        return Identified(card, (), (), calibrated=(name,))
+    def identify(recordings: Any, tree: Tree, methods: Any) -> Identified:
+        return Identified(tree, (), (), calibrated=(name,))
 
     result = judged(other_model(identify=identify))
     assert [c.verdict for c in result.checks] == ["fitted"]
@@ -201,11 +201,9 @@ def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
 ) -> None:
     """The page's notes alone left a quick run of linear cells at nu .4999 without a word."""
 
-    def build(recording: Recording, card: Card, model: None) -> Scene:
-        return replace(scene(card.E, card.cells), material=Material(card.E, 0.4999, rho=1000.0))
-
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
-    locks = replace(TINY, cases=(), build=build)
+    tree = DECLARED.with_scene(material=Material(10e3, 0.4999, rho=1000.0))
+    locks = replace(TINY, cases=(), parameters=tree)
     monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: locks)
     run_command(
         ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
@@ -230,7 +228,9 @@ def declaring(verdict: str, limit: float = 1e-9) -> Experiment:
 @pytest.fixture(scope="module")
 def known() -> Result:
     """A model of a tenth of the stiffness: its error is many times any limit."""
-    softer = replace(declaring("not good enough"), parameters=Card(E=9e4))
+    softer = replace(
+        declaring("not good enough"), parameters=with_given(DECLARED, {"material.E": 9e4})
+    )
     return judged(softer)
 
 
@@ -252,7 +252,7 @@ def test_check_holds_the_declared_verdict_and_fails_where_it_moves(known: Result
 
 def test_declared_verdicts_are_those_of_what_is_shipped() -> None:
     """What a user set has no declared verdict."""
-    result = judged(declaring("not good enough"), E="9e4")
+    result = judged(declaring("not good enough"), **{"material.E": "9e4"})
     assert (result.expected, result.as_expected, result.passed) == ((), False, False)
 
 

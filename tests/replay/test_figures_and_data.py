@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tiny import TINY, Card
+from tiny import TINY
 
 from validate.compare.published import Figure
 from validate.compare.result import Result
@@ -24,7 +24,7 @@ FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here"
 
 
 def tiny(frames: float, **settings: str) -> Result:
-    def told(card: Card, cases: Cases, progress: object) -> Told:
+    def told(tree: Tree, cases: Cases, progress: object) -> Told:
         return Told((), {"frames": frames})
 
     experiment = replace(TINY, exhibits=told, published=(FIGURE,), cases=())
@@ -41,11 +41,11 @@ def test_run_fails_and_says_so_where_our_value_moved() -> None:
 
 
 def test_other_settings_are_not_compared_with_a_printed_figure() -> None:
-    (figure,) = (other := tiny(4.0, **{"E": "10001", "methods.kf.modes": "4"})).published
+    (figure,) = (other := tiny(4.0, **{"material.E": "10001", "methods.kf.modes": "4"})).published
     assert (figure.verdict, figure.ours) == ("other data", None)
-    assert "not compared with E = 10001.0, methods.kf.modes = 4" in figure.why
+    assert "not compared with material.E = 10001.0, methods.kf.modes = 4" in figure.why
     assert other.sentence.endswith("1 of 1 printed figures belong to other data: not compared.")
-    (same,) = tiny(3.0, E="10000").published
+    (same,) = tiny(3.0, **{"material.E": "10000"}).published
     assert same.verdict == "reproduced"
 
 

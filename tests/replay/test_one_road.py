@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tiny import AT_HOLDS, LOADS, STEPS, TINY, Breaks, Card, stiffer
+from tiny import AT_HOLDS, LOADS, STEPS, TINY, Breaks, stiffer
 
 from validate.compare.convergence import convergence
 from validate.compare.effects import Sensor
@@ -18,6 +18,7 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
+from validate.parameters import with_given
 from validate.recording.types import Recording
 from validate.register.markers import MarkerObservation
 from validate.register.registered import Registered
@@ -27,33 +28,23 @@ from validate.replay.experiment import (
     EffectSpec,
     Experiment,
     Identified,
-    Input,
-    MeshLadder,
     Told,
     Uncertainty,
     Variant,
+    vary,
 )
 from validate.replay.followed import Cases
 from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Built, Tree
+from validate.replay.variation import change_of
 from validate.scene.scene import Scene
 from validate.solve.fluid import NoFluid
 
-
-def cells(n: int) -> Callable[[Card], Card]:
-    return lambda card: replace(card, cells=n)
-
-
-def harder(card: Card) -> Card:
-    return replace(card, E=1.3 * card.E)
-
-
-def shifted(card: Card) -> Card:
-    return replace(card, sd=2 * card.sd)
-
-
-MESHES = MeshLadder((cells(6), cells(9)), lambda card: 0.01 / card.cells)
+harder = change_of({"material.E": "x 1.3"})
+shifted = change_of({"sd": "x 2"})
+MESHES = vary("body.cells", "x 2 3")
 FINER = Uncertainty(MESHES)
 ROADS = pytest.mark.parametrize("road", [TINY, AT_HOLDS], ids=["over time", "at holds"])
 
@@ -83,9 +74,9 @@ def untold() -> Result:
     return compare(own, Options({}))
 
 
-def as_measured(card: Card, folder: Path) -> tuple[Recording, ...]:
+def as_measured(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The recording as an instrument writes it: it does not say that a model made it."""
-    (made,) = TINY.load(card, folder)
+    (made,) = TINY.load(tree, folder)
     told = {k: v for k, v in made.metadata.items() if k not in ("provenance", "made_with")}
     return (replace(made, metadata=told),)
 
@@ -161,11 +152,12 @@ def test_identification(road: Experiment) -> None:
     given: list[int] = []
 
     def identify(
-        recordings: Sequence[Recording], card: Card, methods: Mapping[str, Method]
+        recordings: Sequence[Recording], tree: Tree, methods: Mapping[str, Method]
     ) -> Identified:
         given.append(len(recordings))
         score = Score("modulus.E", 12e3, "Pa", 1, "measured recording", "told")
-        return Identified(replace(card, E=12e3), (score,), ("It was told.",), "E = 12 kPa")
+        known = with_given(tree, {"material.E": 12e3})
+        return Identified(known, (score,), ("It was told.",), "E = 12 kPa")
 
     result = compare(declared(road, identify=identify, uncertainty=FINER), Options({}))
     assert given == [1]
@@ -173,13 +165,13 @@ def test_identification(road: Experiment) -> None:
     assert [s.name for s in result.identified] == ["modulus.E"]
     assert "It was told." in result.notes
     assert result.sentence.startswith("E = 12 kPa; ")
-    assert {p.path: p.default for p in result.parameters}["E"] == 12e3
+    assert {p.path: p.default for p in result.parameters}["material.E"] == 12e3
 
 
 @ROADS
 def test_bands(road: Experiment) -> None:
     banded = declared(road, uncertainty=FINER, band="sd")
-    assert of(compare(banded, Options({})), "fem").band == road.parameters.sd
+    assert of(compare(banded, Options({})), "fem").band == road.parameters.settings.sd
     bare = declared(road, uncertainty=FINER)
     assert of(compare(bare, Options({})), "fem").band == 0.0
 
@@ -199,7 +191,7 @@ def test_own_exhibits_printed_figures_and_captions(road: Experiment) -> None:
     chart = Chart("own", "Own", "t / s", "y / m", (Series("y", np.arange(2.0), np.ones(2)),))
     table = NumberTable("counts", "Runs", ("cases / 1",), ((1,),))
 
-    def tell(card: Card, cases: Cases, progress: Callable[[str], None]) -> Told:
+    def tell(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> Told:
         return Told((Exhibit("own", "Own", (), (table,), (chart,)),), {"runs": float(len(cases))})
 
     figure = Figure("runs", "told:runs", 1.0, 0.0, "1", "reproduced", "", "here")
@@ -222,11 +214,12 @@ def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -
     """The slow one is never built there; u_num is the stand-in's, and the check says so."""
     built: list[tuple[str, int]] = []
 
-    def build(recording: Recording, card: Card, model: str) -> Scene:
-        built.append((model, card.cells))
-        return road.build(recording, card, None)
+    def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None) -> Scene:
+        built.append(("slow" if changes else "fast", tree.scene.body.cells[0]))
+        return Built()(recording, tree, changes)
 
-    methods = {name: replace(road.methods["fem"], scene=name) for name in ("slow", "fast")}
+    slow = replace(road.methods["fem"], scene={"dilatation": "pointwise"})
+    methods = {"slow": slow, "fast": road.methods["fem"]}
     uncertainty = replace(FINER, stand_in={"slow": "fast"})
     experiment = declared(
         road, build=build, methods=methods, accepted=("slow",), uncertainty=uncertainty,
@@ -238,17 +231,16 @@ def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -
     name = "force@0.3mm" if road is AT_HOLDS else "node_B@all"
     own = declared(road)
     same = replace(own, twin=replace(road.twin, kind="same model"))  # type: ignore[type-var]
-    answers = [
-        of(compare(same, Options({"cells": n})), "fem").residuals[name].values for n in "369"
-    ]
-    assert check.u_num == convergence((6, 3, 2), answers, 0, 2.0).u
+    meshes = [Options({"body.cells": f"{n},{n},{n}"}) for n in "369"]
+    answers = [of(compare(same, mesh), "fem").residuals[name].values for mesh in meshes]
+    assert check.u_num == pytest.approx(convergence((6, 3, 2), answers, 0, 2.0).u, rel=1e-12)
     assert 0 < check.u_num < np.inf
 
 
 @ROADS
 def test_inputs(road: Experiment) -> None:
     """One standard uncertainty of an input, by the surrogate, is part of u_val."""
-    source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
+    source = vary("material.E", "relative 3 %", "modulus", "E")
     uncertain = replace(FINER, inputs=(source,), surrogate="fem")
     whole = tuple(replace(a, statistic="rms") for a in road.accept)
     result = compare(declared(road, uncertainty=uncertain, accept=whole), Options({}))
@@ -264,7 +256,7 @@ def test_inputs(road: Experiment) -> None:
 
 @ROADS
 def test_a_quick_run_draws_nothing(road: Experiment) -> None:
-    source = Input("modulus", lambda c, z: replace(c, E=(1 + 0.03 * z) * c.E), "E", "assumed")
+    source = vary("material.E", "relative 3 %", "modulus", "E")
     quick = Options({}, quick=True)
     uncertain = replace(FINER, inputs=(source,), surrogate="fem")
     assert compare(declared(road, uncertainty=uncertain), quick).joint == ()
@@ -299,8 +291,8 @@ def test_a_check_that_compared_nothing_carries_the_unit_of_its_quantity() -> Non
 
 
 def test_a_signal_whose_trace_no_method_has_is_a_note_and_a_failed_check() -> None:
-    def place(recording: Recording, card: Card, scene: Scene) -> Registered:
-        seen = AT_HOLDS.place(recording, card, scene)
+    def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+        seen = AT_HOLDS.place(recording, tree, scene)
         (cell,) = seen.of(SignalObservation)
         (markers,) = seen.of(MarkerObservation)
         renamed = replace(cell, trace="nowhere.force")

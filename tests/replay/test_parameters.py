@@ -7,6 +7,7 @@ import pytest
 
 from validate.errors import UsageError
 from validate.parameters import describe, doubts, quantity, with_values
+from validate.scene.material import Region
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,12 @@ def test_every_leaf_is_described_with_its_unit() -> None:
         "x.on": ("bool", "1", True),
         "x.share": ("float", "1", 0.1),
     }
+
+
+def test_a_part_that_is_absent_is_no_setting() -> None:
+    """It was stamped into a twin's recording as "null", and read again as a material."""
+    found = {p.path: p.default for p in describe(Region("core", where="box 0,0,0 to 1,1,1"))}
+    assert found == {"where": "box 0,0,0 to 1,1,1", "contrast": 1.0}
 
 
 def test_what_differs_from_the_librarys_value_was_entered() -> None:

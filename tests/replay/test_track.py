@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from tiny import (
+    DECLARED,
     DT,
     METHODS,
     PROBES,
     STEPS,
     TINY,
     A,
-    Card,
     missed,
     record,
     stiffer,
@@ -33,11 +33,13 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.experiment import Case, Experiment, Input, MeshLadder, Told, Twin, Uncertainty
+from validate.replay.experiment import Case, Experiment, MeshLadder, Told, Twin, Uncertainty, vary
 from validate.replay.followed import Cases, Truth, truth_of
 from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import CellSize, Tree
+from validate.replay.variation import change_of
 from validate.solve.newmark import Newmark
 from validate.solve.types import Stepper
 
@@ -81,7 +83,7 @@ def test_every_probe_is_scored_on_every_case(whole: Result) -> None:
 
 
 def test_scores_are_those_of_the_runs_traces_against_the_truth(whole: Result) -> None:
-    true = true_run(Card())[1]
+    true = true_run(DECLARED)[1]
     found = of(whole, "kf")
     off = found.run.traces["node_B.z"].y - true.traces["node_B.z"].y
     by_hand = {
@@ -98,8 +100,8 @@ def test_scores_are_those_of_the_runs_traces_against_the_truth(whole: Result) ->
 def test_no_method_sees_the_truth(whole: Result) -> None:
     """Another truth moves every score and not one number of a run."""
 
-    def shifted(card: Card, seen: Registered) -> Truth:
-        return Truth({name: u + 1.0 for name, u in truth(card, seen).probes.items()})
+    def shifted(tree: Tree, seen: Registered) -> Truth:
+        return Truth({name: u + 1.0 for name, u in truth(tree, seen).probes.items()})
 
     other = run(replace(TINY, twin=Twin(record, shifted, kind="same model"), cases=()))
     for name in ("fem", "kf", "slow"):
@@ -133,13 +135,13 @@ def test_a_method_gets_the_models_system_and_its_own_markers_and_no_truth() -> N
     methods = {"fem": Method("FEM", spied), "kf": Method("filter", spied, markers=A)}
     run(replace(TINY, methods=methods, sets=spy))
     assert len(placed) == len(given) == 5  # two recorded, two on 'stiff', one on 'missing'
-    for card, seen in placed:
-        assert card == Card()  # never the truth's own
+    for tree, seen in placed:
+        assert tree == DECLARED  # never the truth's own
         assert {f.name for f in fields(seen)} == {
             "observations", "selections", "rest", "outside", "findings", "time_scale",
             "timed", "sudden", "moves",
         }  # fmt: skip
-    assert all(system.scene.material.E == Card().E for system, _ in given)
+    assert all(system.scene.material.E == DECLARED.scene.material.E for system, _ in given)
     names = [looks.names if looks else None for _, looks in given]
     own = ("node_A.x", "node_A.y", "node_A.z")
     assert names == [None, own, None, own, own]
@@ -183,12 +185,12 @@ def test_a_marker_that_is_not_there_is_compared_with_nothing_and_fails() -> None
 
 
 def test_only_looks_that_saw_the_marker_are_compared() -> None:
-    card = missed(Card())
-    markers = record(card, print).marker("markers")
+    tree = missed(DECLARED)
+    markers = record(tree, print).marker("markers")
     j = markers.names.index("node_B")
     looks = int(np.isfinite(markers.x[1:, j, 0]).sum())
     assert 10 < looks < 25
-    result = run(replace(TINY, parameters=card, cases=()), "fem", "slow")
+    result = run(replace(TINY, parameters=tree, cases=()), "fem", "slow")
     assert of(result, "fem").residuals["node_B@all"].count == looks
     assert of(result, "fem").checks[0].count == looks
     # Nothing is compared before the first long step's end, and no marker outside the scene is.
@@ -201,7 +203,7 @@ def test_a_residual_is_estimate_less_measured() -> None:
     """Without noise only the modulus is left: the static part is 1/1.25 of the model's."""
     result = run(TINY, "fem", quick=True, sd="1e-12", **{"twin.stiffness": "1.25"})
     model = np.stack([of(result, "fem").run.traces[f"node_B.{c}"].y for c in "xyz"], axis=1)
-    true = true_run(stiffer(Card()))[1]
+    true = true_run(stiffer(DECLARED))[1]
     measured = np.stack([true.traces[f"node_B.{c}"].y for c in "xyz"], axis=1)
     values = of(result, "fem").residuals["node_B@all"].values
     assert values == pytest.approx(model - measured, abs=1e-9)
@@ -212,7 +214,7 @@ def test_long_steps_are_scored_at_their_own_times(whole: Result) -> None:
     found = of(whole, "slow").run
     assert found.t == pytest.approx(DT * np.arange(3, STEPS + 1, 3))
     assert found.finished
-    true = true_run(Card())[1].traces["node_A.z"].y[2::3]
+    true = true_run(DECLARED)[1].traces["node_A.z"].y[2::3]
     off = found.traces["node_A.z"].y - true
     value = scores(whole, "slow")["node_A.max"]
     assert value == pytest.approx(float(np.abs(off).max()), rel=1e-12)
@@ -241,23 +243,23 @@ def test_methods_without_a_score_alone_are_a_result_too(method: str) -> None:
 
 
 def test_a_case_is_loaded_where_it_ships_and_made_anew_where_not() -> None:
-    loaded: list[Card] = []
-    made: list[Card] = []
+    loaded: list[Tree] = []
+    made: list[Tree] = []
 
-    def loads(card: Card, folder: Path) -> tuple[Recording, ...]:
-        loaded.append(card)
+    def loads(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+        loaded.append(tree)
         assert folder == Path(__file__).parent
-        return (record(card, print),)
+        return (record(tree, print),)
 
-    def records(card: Card, progress: Callable[[str], None]) -> Recording:
-        made.append(card)
-        return record(card, progress)
+    def records(tree: Tree, progress: Callable[[str], None]) -> Recording:
+        made.append(tree)
+        return record(tree, progress)
 
     cases = (Case("a", "", stiffer, shipped=True), Case("b", "", stiffer))
     twin = Twin(records, truth, kind="same model")
     result = run(replace(TINY, load=loads, twin=twin, cases=cases), "fem")
-    assert loaded == [Card(), stiffer(Card())]
-    assert made == [stiffer(Card())]
+    assert loaded == [DECLARED, stiffer(DECLARED)]
+    assert made == [stiffer(DECLARED)]
     found = scores(result, "fem")
     assert found["node_B.rmse@a"] == found["node_B.rmse@b"] > 0
 
@@ -280,10 +282,10 @@ def test_mesh_and_inputs_enter_u_val_by_the_surrogate() -> None:
     """By hand: residuals of three runs, their differences times the declared scales."""
     declared = Uncertainty(
         mesh=MeshLadder(
-            (lambda card: replace(card, cells=2), lambda card: replace(card, cells=4)),
-            lambda card: 0.01 / card.cells,
+            tuple(change_of({"body.cells": (n,) * 3}) for n in (2, 4)),
+            CellSize(),
         ),
-        inputs=(Input("modulus", lambda c, z: replace(c, E=(1 + z / 100) * c.E), "", "assumed"),),
+        inputs=(vary("material.E", "relative 1 %", "modulus"),),
         surrogate="fem",
     )
     accept = (Accept("node_B", 1e-4, "ours", statistic="rms"),)
@@ -293,12 +295,13 @@ def test_mesh_and_inputs_enter_u_val_by_the_surrogate() -> None:
     def residual(**values: str) -> Floats:
         return of(run(TINY, "fem", quick=True, **values), "fem").residuals["node_B@all"].values
 
-    # The recording is made with the card, so its E stays and the twin's is moved against it.
-    moved = residual(E="10100", **{"twin.stiffness": repr(1 / 1.01)})
+    # The recording is made with the tree, so its E stays and the twin's is moved against it.
+    moved = residual(**{"material.E": "10100", "twin.stiffness": repr(1 / 1.01)})
     assert check.u_input == pytest.approx(rms(moved - residual()), rel=1e-6)
-    answers = [residual(cells=n) for n in "324"]
-    assert check.u_num == convergence((4, 6, 3), answers, 0, 2.0).u < np.inf
-    assert min(check.u_input, check.u_num) > 0
+    answers = [residual(**{"body.cells": f"{n},{n},{n}"}) for n in "324"]
+    u_num = convergence((4, 6, 3), answers, 0, 2.0).u
+    assert check.u_num == pytest.approx(u_num, rel=1e-12)
+    assert 0 < min(check.u_input, check.u_num) < np.inf
 
 
 def test_another_model_without_declared_uncertainty_is_refused() -> None:
@@ -306,7 +309,7 @@ def test_another_model_without_declared_uncertainty_is_refused() -> None:
         run(replace(TINY, twin=Twin(record, truth), cases=()), "fem")
 
 
-def told(card: Card, cases: Cases, progress: Callable[[str], None]) -> Told:
+def told(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> Told:
     return Told((), {"cases": float(len(cases))})
 
 
@@ -361,15 +364,15 @@ def test_maps_compare_equal_times_only() -> None:
     """Ten long steps have as many frames as ten of a truth's thirty, at other times: no map, or it
     would show a lag as an error. The exact model has no error to show."""
 
-    def few(card: Card, seen: Registered) -> Truth:
-        true, run = true_run(card, 10)
+    def few(tree: Tree, seen: Registered) -> Truth:
+        true, run = true_run(tree, 10)
         return truth_of(run, true)
 
     twin = Twin(record, few, kind="same model")
     result = run(replace(TINY, twin=twin, frames=10, cases=()), "fem", "kf", "slow")
     maps = {m.name: m for e in result.exhibits for m in e.maps}
     assert set(maps) == {"error_kf"}
-    true = true_run(Card(), 10)[1]
+    true = true_run(DECLARED, 10)[1]
     assert of(result, "slow").run.u.shape == true.u.shape
     error = np.sqrt(((of(result, "kf").run.u - true.u) ** 2).sum(axis=2).mean(axis=0))
     assert maps["error_kf"].values == pytest.approx(1e3 * error, rel=1e-12)

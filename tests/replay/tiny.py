@@ -21,7 +21,9 @@ from validate.replay.experiment import Case, Experiment, Twin
 from validate.replay.followed import Truth, truth_of
 from validate.replay.method import Method
 from validate.replay.remade import stamped
-from validate.scene.box import box
+from validate.replay.tree import Built, Tree
+from validate.replay.variation import change_of
+from validate.scene.geometry import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
 from validate.solve.fluid import NoFluid
@@ -36,50 +38,54 @@ FIDUCIALS = {"f1": (0.0, 0.0, 0.0), "f2": (SIDE, 0.0, 0.0), "f3": (0.0, SIDE, 0.
 
 
 @dataclass(frozen=True)
-class TwinCard:
+class TinyTwin:
     stiffness: float = quantity(1.0, "1", "its modulus over the models'")
     missing: float = quantity(0.0, "1", "share of looks without a marker")
 
 
 @dataclass(frozen=True)
-class Card:
-    E: float = quantity(10e3, "Pa", "modulus of the models")
-    cells: int = quantity(3, "1", "boxes along an edge")
+class TinySettings:
     sd: float = quantity(1e-5, "m", "noise")
-    twin: TwinCard = field(default_factory=TwinCard)
+    twin: TinyTwin = field(default_factory=TinyTwin)
 
 
-def scene(E: float, cells: int = 3) -> Scene:
-    return Scene(
-        box((SIDE, SIDE, SIDE), (cells,) * 3),
-        Material(E, 0.3, "linear", 1000.0, 0.0, 0.05),
-        (Support("z0", (0, 1, 2)),),
-        loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
-        probes=tuple(Probe(name, at) for name, at in PROBES.items()),
-    )
+SCENE = Scene(
+    Box((SIDE, SIDE, SIDE), (3, 3, 3)),
+    Material(10e3, 0.3, "linear", 1000.0, stiffness_damping=0.05),
+    (Support("z0"),),
+    loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
+    probes=tuple(Probe(name, at) for name, at in PROBES.items()),
+)
+DECLARED = Tree(scene=SCENE, settings=TinySettings())
 
 
-def true_run(card: Card, frames: int = 200) -> tuple[Scene, Any]:
-    true = scene(card.twin.stiffness * card.E)
+def true_scene(tree: Tree) -> Scene:
+    """That of the twin, on its own mesh whatever the models'."""
+    changes = {"material.E": f"x {tree.settings.twin.stiffness!r}", "body.cells": (3, 3, 3)}
+    return Built()(None, tree, changes)
+
+
+def true_run(tree: Tree, frames: int = 200) -> tuple[Scene, Any]:
+    true = true_scene(tree)
     t = DT * np.arange(1, STEPS + 1)
     force = 0.05 * np.minimum(t / 0.02, 1.0)[:, None]
     stepper = Newmark(DT).prepare(build(true))
     return true, march("twin", stepper, t, force, output_frames(STEPS, frames), 0.0)
 
 
-def record(card: Card, progress: Callable[[str], None]) -> Recording:
-    true, run = true_run(card)
+def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
+    true, run = true_run(tree)
     return record_tracked(
         Origin("tiny", 3, True),
         points_of(run, true),
         {k: np.array(v) for k, v in FIDUCIALS.items()},
-        Camera(card.sd, 1, card.twin.missing, still=10_000),
+        Camera(tree.settings.sd, 1, tree.settings.twin.missing, still=10_000),
         {"pull": Reading(run.traces["pull.force"].y, "N")},
     )
 
 
-def truth(card: Card, seen: Registered) -> Truth:
-    true, run = true_run(card)
+def truth(tree: Tree, seen: Registered) -> Truth:
+    true, run = true_run(tree)
     return truth_of(run, true)
 
 
@@ -125,7 +131,7 @@ class Breaks:
         return Breaking(inner.prepare(system), self.at, (ending, "told so"))
 
 
-def sets(card: Card, seen: Registered) -> dict[str, Any]:
+def sets(tree: Tree, seen: Registered) -> dict[str, Any]:
     return {"dt": DT}
 
 
@@ -140,25 +146,20 @@ METHODS = {
 }
 
 
-def stiffer(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, stiffness=1.25))
-
-
-def missed(card: Card) -> Card:
-    return replace(card, twin=replace(card.twin, missing=0.4))
-
+stiffer = change_of({"twin.stiffness": 1.25})
+missed = change_of({"twin.missing": 0.4})
 
 TINY = Experiment(
     name="tiny",
     title="tiny",
     source="this test",
-    parameters=Card(),
+    scene=SCENE,
+    settings=TinySettings(),
     methods=METHODS,
     accepted=("fem",),
     accept=(Accept("node_B", 1e-4, "ours"),),
-    load=lambda card, folder: (stamped(record(card, print), card),),
-    build=lambda recording, card, model: scene(card.E, card.cells),
-    place=lambda recording, card, its: follow_signal(recording, its.mesh, "pull", "N"),
+    load=lambda tree, folder: (stamped(record(tree, print), tree),),
+    place=lambda recording, tree, its: follow_signal(recording, its.mesh, "pull", "N"),
     sets=sets,
     axis="z",
     reference="fem",
@@ -177,40 +178,38 @@ TINY = Experiment(
 LOADS = (1e-4, 2e-4, 3e-4)  # m
 
 
-def moved_scene(E: float, cells: int = 3) -> Scene:
-    """The block with its top moved upward."""
-    drive = Drive("stage", "z1", (0.0, 0.0, 1.0))
-    return replace(scene(E, cells), loads=(), drives=(drive,))
+#: The block with its top moved upward.
+MOVED = replace(SCENE, loads=(), drives=(Drive("stage", "z1", (0.0, 0.0, 1.0)),))
 
 
-def moved_run(card: Card) -> tuple[Scene, Any]:
-    true = moved_scene(card.twin.stiffness * card.E)
+def moved_run(tree: Tree) -> tuple[Scene, Any]:
+    true = true_scene(tree)
     y = np.linspace(0, LOADS[-1], STEPS + 1)[1:, None]
     t = np.arange(1.0, STEPS + 1)
     stepper = NoFluid().prepare(build(true))
     return true, march("twin", stepper, t, y, output_frames(STEPS, 2), 0.0)
 
 
-def record_moved(card: Card, progress: Callable[[str], None]) -> Recording:
-    true, run = moved_run(card)
+def record_moved(tree: Tree, progress: Callable[[str], None]) -> Recording:
+    true, run = moved_run(tree)
     stage = np.linspace(0, LOADS[-1], STEPS + 1)[1:]
     readings = {
         "stage": Reading(stage, "m"),
         "cell": Reading(run.traces["stage.force"].y, "N", 1e-4),
     }
     at = {k: np.array(v) for k, v in FIDUCIALS.items()}
-    camera = Camera(card.sd, 1, card.twin.missing, still=10_000)
+    camera = Camera(tree.settings.sd, 1, tree.settings.twin.missing, still=10_000)
     return record_tracked(Origin("moved", 3, True), points_of(run, true), at, camera, readings)
 
 
-def moved_truth(card: Card, seen: Registered) -> Truth:
+def moved_truth(tree: Tree, seen: Registered) -> Truth:
     """The twin's motion at the recorded samples, rest first."""
-    true, run = moved_run(card)
+    true, run = moved_run(tree)
     probes = truth_of(run, true).probes
     return Truth({name: np.vstack([np.zeros((1, 3)), u]) for name, u in probes.items()})
 
 
-def place_moved(recording: Recording, card: Card, its: Scene) -> Registered:
+def place_moved(recording: Recording, tree: Tree, its: Scene) -> Registered:
     stage = driving(recording, "stage", "m")
     cell = validating(recording, "cell", "N", quantity="force", trace="stage.force")
     markers = placed_markers(recording, its.mesh)
@@ -220,12 +219,12 @@ def place_moved(recording: Recording, card: Card, its: Scene) -> Registered:
 
 AT_HOLDS = replace(
     TINY,
+    parameters=Tree(scene=MOVED, settings=TinySettings()),
     methods={"fem": Method("FEM", NoFluid())},
     accept=(Accept("node_B", 1e-4, "ours"), Accept("force", 0.1, "ours")),
-    load=lambda card, folder: (stamped(record_moved(card, print), card),),
-    build=lambda recording, card, model: moved_scene(card.E, card.cells),
+    load=lambda tree, folder: (stamped(record_moved(tree, print), tree),),
     place=place_moved,
-    sets=lambda card, seen: {},
+    sets=lambda tree, seen: {},
     cases=(Case("stiff", "25 % stiffer", stiffer),),
     twin=Twin(record_moved, moved_truth, kind="same model"),
 )

@@ -40,25 +40,27 @@ HERE = Where(0)
 TINY = (ROOT / "tests" / "replay" / "tiny.py").read_text("utf-8")
 # The block at three holds: one force each, its sensor's noise .1 mN, E perhaps uncertain.
 OWN = """
-from validate.replay.experiment import Input, Uncertainty
-
-def stiffened(card, z):
-    return replace(card, E=card.E * (1 + {range} * z))
+from validate.replay.experiment import Uncertainty, vary
 
 EXPERIMENT = replace(
     AT_HOLDS, name="{name}", accept=(Accept("{quantity}", {limit}, "ours"),),
     uncertainty={uncertainty}, path=None)
 """
-INPUTS = 'Uncertainty(inputs=(Input("modulus", stiffened, "E", "assumed"),), surrogate="fem")'
+REGION = """
+from validate.scene.material import Region
+
+WHOLE = Region("all", where="box 0,0,0 to 10mm,10mm,10mm", contrast=1.0)
+AT_HOLDS = replace(AT_HOLDS, parameters=AT_HOLDS.parameters.with_scene(regions=(WHOLE,)))
+"""
+INPUTS = """Uncertainty(
+    inputs=(vary("material.E", "relative {range}", "modulus"),), surrogate="fem")"""
 
 
 def written(name: str, quantity: str = "force", uncertain: float = 0.0) -> Experiment:
     path = Path(mkdtemp()) / f"{name}.py"
-    declared = INPUTS if uncertain else "None"
+    declared = INPUTS.format(range=uncertain) if uncertain else "None"
     limit = 5e-3 if quantity == "force" else 5e-5
-    own = OWN.format(
-        name=name, quantity=quantity, limit=limit, range=uncertain, uncertainty=declared
-    )
+    own = OWN.format(name=name, quantity=quantity, limit=limit, uncertainty=declared)
     path.write_text(TINY + own, encoding="utf-8")
     return load_file(path)
 
@@ -134,12 +136,13 @@ def test_an_input_alone_never_leaves_its_uniform_range() -> None:
 @pytest.mark.slow
 def test_a_wrong_modulus_is_noticed_the_more_the_wronger() -> None:
     found = studied()
-    every = [p for p in found.power if p.path == "E" and p.name is None]
+    every = [p for p in found.power if p.path == "material.E" and p.name is None]
     shares = [p.share.value for p in every if p.share]
     assert [p.by for p in every] == [0.05, 0.1, 0.2]
     assert shares == [1.0, 1.0, 1.0]  # .1 mN in a force of 30 mN
     blunt = studied(uncertain=0.2)
-    weak = [p.share.value for p in blunt.power if p.share and p.name is None and p.path == "E"]
+    own = [p for p in blunt.power if p.name is None and p.path == "material.E"]
+    weak = [p.share.value for p in own if p.share]
     assert weak[0] < 0.1
     assert weak == sorted(weak)
 
@@ -267,12 +270,12 @@ def test_no_rival_is_opened() -> None:
 
 def test_worlds_are_parameters() -> None:
     own = written("drawn", uncertain=0.1)
-    assert [p.path for p in wrong_paths(own.parameters)] == ["E", "sd"]
-    wrong = in_world(own, own.parameters, World(wrong=("E", 0.2)))
-    assert pytest.approx(1.2 * own.parameters.E) == wrong.E
+    assert [p.path for p in wrong_paths(own.parameters)] == ["material.E", "sd"]
+    wrong = in_world(own, own.parameters, World(wrong=("material.E", 0.2)))
+    assert pytest.approx(1.2 * own.parameters.scene.material.E) == wrong.scene.material.E
     assert (
-        pytest.approx(0.9 * own.parameters.E)
-        == in_world(own, own.parameters, World((("modulus", -1.0),))).E
+        pytest.approx(0.9 * own.parameters.scene.material.E)
+        == in_world(own, own.parameters, World((("modulus", -1.0),))).scene.material.E
     )
 
 
@@ -335,9 +338,12 @@ def test_the_command_writes_a_page_with_tables_and_curves(
 
 @pytest.mark.slow
 def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Path) -> None:
-    text = OWN.format(name="steep", quantity="force", limit=5e-3, range=0.7, uncertainty=INPUTS)
+    """The modulus of a region that is all of the block has no sign of its own before it is meshed;
+    beyond -1/.7 u it is negative."""
+    uncertainty = INPUTS.format(range=0.7).replace("material.E", "regions.all.contrast")
+    text = OWN.format(name="steep", quantity="force", limit=5e-3, uncertainty=uncertainty)
     path = tmp_path / "steep.py"
-    path.write_text(TINY + text, encoding="utf-8")  # beyond -1/.7 u there is no modulus
+    path.write_text(TINY + REGION + text, encoding="utf-8")
     found = coverage(load_file(path), draws=20, out=tmp_path, where=HERE)
     (note,) = found.notes
     assert "drawn truths have no solution" in note

@@ -121,7 +121,8 @@ def wrong_paths(parameters: Any) -> Iterator[Parameter]:
         friction = "friction" in p.path.rpartition(".")[2] or p.unit in _FRICTIONS
         if p.path.startswith(_OTHERS) or not (friction or p.unit in _MODULI + _LENGTHS):
             continue
-        if isinstance(p.default, float) and p.default > 0:
+        per_metre = p.path == "thickness" and p.default == 1.0  # or of a 3-D body
+        if isinstance(p.default, float) and p.default > 0 and not per_metre:
             yield p
 
 
