@@ -1,6 +1,6 @@
 """A material point walks the whole road: a stress-stretch record, no mesh, a report."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -10,14 +10,14 @@ import pytest
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.errors import SceneError
-from validate.parameters import quantity
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
-from validate.replay.experiment import Experiment, Input, Uncertainty
+from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import compare
+from validate.replay.tree import Tree
 from validate.report.write import write_report
 from validate.scene.material import Material
 from validate.scene.material_point import MaterialPoint
@@ -30,9 +30,7 @@ MU, NU = 30e3, 0.4999
 STRETCH = np.linspace(1.0, 2.0, 41)
 
 
-@dataclass(frozen=True)
-class Rubber:
-    mu: float = quantity(MU, "Pa", "shear modulus")
+SCENE = MaterialPoint(Material(2 * MU * (1 + NU), NU, "neo_hooke"), "uniaxial")
 
 
 def recorded() -> Recording:
@@ -47,32 +45,32 @@ def recorded() -> Recording:
     return Recording("rubber", Source("x", "", 0, "x"), 0, signals=MappingProxyType(signals))
 
 
-def build(recording: Recording, card: Rubber, model: None) -> MaterialPoint:
-    return MaterialPoint(Material(2 * card.mu * (1 + NU), NU, "neo_hooke"), "uniaxial")
-
-
-def place(recording: Recording, card: Rubber, scene: object) -> Registered:
+def place(recording: Recording, tree: Tree, scene: object) -> Registered:
     stress = validating(recording, "stress", "Pa", quantity="stress", trace="nominal_stress")
     return Registered((driving(recording, "stretch", "1"), stress))
 
 
 POINT = Experiment(
-    "rubber", "a strip pulled", "this test", Rubber(), {"neo": Method("neo-Hooke", StretchTest())},
-    ("neo",), (Accept("stress", 5e3, "a tenth of the largest stress"),),
-    lambda card, folder: (recorded(),), build, place,
-    uncertainty=Uncertainty(
-        inputs=(Input("mu", lambda c, z: replace(c, mu=c.mu * (1 + z / 100)), "", "assumed"),),
-        surrogate="neo",
-    ),
+    name="rubber",
+    title="a strip pulled",
+    source="this test",
+    scene=SCENE,
+    methods={"neo": Method("neo-Hooke", StretchTest())},
+    accepted=("neo",),
+    accept=(Accept("stress", 5e3, "a tenth of the largest stress"),),
+    load=lambda tree, folder: (recorded(),),
+    place=place,
+    variations=(vary("material.E", "relative 1 %"),),
+    uncertainty=Uncertainty(surrogate="neo"),
     path=Path(__file__),
-)  # fmt: skip
+)
 
 
 def test_stress_against_stretch_is_predicted_without_a_mesh(tmp_path: Path) -> None:
     result = compare(POINT, Options({}))
     (check,) = result.checks
     assert (check.unit, check.count, check.verdict) == ("Pa", len(STRETCH), "good enough")
-    wrong = compare(POINT, Options({"mu": "33e3"}))
+    wrong = compare(POINT, Options({"material.E": repr(2 * 33e3 * (1 + NU))}))
     assert wrong.checks[0].validation == "differs"
     page = write_report(result, tmp_path / "rubber", created="2026-01-01T00:00:00+00:00")
     assert "stress" in page.read_text("utf-8")
@@ -111,8 +109,8 @@ def test_every_law_walks_the_road(law: str) -> None:
     recording = held(curve, np.arange(len(STRETCH), dtype=float), STRETCH)
     made = replace(
         POINT,
-        load=lambda card, folder: (recording,),
-        build=lambda recording, card, model: MaterialPoint(material, "uniaxial"),
+        load=lambda tree, folder: (recording,),
+        parameters=Tree(scene=MaterialPoint(material, "uniaxial")),
     )
     (check,) = compare(made, Options({})).checks
     assert (check.count, check.verdict) == (len(STRETCH), "good enough")
@@ -129,8 +127,8 @@ def test_a_stretch_that_is_held_relaxes_on_the_road() -> None:
         material = Material(2 * MU * (1 + NU), NU, "neo_hooke", prony=prony)
         experiment = replace(
             POINT,
-            load=lambda card, folder: (recording,),
-            build=lambda recording, card, model: MaterialPoint(material, "uniaxial"),
+            load=lambda tree, folder: (recording,),
+            parameters=Tree(scene=MaterialPoint(material, "uniaxial")),
         )
         return compare(experiment, Options({})).checks[0].verdict
 
@@ -150,17 +148,17 @@ def test_every_recording_of_one_material_has_its_own_mode() -> None:
     curves = {mode: MU * (STRETCH - STRETCH**power) for mode, power in powers.items()}
     recordings = tuple(replace(held(y, t, STRETCH), name=mode) for mode, y in curves.items())
 
-    def mode_of(recording: Recording, card: Rubber, model: None) -> MaterialPoint:
-        return MaterialPoint(Material(2 * card.mu * (1 + NU), NU, "neo_hooke"), recording.name)  # type: ignore[arg-type]
+    def mode_of(recording: Recording, tree: Tree, changes: None) -> MaterialPoint:
+        return replace(tree.scene, mode=recording.name)
 
-    def by_mode(recording: Recording, card: Rubber, scene: MaterialPoint) -> Registered:
+    def by_mode(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
         assert scene.mode == recording.name
         stress = validating(recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress")
         return Registered((driving(recording, "stretch", "1"), stress))
 
     accept = tuple(Accept(mode, 9e3, "a tenth of the stress") for mode in powers)
     both = replace(
-        POINT, load=lambda card, folder: recordings, build=mode_of, place=by_mode, accept=accept
+        POINT, load=lambda tree, folder: recordings, build=mode_of, place=by_mode, accept=accept
     )
     checks = compare(both, Options({})).checks
     assert [(c.name, c.verdict) for c in checks] == [
