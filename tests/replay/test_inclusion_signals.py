@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from validate.errors import RecordingError, RegistrationError, ValidateError
+from validate.errors import RecordingError, RegistrationError, UsageError, ValidateError
+from validate.parameters import with_given
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
+from validate.replay.declaration import from_json, holds_code, to_json
 from validate.replay.experiment import Experiment
 from validate.replay.inclusion import InclusionTest, Streams, inclusion_test
 from validate.replay.inclusion_body import BlockWithInclusion
@@ -49,6 +51,29 @@ def recorded(project_root: Path) -> Recording:
 def test_forces_and_pressures_are_observed_beside_outlines_and_markers(recorded: Recording) -> None:
     everything = ("stage", "outline", "markers", "pressure", "load_cell")
     assert placed(recorded, "pressure", "load_cell") == everything
+
+
+def test_a_body_is_meshed_from_a_recorded_sweep(recorded: Recording) -> None:
+    mine = declared()
+    swept = with_given(mine.parameters, {"body.inclusion.shape": "sweep"})
+    scene = mine.build(recorded, swept, {"body.element": "linear"})
+    (said,) = mine.place(recorded, swept, scene).findings
+    assert "The inclusion is meshed from 14 slices of a sweep" in said
+
+
+def test_its_json_is_all_of_it(tmp_path: Path) -> None:
+    """Sizes stay open, and what the library adds is no part of it."""
+    mine = declared("pressure")
+    opened = with_given(mine.parameters, {"body.x": None})
+    text = to_json(replace(mine, parameters=opened))
+    assert not holds_code(text)
+    found = from_json(text, tmp_path / "mine.json")
+    assert found.complete
+    assert found.parameters == opened
+    assert dict(found.methods) == dict(mine.methods)
+    assert to_json(found) == text
+    with pytest.raises(UsageError, match=r"body\.x is not set; give it with --set body\.x=VALUE"):
+        opened.scene.body.block.sizes.prod()
 
 
 def turned(s: Signal) -> Signal:

@@ -308,8 +308,8 @@ class Experiment:
 
     Declared, it has a `scene`, whose numbers are its parameters by path; `settings` is a dataclass
     of what no scene holds, `recording` the file from the experiment's folder. A method's `scene` is
-    then its changes by path: {"body.cells": (9, 9, 24)}. The kinds that `validate new` writes, and
-    tests, still have `parameters` of a dataclass of their own, and `build`.
+    then its changes by path: {"body.cells": (9, 9, 24)}. Kinds of
+    `validate new` in the older form have `parameters` of a dataclass of their own, and `build`.
 
     `methods` maps a name to a `Method`. `load` gets the parameters and the experiment's folder;
     `build` a recording, the parameters and a method's `scene` options; `place` registers a
