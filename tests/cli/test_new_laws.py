@@ -13,13 +13,14 @@ from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.declaration import from_json, to_json
 from validate.replay.find import load_file
+from validate.replay.tree import Tree
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.material import LawName
 
 PLATES = """
 experiment = "plates"
 test = "compression"
-specimen = {diameter = "30mm", height = "20mm"}
+body = {diameter = "30mm", height = "20mm"}
 accept = {force = "0.1N"}
 why = {force = "felt"}
 """
@@ -77,8 +78,10 @@ def test_a_law_is_chosen_with_its_coefficients(folder: Path, kind: str, law: str
     written = (folder / "experiments" / "mine.py").read_text("utf-8")
     assert len(written.splitlines()) <= 60
     mine = load_file(folder / "experiments" / "mine.py")
-    assert mine.methods[mine.accepted[0]].scene.law == law
-    used = mine.parameters.material.coefficients
+    declared = isinstance(mine.parameters, Tree)
+    has_law = mine.parameters.scene.material if declared else mine.methods[mine.accepted[0]].scene
+    assert has_law.law == law
+    used = (has_law if declared else mine.parameters.material).coefficients
     for name in names:
         assert getattr(used, name) != getattr(Coefficients(), name)
     if names:
@@ -99,7 +102,7 @@ def test_plates_run_in_every_law_at_large_strain(folder: Path, law: str) -> None
     (folder / "a.toml").write_text(f'law = "{law}"\n{given}{PLATES}', "utf-8")
     assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
     mine = load_file(folder / "experiments" / "mine.py")
-    coarse = {"mesh.radial": "1", "mesh.axial": "1"}
+    coarse = {"body.cells": "1,1"}
     (found,) = compare(mine, coarse, methods=("slip",), quick=True).methods
     scores = {s.name: s.value for s in found.scores}
     assert np.isfinite(list(scores.values())).all()

@@ -10,7 +10,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from machine_logs import machine_log, on_a_body
+from machine_logs import machine_log, on_a_body, pressed_cylinder
 from scipy.optimize import brentq
 
 from validate.arrays import Floats
@@ -19,14 +19,8 @@ from validate.compare.verdict import Accept
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.replay import compare
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import (
-    Compression,
-    CompressionRanges,
-    CylinderGrid,
-    Gel,
-    Specimen,
-)
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression, CompressionRanges
 from validate.replay.experiment import Experiment
 from validate.replay.fitted_moduli import Moves, sentence
 from validate.replay.measured_body import solid
@@ -38,13 +32,17 @@ from validate.replay.measured_cards import (
     Solid,
     Tissue,
 )
+from validate.replay.method import Method
 from validate.report.store import document, schema
+from validate.solve.fluid import NoFluid
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 
 DIAMETER, HEIGHT, E, NU = 0.03, 0.02, 25e3, 0.45
 AREA = np.pi * DIAMETER**2 / 4
 LAWS = {
-    "linear": pressed("linear", order=1),
-    "neo": pressed("neo-Hooke", "slip", "neo_hooke", 1),
+    "linear": Method("linear", NoFluid()),
+    "neo": Method("neo-Hooke", Tabulated(StaticNewton("none")), {"material.law": "neo_hooke"}),
 }
 
 
@@ -82,10 +80,10 @@ def log(noise: float, *, large: bool, seed: int = 0) -> Recording:
 
 def experiment(folder: Path, seen: Recording, **ranges: float) -> Experiment:
     write_recording(seen, folder / "log.mcap")
-    parameters = Compression(
-        "log.mcap", specimen=Specimen(DIAMETER, HEIGHT), material=Gel(nu=NU),
-        mesh=CylinderGrid(2, 2), ranges=CompressionRanges(**ranges),
-    )  # fmt: skip
+    settings = Compression(ranges=CompressionRanges(**ranges))
+    parameters = pressed_cylinder(
+        DIAMETER, HEIGHT, nu=NU, cells=(2, 2), element="tet4", settings=settings
+    )
     made = compression(
         "gel", "gel", "x", parameters, LAWS, ("linear", "neo"), (Accept("force", 0.1, "test"),)
     )

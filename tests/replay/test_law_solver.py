@@ -5,14 +5,21 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import UsageError
-from validate.replay.compression import pressed
 from validate.replay.experiment import Experiment
 from validate.replay.law_solver import laws_of, with_laws
+from validate.replay.measured_body import solid
+from validate.replay.method import Method
 from validate.replay.options import Options, all_methods
+from validate.scene.material import LawName
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
 from validate.solve.tabulated import Tabulated
+
+
+def pressed(label: str, law: LawName = "linear") -> Method:
+    settings = NoFluid() if law == "linear" else Tabulated(StaticNewton("none"))
+    return replace(solid(label, law), settings=settings)
 
 
 def test_a_static_method_takes_the_solver_of_its_law() -> None:

@@ -9,11 +9,9 @@ from validate.errors import UsageError
 from validate.parameters import quantity
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
-from validate.replay.experiment import Change
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.plates import plates_of_share, rubbing_share
-from validate.scene.similar_grids import member
 from validate.twin.tracked import Camera, require_noise
 
 
@@ -60,18 +58,6 @@ def rubbed(p: Any, z: float) -> Any:
     share = abs(rubbing_share(p.plates, p.friction, E, apart) + z * p.ranges.friction)
     plates, friction = plates_of_share(min(share, 2 - share), E, apart)
     return replace(p, plates=plates, friction=friction)
-
-
-def scaled(share: float | None, *counts: str) -> Change:
-    """The similar mesh with about `share` of the cells along every edge (none: its own `finer`), in
-    the fields `counts`."""
-
-    def change(p: Any) -> Any:
-        by = p.mesh.finer if share is None else share
-        cells = member([getattr(p.mesh, k) for k in counts], by)
-        return replace(p, mesh=replace(p.mesh, **dict(zip(counts, cells, strict=True))))
-
-    return change
 
 
 def require_used(given: Coefficients, laws: set[LawName]) -> None:

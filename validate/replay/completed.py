@@ -26,7 +26,7 @@ def kinds() -> Mapping[type, Callable[..., Experiment]]:
 
     return MappingProxyType({
         MeasuredBody: measured_body,
-        Compression: _without_folder(compression),
+        Compression: compression,
         InclusionTest: _without_folder(inclusion_test),
     })  # fmt: skip
 

@@ -416,7 +416,7 @@ class Experiment:
     def _find_from(self, folder: Path) -> None:
         """Mesh files of a declared body are found from the experiment's folder."""
         if isinstance(self.build, Built):
-            object.__setattr__(self, "build", Built(folder))
+            object.__setattr__(self, "build", replace(self.build, folder=folder))
         declared = self.uncertainty
         if declared and declared.mesh and isinstance(declared.mesh.size, CellSize):
             mesh = replace(declared.mesh, size=CellSize(folder))

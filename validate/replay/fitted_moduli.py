@@ -17,6 +17,7 @@ from validate.compare.convergence import convergence
 from validate.errors import ComparisonError, SceneError
 from validate.identify.budget import IdentifiedValue
 from validate.identify.residual_pattern import MATERIAL, Pattern
+from validate.parameters import has_path, value_at, with_given
 from validate.replay.experiment import Input, MeshLadder
 from validate.report.numbers import with_unit
 
@@ -54,8 +55,9 @@ def toe_in(entries: tuple[Entry, ...], name: str) -> float | None:
 
 def moving(p: Any, moves: Moves, z: float) -> Any:
     """Parameters with the moduli of every model moved."""
-    entries = moves.of(p.material.by_method, z)
-    return replace(p, material=replace(p.material, by_method=entries))
+    path = "by_method" if has_path(p, "by_method") else "material.by_method"
+    entries = moves.of(value_at(p, path)[0], z)
+    return with_given(p, {path: entries})
 
 
 def with_move(
