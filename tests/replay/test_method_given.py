@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from machine_logs import pressed_cylinder
+from machine_logs import machine_log, pressed_cylinder
 
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
@@ -74,6 +74,18 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
     assert made.identify((), card, methods).parameters == card
     with pytest.raises(UsageError, match=r"material.C01 = 500.0: no method .* only linear; set"):
         made.identify((), card, {"slip": methods["slip"]})
+
+
+def test_one_model_of_two_materials_has_no_modulus_of_its_own() -> None:
+    card = pressed_cylinder(0.03, 0.02)
+    stiff = {"material.nu": 0.4}
+    methods = {"slip": Method("slip", NoFluid()), "other": Method("other", NoFluid(), stiff)}
+    made = compression("c", "", "", card, methods, ("slip",), (Accept("force", 1.0, ""),))
+    t = np.linspace(0.0, 10.0, 101)
+    seen = machine_log(t, 2e-4 * t, t)
+    assert made.identify is not None
+    with pytest.raises(UsageError, match=r"other: another material .* set methods\.other"):
+        made.identify((seen,), card, methods)
 
 
 def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> None:

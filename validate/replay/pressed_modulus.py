@@ -119,8 +119,11 @@ def identify_pressed(
     found: dict[str, _Fitting] = {}
     for name in wanted:
         one = _Fitting(recording, tree, methods[name], name, build, log)
-        if one.model not in {f.model for f in found.values()}:
+        same = next((f for f in found.values() if f.model == one.model), None)
+        if same is None:
             found[name] = one
+        else:
+            _require_alike(one, same)
     entries = tuple((f.model, f.E, f.toe) for f in found.values())
     bonded = next((f.E for f in found.values() if f.ends == "bonded"), None)
     fitted = replace(
@@ -136,6 +139,16 @@ def identify_pressed(
         fitted, (), tuple(notes), calibrated=("force@fit",), values=values,
         inputs=_inputs(budgets, declared), mesh=_ladder(ladder, budgets),
     )  # fmt: skip
+
+
+def _require_alike(one: "_Fitting", same: "_Fitting") -> None:
+    """Raises `UsageError` for methods of one model whose materials differ: it has one modulus."""
+    a, b = (f.changed.scene.material for f in (one, same))
+    if a != b:
+        raise UsageError(
+            f"methods.{one.name}: another material than {same.name}, of the same model "
+            f"({one.model}), whose modulus is identified; set methods.{one.name}.material.E"
+        )
 
 
 def _has_modulus(method: Method) -> bool:
@@ -170,7 +183,7 @@ class _Fitting:
         self.p: Compression = tree.settings
         self.method, self.build, self.log = method, build, log
         self.size = pressed_size(tree, build.folder)
-        changed = changed_by(tree, method.scene or {})
+        self.changed = changed = changed_by(tree, method.scene or {})
         self.model, self.law = build.model(changed), changed.scene.material.law
         self.ends = ends_of(changed.scene)
         self.linear = self.law == "linear"
