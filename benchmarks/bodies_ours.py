@@ -8,6 +8,7 @@ import numpy as np
 from bodies_drawn import Drawn, E
 
 from validate.arrays import rms
+from validate.cli.new_scene import geometry_of
 from validate.compare.convergence import GridConvergence
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.register.declared import as_declared
@@ -16,9 +17,12 @@ from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Experiment, Variant
 from validate.replay.measured_body import measured_body, solid
-from validate.replay.measured_cards import HeldAt, MeasuredBody, MovedBy, SeenOf, Solid, Tissue
+from validate.replay.measured_cards import MeasuredBody, SeenOf
 from validate.replay.refined import Refined
 from validate.replay.runs import Road
+from validate.replay.tree import Tree
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Load, Scene, Support
 
 _T = np.array([0.0, 1.0])
 _TOGETHER = (Together("marker", (0, 1, 2), "displacement of the markers"),)
@@ -42,33 +46,44 @@ class Judged:
         return 2 * self.found.u / self.error
 
 
-def parameters(body: Drawn) -> MeasuredBody:
+def parameters(body: Drawn) -> Tree:
     """The body as a user would declare it."""
     low, high = (f"{'xyz'[body.axis]}{end}" for end in ("min", "max"))
-    slides = body.support == "slipping"
-    if body.kind == "cylinder":
-        shape = Solid(cylinder=(body.size[0], body.size[2]), cells=body.cells)
-    else:
-        shape = Solid(block=body.size, cells=body.cells)
-    along = f"+{'xyz'[body.along]}"
-    return MeasuredBody(
-        "", shape, Tissue(E, body.nu), HeldAt(slides=low) if slides else HeldAt(all=low),
-        MovedBy("load", high, along), SeenOf(force="force" if body.moves else None),
+    round_, slides = body.kind == "cylinder", body.support == "slipping"
+    sides = (body.size[0], body.size[2]) if round_ else body.size
+    shape = "cylinder" if round_ else "block"
+    answers = {"body.shape": shape, f"body.{shape}": ",".join(map(str, sides))}
+    answers |= {"held.slides": low} if slides else {}
+    axis = np.eye(3)[body.along]
+    along, place = tuple(axis.tolist()), f"{high}"
+    across = tuple(int(c) for c in np.flatnonzero(axis == 0))
+    held = Support(low, (body.axis,), rests=True) if slides else Support(low)
+    parts: dict[str, Any] = {"loads": (Load("load", place, along),)}
+    if body.moves:
+        parts = {"drives": (Drive("load", place, along),)}
+    return Tree(
+        "",
+        Scene(
+            geometry_of(answers, body.cells, 2), Material(E, body.nu),
+            (held, *((Support(place, across),) if body.moves else ())),
+            dilatation="by_element", **parts,
+        ),
+        MeasuredBody(SeenOf(force="force" if body.moves else None)),
     )  # fmt: skip
 
 
 def experiment(body: Drawn, truth: list[float]) -> Experiment:
     """One load step, compared with the converged answer in place of a measurement."""
     p = parameters(body)
-    method = solid("quadratic cells", body.law, 2)
+    method = solid("quadratic cells", body.law)
     made = measured_body("body", "body", "drawn", p, {"solid": method}, ("solid",), (), Path())
 
-    def place(recording: Recording, p: MeasuredBody, scene: Any) -> Registered:
+    def place(recording: Recording, p: Tree, scene: Any) -> Registered:
         load = recording.signals["load"]
         drive = SignalObservation("load", "drives", _T[1:], load.y[1:], load.unit, 0.0)
         if body.moves:
             force = SignalObservation("force", "validates", _T[1:], np.array([truth]), "N", 0.0,
-                                      "force", "moved.force")  # fmt: skip
+                                      "force", "load.force")  # fmt: skip
             return Registered((drive, force))
         rest = np.array(body.markers)
         names = tuple(f"m{i}" for i in range(len(rest)))

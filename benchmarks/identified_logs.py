@@ -35,17 +35,19 @@ from validate.identify.scaled_curve import UnitCurve, fit_scaled
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay import compare
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import (
-    Compression,
-    CompressionRanges,
-    CylinderGrid,
-    Gel,
-    Specimen,
-)
+from validate.replay.compression import compression
+from validate.replay.compression_cards import BONDED_PLATES, Compression, CompressionRanges
 from validate.replay.experiment import Experiment
+from validate.replay.method import Method
 from validate.replay.options import Options
 from validate.replay.road import set_out
+from validate.replay.tree import Tree
+from validate.scene.geometry import Cylinder
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.solve.fluid import NoFluid
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 
 Case = Literal["linear slip", "neo_hooke slip", "linear bonded"]
 CASES: tuple[Case, ...] = ("linear slip", "neo_hooke slip", "linear bonded")
@@ -121,7 +123,7 @@ class Truth:
 
     case: Case
     E: float
-    told: Compression
+    told: Tree
     recording: Recording
 
 
@@ -153,11 +155,18 @@ def log(seed: int) -> Truth:
     force = cell * E * np.pi * D**2 / 4 * curve * (1 + held * (factor - 1))
     noise = rng.uniform(0.001, 0.01) * force.max()
     force = force + remembering(rng, noise, MEMORY * (seed % 2)) + rng.normal(0, 5 * noise)
-    told = Compression(
-        "log.mcap", specimen=Specimen(diameter, height), material=Gel(nu=nu),
-        mesh=CylinderGrid(3, 3),
-    )  # fmt: skip
+    told = cylinder(diameter, height, nu, (3, 3))
     return Truth(case, E, told, recorded(t, d + approach, force))
+
+
+def cylinder(diameter: float, height: float, nu: float, cells: tuple[int, int]) -> Tree:
+    """What a run is told of a specimen between plates."""
+    scene = Scene(
+        Cylinder(diameter, height, cells, "tet10", "quarter"), Material(None, nu),
+        (Support("lower_plate", (2,)),),
+        drives=(Drive("stage", "upper_plate", (0.0, 0.0, -1.0)),),
+    )  # fmt: skip
+    return Tree("log.mcap", scene, Compression())
 
 
 def remembering(rng: np.random.Generator, sd: float, memory: float) -> Floats:
@@ -179,10 +188,12 @@ def recorded(t: Floats, d: Floats, force: Floats) -> Recording:
 # --- what a run makes of them ---------------------------------------------------------------------
 
 
-def experiment(folder: Path, told: Compression, seen: Recording, law: str, contact: str,
-               order: Any = 2) -> Experiment:  # fmt: skip
+def experiment(folder: Path, told: Tree, seen: Recording, law: str, contact: str,
+               ) -> Experiment:  # fmt: skip
     write_recording(seen, folder / "log.mcap")
-    method: Any = pressed(f"{law}, {contact}", contact, law, order)  # type: ignore[arg-type]
+    solver: Any = NoFluid() if law == "linear" else Tabulated(StaticNewton("none"))
+    changes = {"material.law": law, **(BONDED_PLATES if contact == "bonded" else {})}
+    method = Method(f"{law}, {contact}", solver, changes)
     made = compression(
         "log", "log", "synthetic", told, {"judged": method}, ("judged",),
         (Accept("force", 1.0, "not judged"),), kind="twin",
@@ -263,15 +274,15 @@ def wrong_law(seed: int, stiffening: float) -> Recording:
     return recorded(t, d - d[0], force)
 
 
-def _told() -> Compression:
-    return Compression(
-        "log.mcap", specimen=Specimen(_DIAMETER, _HEIGHT), material=Gel(nu=0.4995),
-        mesh=CylinderGrid(2, 2),
-    )  # fmt: skip
+def _told() -> Tree:
+    """In linear cells: many logs."""
+    tree = cylinder(_DIAMETER, _HEIGHT, 0.4995, (2, 2))
+    linear = replace(tree.scene.body, element="tet4")
+    return tree.with_scene(body=linear, dilatation="nodal_mean")
 
 
 def wrong(folder: Path, seed: int, stiffening: float) -> Experiment:
-    return experiment(folder, _told(), wrong_law(seed, stiffening), "neo_hooke", "slip", 1)
+    return experiment(folder, _told(), wrong_law(seed, stiffening), "neo_hooke", "slip")
 
 
 def misfit(stiffening: float) -> float:

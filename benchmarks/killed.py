@@ -30,19 +30,25 @@ from validate.compare.verdict import Accept
 from validate.parameters import quantity
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import Role
-from validate.replay import compression_cards as cards
-from validate.replay.compression import compression, pressed
+from validate.replay.compression_cards import Compression
+from validate.replay.experiment import Experiment
+from validate.replay.method import Method
+from validate.scene.geometry import Cylinder
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.solve.fluid import NoFluid
 
-EXPERIMENT = compression(
+EXPERIMENT = Experiment(
     name="small", title="A small cylinder", source="benchmarks/killed.py",
-    parameters=cards.Compression(
-        recording="log.mcap", test="compression",
-        specimen=cards.Specimen(diameter=0.03, height=0.02),
-        material=cards.Gel(E=None, nu=0.499),
-        mesh=cards.CylinderGrid(radial=2, axial=2),
-        fit_from=0.0, fit_to=0.03, limit=0.06,
+    recording="log.mcap",
+    scene=Scene(
+        body=Cylinder("30 mm", "20 mm", cells=(2, 2), element="tet10", part="quarter"),
+        material=Material(None, 0.499),
+        supports=(Support("lower_plate", (2,)),),
+        drives=(Drive("stage", "upper_plate", "-z"),),
     ),
-    methods={"slip": pressed("linear, slipping plates")},
+    settings=Compression(fit_from=0.0, fit_to=0.03, limit=0.06),
+    methods={"slip": Method("linear, slipping plates", NoFluid())},
     accepted=("slip",),
     accept=(Accept("force", 0.5, "half a newton (ours)"),),
 )

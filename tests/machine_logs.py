@@ -8,10 +8,15 @@ from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
+from validate.replay.compression_cards import Compression
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import measured_body
-from validate.replay.measured_cards import MeasuredBody
 from validate.replay.method import Method
+from validate.replay.tree import Tree
+from validate.scene.geometry import Cylinder
+from validate.scene.material import Material
+from validate.scene.mesh import Kind
+from validate.scene.scene import Drive, Scene, Support
 
 
 def machine_log(t: Floats, u: Floats, force: Floats, noise: float = 0.0) -> Recording:
@@ -23,8 +28,24 @@ def machine_log(t: Floats, u: Floats, force: Floats, noise: float = 0.0) -> Reco
     return Recording("log", Source("x", "", 0, "x"), 0, signals=signals)
 
 
+def pressed_cylinder(
+    diameter: float | None, height: float | None, E: float | None = None, nu: float = 0.499, *,
+    cells: tuple[int, int] = (4, 4), element: Kind = "tet10", whole: bool = False,
+    settings: Compression | None = None,
+) -> Tree:  # fmt: skip
+    """A cylinder between slipping plates, beside its log "log.mcap"."""
+    scene = Scene(
+        Cylinder(diameter, height, cells, element, "whole" if whole else "quarter"),
+        Material(E, nu),
+        (Support("lower_plate", (2,), rests=whole),),
+        drives=(Drive("stage", "upper_plate", "-z"),),  # type: ignore[arg-type]
+        dilatation="nodal_mean" if element == "tet4" else "pointwise",
+    )
+    return Tree("log.mcap", scene, settings or Compression())
+
+
 def on_a_body(
-    folder: Path, p: MeasuredBody, seen: Recording, methods: Mapping[str, Method],
+    folder: Path, p: Tree, seen: Recording, methods: Mapping[str, Method],
     limits: Mapping[str, float],
 ) -> Experiment:  # fmt: skip
     """An experiment of which all methods are judged; its recording is written to `folder`."""

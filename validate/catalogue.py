@@ -89,6 +89,10 @@ def card(path: Path) -> Card:
         return Card(name_of(path), "", "", f"cannot be read: {error}")
     if not any(_names_experiment(node) for node in ast.walk(module)):
         return Card(name_of(path), "", "", "defines no EXPERIMENT")
+    if _is_of_older_form(module):
+        return Card(name_of(path), "", "", f"declares `parameters` in place of a scene, as older "
+                    f"files did; write it anew: `validate new {name_of(path)} --from RECORDING "
+                    "--force`")  # fmt: skip
     texts = _spelt(module)
     docstring = (ast.get_docstring(module) or "").partition("\n")[0]
     title, needs = texts.get("title", docstring), texts.get("needs", "")
@@ -100,6 +104,20 @@ def _names_experiment(node: ast.AST) -> bool:
     if isinstance(node, ast.alias):
         return (node.asname or node.name) in ("EXPERIMENT", "*")
     return isinstance(node, ast.Name) and node.id == "EXPERIMENT"
+
+
+def _is_of_older_form(module: ast.Module) -> bool:
+    """Whether the experiment is declared by parameters of its own, of which a scene was built."""
+    return any(k.arg == "parameters" for call in _declarations(module) for k in call.keywords)
+
+
+def _declarations(module: ast.Module) -> list[ast.Call]:
+    """`EXPERIMENT = Experiment(...)`."""
+    return [
+        node.value for node in module.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call)
+        and isinstance(node.targets[0], ast.Name) and node.targets[0].id == "EXPERIMENT"
+    ]  # fmt: skip
 
 
 def _spelt(module: ast.Module) -> dict[str, str]:

@@ -79,13 +79,21 @@ class Changed:
 
 
 def changed(declared: Sequence[Parameter], used: Sequence[Parameter]) -> tuple[Changed, ...]:
-    """What differs of the parameters that both have."""
-    own = {p.path: p.default for p in declared}
+    """What differs of the parameters that both have; what a method changes of a scene by a path
+    that it did not have is held against the scene's own value."""
+    own = {p.path: p for p in declared}
+    pairs = ((p, own.get(p.path) or own.get(_without_method(p.path))) for p in used)
     return tuple(
-        Changed(p.path, own[p.path], p.default, p.unit)
-        for p in used
-        if p.path in own and own[p.path] != p.default
+        Changed(p.path, d.default, p.default, d.unit)
+        for p, d in pairs
+        if d and d.default != p.default
     )
+
+
+def _without_method(path: str) -> str:
+    """The path of the scene in methods.NAME.PATH; "" of another one."""
+    parts = path.split(".", 2)
+    return parts[2] if parts[0] == "methods" and len(parts) == 3 else ""
 
 
 def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Parameter, ...]:

@@ -15,12 +15,12 @@ from validate.papers.ecoflex.cylinder import (
     SiliconeModuli,
     load,
     place,
-    stated,
 )
 from validate.papers.ecoflex.logged import follows
 from validate.papers.ecoflex.modulus import identified
 from validate.papers.ecoflex.specimens import specimen_of
 from validate.parameters import describe
+from validate.replay.compression_cards import stated_sizes
 from validate.replay.experiment import Experiment, Uncertainty, vary
 from validate.replay.method import Method
 from validate.scene.geometry import Cylinder
@@ -100,7 +100,7 @@ EXPERIMENT = Experiment(
     place=place,
     uncertainty=Uncertainty(surrogate="slip"),
     published=PUBLISHED,
-    stated=stated,
+    stated=stated_sizes,
     identify=identified,
     band="ranges.specimen",
     frames=2,

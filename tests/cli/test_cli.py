@@ -437,7 +437,7 @@ def test_commands_without_what_they_need_report_it(
 def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(new_body, "_mesh_of", lambda found: None)
+    monkeypatch.setattr(new_body, "answered_mesh", lambda found: None)
     monkeypatch.setattr(new_body, "_judged", lambda found: ())
     with pytest.raises(UsageError, match=r"held.all, .x, .y, .z and .slides are all empty: name"):
         new_body._fields(None, "", Path(), {})  # type: ignore[arg-type]

@@ -68,7 +68,7 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
     listed = in_folder(tmp_path, "list", "my_gel", "--json")[1]
     paths = {p["path"]: p["default"] for p in json.loads(listed)["parameters"]}
-    assert (paths["specimen.diameter"], paths["specimen.height"]) == (DIAMETER, HEIGHT)
+    assert (paths["body.diameter"], paths["body.height"]) == (DIAMETER, HEIGHT)
     own = load_file(tmp_path / "experiments" / "my_gel.py")
     result = compare(own)
     assert [(c.name, c.verdict) for c in result.checks] == [
@@ -76,9 +76,9 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     ]  # fmt: skip
     values = {p.path: (p.default, p.origin) for p in result.parameters}
     assert values["material.E"] == (pytest.approx(E, rel=0.02), "identified")
-    assert values["specimen.diameter"] == (DIAMETER, "recorded")
+    assert values["body.diameter"] == (DIAMETER, "recorded")
     assert values["limit"][1] == "entered"
-    assert values["material.nu"] == (0.499, "default")
+    assert values["material.nu"] == (0.499, "entered")
     assert (result.passed, result.warnings) == (True, ())
 
 
@@ -112,15 +112,15 @@ def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> Non
     lines = file.read_text("utf-8").splitlines()
     places = {k: next(i for i, s in enumerate(lines, 1) if f" {k}=None," in s)
               for k in ("diameter", "height")}  # fmt: skip
-    assert "ranges=cards.CompressionRanges(E=0.05, diameter=0.005)" in "".join(lines)
+    assert "ranges=CompressionRanges(E=0.05, diameter=0.005)" in "".join(lines)
     for command in (("run", "bare"), ("study", "tradeoff", "bare", "--quick", "--workers", "0")):
         code, message = in_folder(tmp_path, *command)
         assert code == 2
         assert "\n" not in message.strip()
         for name, line in places.items():
-            at = str(Path("experiments") / "bare.py") + f":{line}: specimen.{name} (m) is not set"
+            at = str(Path("experiments") / "bare.py") + f":{line}: body.{name} (m) is not set"
             assert at in message
-            assert f"--set specimen.{name}=VALUE" in message
+            assert f"--set body.{name}=VALUE" in message
 
 
 @pytest.mark.slow
@@ -128,10 +128,10 @@ def test_a_part_of_the_sizes_is_enough_where_the_recording_says_the_rest(tmp_pat
     write_recording(log(height_m=repr(HEIGHT)), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "half", "--from", "gel.mcap")
     mine = load_file(tmp_path / "experiments" / "half.py")
-    result = compare(mine, {"specimen.diameter": repr(DIAMETER), "specimen.height": "none"})
+    result = compare(mine, {"body.diameter": repr(DIAMETER), "body.height": "none"})
     found = {p.path: (p.default, p.origin) for p in result.parameters}
-    assert found["specimen.diameter"] == (DIAMETER, "entered")
-    assert found["specimen.height"] == (HEIGHT, "recorded")
+    assert found["body.diameter"] == (DIAMETER, "entered")
+    assert found["body.height"] == (HEIGHT, "recorded")
     assert result.passed
 
 
@@ -141,17 +141,17 @@ def test_metres_for_millimetres_are_warned_of_with_the_factor(tmp_path: Path) ->
     write_recording(log(**SIZES), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "big", "--from", "gel.mcap")
     slip = ("--methods", "slip")
-    code, output = in_folder(tmp_path, "run", "big", "--set", "specimen.diameter=30", "-v", *slip)
+    code, output = in_folder(tmp_path, "run", "big", "--set", "body.diameter=30", "-v", *slip)
     assert code == 0
     assert "good enough" in output
     first = " ".join(output.partition("Checks of")[0].split())
-    assert "specimen.diameter = 30 m is 1000 times 30 mm: check its unit" in first
+    assert "body.diameter = 30 m is 1000 times 30 mm: check its unit" in first
     assert "material.E (identified) is a modulus of 0.02 Pa" in first
     assert "is a stress of" in first
     assert "was entered; the recording has 0.03 m, 1e+03 times" in first
     (folder,) = (tmp_path / "reports").glob("big+*")
     stored = json.loads((folder / "results.json").read_text("utf-8"))
-    assert stored["parameters"]["specimen.diameter"] == {
+    assert stored["parameters"]["body.diameter"] == {
         "value": 30.0, "unit": "m", "origin": "entered",
     }  # fmt: skip
     assert stored["parameters"]["material.E"]["origin"] == "identified"
@@ -271,8 +271,8 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     write_recording(replace(pulled, signals=turned), tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "strip", "--from", "gel.mcap")[0] == 0
     text = (tmp_path / "experiments" / "strip.py").read_text("utf-8")
-    assert 'test="tension",  # recorded' in text
-    assert 'pressed("linear, gripped ends", "bonded")' in text
+    assert 'drives=(Drive("stage", "upper_plate", "+z"),),  # tension, recorded' in text
+    assert 'Method("linear, gripped ends", NoFluid(), BONDED_PLATES)' in text
     mine = load_file(tmp_path / "experiments" / "strip.py")
     result = compare(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
@@ -281,8 +281,8 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     (slip,) = [m for m in result.methods if m.name == "slip"]
     tops = slip.scene.mesh.facet_nodes("upper_plate")
     assert slip.runs[0].u[-1][tops, 2].mean() > 0
-    with pytest.raises(RecordingError, match="--set test=tension"):
-        compare(mine, {"test": "compression"})
+    with pytest.raises(RecordingError, match=r"one in compression: its drive is along '\+z'"):
+        compare(mine, {"drives.stage.direction": "0,0,-1"})
 
 
 def test_what_presses_is_asked_where_nothing_says_it(tmp_path: Path) -> None:
@@ -296,7 +296,7 @@ def test_what_presses_is_asked_where_nothing_says_it(tmp_path: Path) -> None:
     arguments = ("new", "b", "--from", "gel.mcap", "--answers", "a.toml")
     assert in_folder(tmp_path, *arguments)[0] == 0
     text = (tmp_path / "experiments" / "b.py").read_text("utf-8")
-    assert 'test="tension",  # answered' in text
+    assert '"upper_plate", "+z"),),  # tension, answered' in text
     assert """Accept("force", 0.04, 'felt')""" in text
     (tmp_path / "a.toml").write_text(told, "utf-8")
     assert in_folder(tmp_path, "new", "c", *arguments[2:])[0] == 0
@@ -317,7 +317,7 @@ def test_a_cross_section_is_taken_from_sides_that_tell_it_alone(
 ) -> None:
     """A slab's width and thickness were its area, and so were a strip's width and length."""
     said = {f"{name}_m": repr(value) for name, value in sides.items()}
-    found = stated_sizes(log(test=test, **said)).get("specimen.diameter")
+    found = stated_sizes(log(test=test, **said)).get("body.diameter")
     assert found == (None if area is None else pytest.approx(2 * np.sqrt(area / np.pi)))
 
 
@@ -336,7 +336,7 @@ def test_several_lengths_of_a_strip_are_shown_and_none_is_taken(tmp_path: Path) 
     assert in_folder(tmp_path, "import", "z.csv", "-o", "z.mcap")[0] == 0
     _, listed = in_folder(tmp_path, "new", "a", "--from", "z.mcap", "--questions")
     assert "the header gives width 10 mm, thickness 2 mm, Einspannlänge 100 mm, Messlä" in listed
-    assert "specimen.diameter" not in listed
+    assert "body.diameter" not in listed
 
 
 def test_an_answered_height_decides_what_is_judged_and_accepted(tmp_path: Path) -> None:
@@ -347,9 +347,9 @@ def test_an_answered_height_decides_what_is_judged_and_accepted(tmp_path: Path) 
     assert '\naccept.force = ""' in in_folder(tmp_path, *arguments, "--questions")[1]
     answers = tmp_path / "a.toml"
     asked = (*arguments, "--answers", "a.toml")
-    answers.write_text('specimen.height = "high"', "utf-8")
-    assert in_folder(tmp_path, *asked, "--questions")[1].startswith("specimen.height = high: ")
-    answers.write_text('specimen.height = "40mm"', "utf-8")
+    answers.write_text('body.height = "high"', "utf-8")
+    assert in_folder(tmp_path, *asked, "--questions")[1].startswith("body.height = high: ")
+    answers.write_text('body.height = "40mm"', "utf-8")
     assert (
         "a tenth of the force at the strain limit, ass"
         in in_folder(tmp_path, *asked, "--questions")[1]
@@ -402,9 +402,11 @@ def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
     named = {"lower_plate": block.facets["z0"], "upper_plate": block.facets["z1"]}
     write_mesh(replace(block, facets=named), tmp_path / "body.npz")
     write_recording(log(**SIZES), tmp_path / "gel.mcap")
-    assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
+    (tmp_path / "a.toml").write_text('body.file = "body.npz"', "utf-8")
+    asked = ("new", "my_gel", "--from", "gel.mcap", "--answers", "a.toml")
+    assert in_folder(tmp_path, *asked)[0] == 0
     mine = load_file(tmp_path / "experiments" / "my_gel.py")
-    result = compare(mine, {"specimen.mesh": str(tmp_path / "body.npz")})
+    result = compare(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
     assert result.methods[0].scene.copies == 1
 

@@ -17,6 +17,8 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
 from validate.replay import compare
 from validate.replay.find import load_file
+from validate.replay.named_run import run_name
+from validate.replay.options import Options
 from validate.scene.box import box, grid
 from validate.scene.mesh_file import write_mesh
 from validate.study.job import Job, job_of
@@ -74,7 +76,7 @@ def test_a_body_of_hexahedra_is_solved_as_its_methods_say(here: Path) -> None:
     (here / "h.toml").write_text(file, "utf-8")
     assert called("new", "hexa", "--from", "all.mcap", "--answers", "h.toml")[0] == 0
     text = (here / "experiments" / "hexa.py").read_text("utf-8")
-    assert '"linear": solid("linear law, mixed hexahedra", "linear", 1)' in text
+    assert '"linear": solid("linear law, mixed hexahedra", "linear")' in text
     assert '"quick"' not in text
     found = compare(load_file(here / "experiments" / "hexa.py"), quick=True)
     method = found.methods[0]
@@ -113,11 +115,36 @@ def test_answers_make_an_experiment_that_runs(here: Path) -> None:
     assert (code, "not used" in said) == (0, False)
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert len(text.splitlines()) <= 60
-    assert "material=Tissue(E=20000, nu=0.3),  # E: Pa" in text
+    assert "material=Material(E=20000, nu=0.3, rho=1000),  # E: Pa, rho: kg/m^3" in text
     result = compare(load_file(here / "experiments" / "mine.py"))
     assert {c.name: c.verdict for c in result.checks} == dict.fromkeys(
         ("force.max@low", "force.max@high", "marker.max@low", "marker.max@high"), "good enough"
     )
+
+
+def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
+    """A scene's path set for one method had no folder of its own, and wrong names came late."""
+    assert called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")[0] == 0
+    file = here / "experiments" / "mine.py"
+    mine = load_file(file)
+    coarse = {"methods.linear.body.cells": "2,2,2"}
+    assert run_name(mine, Options(coarse)) != run_name(mine, Options({}))
+    found = compare(mine, coarse, quick=True)
+    assert [(c.path, c.value) for c in found.changed] == [("methods.linear.body.cells", [2, 2, 2])]
+    with pytest.raises(UsageError, match=r"methods\.X\.material\.law: no method 'X'; "):
+        compare(mine, {"methods.X.material.law": "svk"})
+    text = file.read_text("utf-8")
+    for old, new, why in (
+        ('accepted=("linear",)', 'accepted=("slap",)', "accepted: no method 'slap'"),
+        ('"linear"),', '"linear", {"body.cell": (2, 2, 2)}),', "unknown parameter 'body.cell'"),
+        ('"linear"),', '"linear", {"body.cells": [2, 2, 2]}),', "expected a number, a text or a"),
+    ):
+        assert old in text
+        file.write_text(text.replace(old, new), "utf-8")
+        with pytest.raises(UsageError, match=why):
+            load_file(file)
+    file.write_text(text.replace('"linear"),', '"linear", {"body.cells": (2, 2, 2)}),'), "utf-8")
+    assert compare(load_file(file), quick=True).methods[0].scene.mesh.nodes.size < 2000
 
 
 def _worked(job: Job) -> dict[str, float]:
@@ -199,7 +226,7 @@ def test_what_markers_on_a_face_move_is_asked_before_it_runs(
     assert (code, why in told) == (2 if why else 0, True), told
     if not why:
         parameters = load_file(here / "experiments" / "mine.py").parameters
-        assert parameters.moved.markers == ("A", "B", "C")
+        assert parameters.scene.tracked[0].labels == ("A", "B", "C")
 
 
 def test_images_alone_lead_to_an_experiment_by_what_was_noted(here: Path) -> None:
@@ -221,7 +248,7 @@ def test_images_alone_lead_to_an_experiment_by_what_was_noted(here: Path) -> Non
     assert (code, "not used" in told) == (0, False), told
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert len(text.splitlines()) <= 60
-    assert load_file(here / "experiments" / "mine.py").parameters.moved.noted == (0.0, 1e-3)
+    assert load_file(here / "experiments" / "mine.py").parameters.settings.noted == (0.0, 1e-3)
 
 
 def test_questions_are_a_file_of_answers(here: Path) -> None:
@@ -248,7 +275,7 @@ def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
     code, said = called("new", "mine", "--from", "seen.mcap", "--answers", "a.toml")
     assert code == 0, said
     text = (here / "experiments" / "mine.py").read_text("utf-8")
-    assert "body=Solid(file='../body.npz')," in text
+    assert "body=MeshFile(file='../body.npz', element='quadratic')," in text
     result = compare(load_file(here / "experiments" / "mine.py"))
     assert [c.name for c in result.checks] == ["marker.max@low", "marker.max@high"]
     (here / "answers").mkdir()

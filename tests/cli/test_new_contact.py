@@ -68,15 +68,17 @@ def test_answers_make_an_indentation_that_runs(
     assert "machine=Machine(compliance=0.0001, sd=1e-05)," in text
     assert "bonded=True" in text
     experiment = load_file(tmp_path / "experiments" / "ball.py")
-    card = experiment.parameters.indenter
-    assert card.gap == pytest.approx(GAP, abs=2e-5)
-    assert card.reach == pytest.approx(np.sqrt(RADIUS * DEPTH), rel=0.02)
-    small = {"body.cells": "4", "seen.states": "8"}
+    scene = experiment.parameters.scene
+    assert scene.contacts[0].shape.gap == pytest.approx(GAP, abs=2e-5)
+    assert scene.body.part == "quarter"
+    reach = np.sqrt(RADIUS * DEPTH)  # four cells along it
+    assert scene.body.shares == pytest.approx((14 * reach / 4 / 10e-3,) * 3, rel=0.02)
+    small = {"body.cells": "4,4,4", "seen.states": "8"}
     result = compare(experiment, small, quick=True)
     run = result.methods[0].runs[0]
     assert run.outcome.state == "finished"
-    assert run.traces["moved.slipping"].y.max() == 0  # bonded
-    assert run.traces["moved.touching"].y[-1] > 1
+    assert run.traces["displacement.slipping"].y.max() == 0  # bonded
+    assert run.traces["displacement.touching"].y[-1] > 1
 
 
 def test_the_machine_is_asked_about(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,3 +156,18 @@ def test_a_cylinder_presses_with_the_force_of_another_code(
         assert check.validation == "not distinguishable", check
         assert abs(check.value) < 0.05 * force[-1]
         assert check.u_num > 0.5 * check.u_val
+
+
+def test_a_file_of_answers_elsewhere_holds_numbers_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compliance of 1e-4 m/N was taken for the name of a file beside the answers."""
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path / "mine")
+    write_recording(log(), tmp_path / "log.mcap")
+    (tmp_path / "a.toml").write_text(ANSWERS.replace('"bonded"', '"0.3"'), "utf-8")
+    code, said = called("new", "ball", "--from", "../log.mcap", "--answers", "../a.toml")
+    assert code == 0, said
+    p = load_file(tmp_path / "mine" / "experiments" / "ball.py").parameters
+    assert p.settings.machine.compliance == 1e-4
+    assert p.scene.contacts[0].friction == 0.3

@@ -1,5 +1,6 @@
 """What a mesh file of a specimen holds is not asked again, by `validate new` or a run."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,18 +11,20 @@ import numpy as np
 import pytest
 from commands import here, refused
 
-from validate.cli.new_body import _mesh_of
+from validate.cli import new
+from validate.cli.new_scene import answered_mesh
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.replay.find import load_file
 from validate.replay.origins import opened
+from validate.replay.pressed_scene import pressed_size
 from validate.scene.box import box, grid
 from validate.scene.mesh_file import write_mesh
 
 SIDES, E = (0.06, 0.045, 0.07), 20e3
 ANSWERS = {"test": "compression", "accept.force": "0.1N", "why.force": "felt"}
 SIZES = {
-    "specimen.diameter": 2 * np.sqrt(SIDES[0] * SIDES[1] / np.pi), "specimen.height": SIDES[2],
+    "body.diameter": 2 * np.sqrt(SIDES[0] * SIDES[1] / np.pi), "body.height": SIDES[2],
 }  # fmt: skip
 
 
@@ -39,8 +42,11 @@ def force_log(**specimen: str) -> Recording:
                      metadata={"specimen": specimen} if specimen else {})  # fmt: skip
 
 
-def block(divisions: int = 2, make: Any = box, names: tuple[str, ...] = ("z0", "z1")) -> Any:
-    mesh = make(SIDES, (divisions,) * 3)
+def block(
+    divisions: int = 2, make: Any = box, names: tuple[str, ...] = ("z0", "z1"),
+    sides: tuple[float, ...] = SIDES,
+) -> Any:  # fmt: skip
+    mesh = make(sides, (divisions,) * 3)
     plates = zip(("lower_plate", "upper_plate"), names, strict=False)
     return replace(mesh, facets={plate: mesh.facets[name] for plate, name in plates})
 
@@ -64,38 +70,51 @@ def answers(folder: Path, **given: str) -> None:
 
 
 @pytest.mark.parametrize("mesh", [
-    {"specimen.mesh": "block.npz"}, {"specimen.mesh": "block.inp", "specimen.mesh_unit": "mm"},
+    {"body.file": "block.npz"}, {"body.file": "block.inp", "body.unit": "mm"},
 ])  # fmt: skip
 def test_the_sizes_of_a_mesh_are_not_asked(folder: Path, mesh: Mapping[str, Any]) -> None:
     answers(folder, **mesh)
     arguments = ("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
-    assert "specimen.height" not in here(*arguments, "--questions")[1]
+    assert "body.height" not in here(*arguments, "--questions")[1]
     code, _, err = here(*arguments)
-    assert (code, "specimen." in err) == (0, False), err
+    assert (code, "body." in err) == (0, False), err
     mine = load_file(folder / "experiments" / "mine.py")
-    used = opened(mine, mine.parameters).parameters
-    assert used.specimen.diameter == pytest.approx(SIZES["specimen.diameter"], rel=1e-5)
-    assert used.specimen.height == pytest.approx(SIZES["specimen.height"], rel=1e-5)
+    used = pressed_size(opened(mine, mine.parameters).parameters, folder / "experiments")
+    assert used.diameter == pytest.approx(SIZES["body.diameter"], rel=1e-5)
+    assert used.height == pytest.approx(SIZES["body.height"], rel=1e-5)
     code, out, err = here("run", "mine", "--quick", "--methods", "slip")
     assert code == 0, err
     assert "1 of 1 requirements are met" in " ".join(out.split())
 
 
 def test_a_run_takes_the_sizes_from_the_mesh_that_it_is_given(folder: Path) -> None:
-    """It asked for specimen.diameter of a block whose mesh was given."""
+    """It asked for body.diameter of a block whose mesh was given; a path is from the file's
+    folder."""
     answers(folder)
     assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
-    assert "specimen.diameter (m) is not set" in refused("run", "mine", "--quick")
-    mesh = ("--set", "specimen.mesh=block.npz")
-    code, _, err = here("run", "mine", "--quick", "--methods", "slip", *mesh)
-    assert code == 0, err
+    assert "body.diameter (m) is not set" in refused("run", "mine", "--quick")
+    (folder / "block.npz").rename(folder / "other.npz")
+    write_mesh(block(sides=(0.03, 0.045, 0.07)), folder / "block.npz")
+    answers(folder, **{"body.file": "block.npz"})
+    assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml", "--force")[0] == 0
+    quick = ("run", "mine", "--quick", "--methods", "slip")
+    moduli = []
+    for mesh in ((), ("--set", "body.file=../other.npz")):
+        code, _, err = here(*quick, *mesh, "--out", f"out{len(mesh)}")
+        assert code == 0, err
+        (found,) = (folder / f"out{len(mesh)}").rglob("results.json")
+        stored = json.loads(found.read_text("utf-8"))["parameters"]
+        moduli.append(stored["material.E"]["value"])
+    assert moduli[0] == pytest.approx(2 * moduli[1], rel=1e-3)  # half the area
 
 
 def test_a_size_of_the_header_that_the_mesh_does_not_have_is_named(folder: Path) -> None:
     write_recording(force_log(height_m="0.08"), folder / "log.mcap")
-    answers(folder, **{"specimen.mesh": "block.npz"})
+    answers(folder, **{"body.file": "block.npz"})
     err = here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[2]
-    assert "specimen.height: 80 mm in the header, 70 mm in block.npz" in " ".join(err.split())
+    assert "body.height: 80 mm in the header, 70 mm in block.npz, which counts" in " ".join(
+        err.split()
+    )
 
 
 @pytest.mark.parametrize(("mesh", "words"), [
@@ -106,7 +125,7 @@ def test_a_size_of_the_header_that_the_mesh_does_not_have_is_named(folder: Path)
 ])  # fmt: skip
 def test_a_mesh_that_plates_cannot_press_is_refused(folder: Path, mesh: Any, words: str) -> None:
     write_mesh(mesh, folder / "block.npz")
-    answers(folder, **{"specimen.mesh": "block.npz"})
+    answers(folder, **{"body.file": "block.npz"})
     assert words in refused("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
 
 
@@ -120,6 +139,26 @@ def test_a_mesh_file_that_changed_is_read_again(
         folder.mkdir()
         monkeypatch.chdir(folder)
         write_mesh(box((side, side, side), (1, 1, 1)), folder / "b.npz")
-        mesh = _mesh_of(found)
+        mesh = answered_mesh(found)
         assert mesh is not None
         assert np.ptp(mesh.nodes[:, 0]) == pytest.approx(side)
+
+
+def test_a_large_mesh_file_between_plates_is_filled_anew_coarser_and_refine_takes_its_own(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(new, "_FIRST", 0.0)  # s: as if it took long
+    write_mesh(block(8), folder / "fine.npz")
+    answers(folder, **{"body.file": "fine.npz"})
+    code, out, _ = here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
+    assert code == 0
+    assert "its mesh is coarser" in out
+    mine = load_file(folder / "experiments" / "mine.py")
+    assert mine.parameters.scene.body.halvings < 0
+    assert mine.refine is not None
+    assert mine.refine(mine.parameters, folder)["body.halvings"] == "0"
+    shown = mine.follows(mine, mine.load(mine.parameters, folder / "experiments"), mine.parameters)
+    sizes = [shown.uncertainty.mesh.size(level(mine.parameters))
+             for level in shown.uncertainty.mesh.levels]  # fmt: skip
+    assert min(sizes) == pytest.approx(shown.uncertainty.mesh.size(
+        mine.parameters.given({"body.halvings": 0})))  # fmt: skip

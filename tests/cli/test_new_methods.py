@@ -37,6 +37,5 @@ def test_filters_need_measurements_and_their_kind_of_load() -> None:
         assert fits_motion(name, "linear", "pulls", preloaded=False, measured=True)
         assert not fits_motion(name, "linear", "pulls", preloaded=False, measured=False)
         assert not fits_motion(name, "linear", "moves", preloaded=False, measured=True)
-    assert not fits_motion("node_ekf", "linear", "pulls", preloaded=False, measured=True)
     assert fits_motion("reduced_ekf", "neo_hooke", "pulls", preloaded=False, measured=True)
     assert not fits_motion("reduced_ekf", "neo_hooke", "releases", preloaded=True, measured=True)

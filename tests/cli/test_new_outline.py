@@ -67,8 +67,8 @@ def test_the_edge_is_judged_as_answered(seen: Path) -> None:
     assert "not used" not in err
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
-    assert isinstance(mine.parameters, Compression)
-    card = mine.parameters.outline
+    assert isinstance(mine.parameters.settings, Compression)
+    card = mine.parameters.settings.outline
     assert (card.topic, card.surface, card.sd) == ("cyst", "surface", 1e-4)
     assert card.origin == pytest.approx((-0.02, 0.0, 0.035))
     assert [(a.quantity, a.limit) for a in mine.accept][1:] == [("contour", 0.5e-3)]
@@ -80,7 +80,7 @@ def test_what_the_model_does_not_have_is_left_out_and_named(seen: Path) -> None:
     err, text = written(seen, {"outline.shows": "other"})
     assert "'cyst' is not used by this experiment" in err
     assert "'us' is not used by this experiment" in err
-    assert "outline" not in text.split("PARAMETERS")[1]
+    assert "outline" not in text.split("EXPERIMENT")[1]
 
 
 def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> None:
@@ -88,25 +88,27 @@ def test_an_inclusion_wants_its_mesh_its_fluid_and_the_modulus(seen: Path) -> No
     block = box((0.02, 0.02, 0.03), (2, 2, 2))
     sets = {name: block.facets[side] for name, side in names.items()}
     write_mesh(replace(block, facets=sets), seen / "cyst.npz")
-    inside = {"outline.shows": "inclusion", "specimen.mesh": "cyst.npz", "outline.surface": "wall",
+    inside = {"outline.shows": "inclusion", "body.file": "cyst.npz", "outline.surface": "wall",
               "outline.fluid": "true", "material.E": "15kPa", **PLACE}  # fmt: skip
     _, text = written(seen, inside)
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
-    assert isinstance(mine.parameters, Compression)
-    assert mine.parameters.specimen.fluid == mine.parameters.outline.surface == "wall"
-    assert mine.parameters.material.E == 15e3
+    scene, settings = mine.parameters.scene, mine.parameters.settings
+    assert isinstance(settings, Compression)
+    assert scene.cavities[0].facets == settings.outline.surface == "wall"
+    assert scene.material.E == 15e3
     assert [type(m.settings).__name__ for m in mine.methods.values()] == ["ExactPressure"] * 2
-    assert [m.scene.order for m in mine.methods.values()] == [2, 2]
+    assert (scene.body.element, scene.dilatation) == ("quadratic", "pointwise")
     (seen / "experiments" / "mine.py").unlink()
     block = box((0.02, 0.02, 0.03), (10, 10, 10))
     sets = {name: block.facets[side] for name, side in names.items()}
     write_mesh(replace(block, facets=sets), seen / "cyst.npz")
     said, text = written(seen, inside)
-    assert "cyst.npz has 6000 cells: linear ones are proposed (order=1)" in said
+    assert "cyst.npz has 6000 cells: linear ones are proposed (element=linear)" in said
     assert len(text.splitlines()) <= 60
     mine = load_file(seen / "experiments" / "mine.py")
-    assert [m.scene.order for m in mine.methods.values()] == [1, 1]
+    scene = mine.parameters.scene
+    assert (scene.body.element, scene.dilatation) == ("linear", "nodal_mean")
     recordings = mine.load(mine.parameters, folder_of(mine))
     used = mine.follows(mine, recordings, mine.parameters).uncertainty
     assert used is not None
@@ -119,10 +121,10 @@ def test_a_specimen_of_an_unusual_size_is_a_question(seen: Path) -> None:
     plates = {"lower_plate": mesh.facet_nodes("z0"), "upper_plate": mesh.facet_nodes("z1")}
     body = meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)], point_sets=plates)
     body.write(seen / "cyst.inp")
-    lines = ["experiment = 'plates'", "outline.shows = 'inclusion'", "specimen.mesh = 'cyst.inp'"]
+    lines = ["experiment = 'plates'", "outline.shows = 'inclusion'", "body.file = 'cyst.inp'"]
     for unit, is_asked in (("mm", True), ("m", False)):
-        text = "\n".join([*lines, f"specimen.mesh_unit = '{unit}'"])
+        text = "\n".join([*lines, f"body.unit = '{unit}'"])
         (seen / "a.toml").write_text(text, "utf-8")
         told = refused("new", "mine", "--from", "gel.mcap", "--answers", "a.toml")
-        said = "specimen.mesh_size (largest side of the body, as 3mm, to confirm its unit"
+        said = "body.size (largest side of the body, as 3mm, to confirm its unit"
         assert (said in told) == is_asked

@@ -162,10 +162,11 @@ def answer(case: Case, question: Question, rng: random.Random) -> str:
     key, (a, b, h) = question.key, map(float, case.size)
     known = {
         "experiment": "plates" if case.kind == "plates" else "body",
-        "specimen.mesh": "", "test": "compression", "outline.shows": "other",
-        "specimen.diameter": length(2 * math.sqrt(case.area / math.pi), case),
-        "specimen.height": length(h, case),
-        "body.shape": "file" if "." in case.shape else case.shape, "body.file": case.shape,
+        "test": "compression", "outline.shows": "other",
+        "body.diameter": length(2 * math.sqrt(case.area / math.pi), case),
+        "body.height": length(h, case),
+        "body.shape": "file" if "." in case.shape else case.shape,
+        "body.file": "" if case.kind == "plates" else case.shape,
         "body.block": ",".join(length(v, case) for v in (a, b, h)),
         "body.cylinder": ",".join(length(v, case) for v in (a, h)),
         "body.size": length(max(a, b, h), case),
@@ -209,7 +210,7 @@ def held_by_a_source(case: Case) -> set[str]:
     """Keys of questions whose answers the recording or the mesh file holds."""
     keys = set()
     if case.kind in ("plates", "log") and case.header:
-        keys |= {"specimen.height", "body.block", "body.cylinder", "specimen.diameter"}
+        keys |= {"body.height", "body.block", "body.cylinder", "body.diameter"}
     if "." in case.shape:
         keys |= {"body.unit", "body.block", "body.cylinder"}
     return keys
@@ -229,11 +230,12 @@ def one_line(error: str) -> None:
 
 
 def ran(mine: Experiment, case: Case) -> None:
-    values = {"mesh.radial": "2", "mesh.axial": "2"}
-    if isinstance(mine.parameters, MeasuredBody):
-        values = {"seen.states": "8"}
-        values |= {} if "." in case.shape else {"body.cells": "2"}
-        if mine.parameters.motion.how == "dynamic":
+    values = {"body.cells": "2,2"}
+    settings = getattr(mine.parameters, "settings", None)
+    if isinstance(settings, MeasuredBody):
+        values, body = {"seen.states": "8"}, mine.parameters.scene.body
+        values |= {} if "." in case.shape else {"body.cells": ",".join("2" * len(body.cells))}
+        if settings.motion.how == "dynamic":
             values["motion.length"] = f"{min(10, case.samples - 1) / case.rate:.6g}"
     try:
         result = compare(mine, values, methods=(list(mine.methods)[-1],), quick=True)

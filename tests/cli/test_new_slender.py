@@ -1,6 +1,5 @@
 """`validate new` of slender, nearly incompressible bodies: right, and known to be right."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +7,10 @@ import pytest
 from commands import called, refused
 
 from validate.arrays import Floats
+from validate.parameters import with_given
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source
 from validate.replay import compare
-from validate.replay.body_mesh import gridded
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.options import folder_of
@@ -73,7 +72,7 @@ def declared(folder: Path, shape: dict[str, str], *, tracked: bool) -> Experimen
 
 def errors(of: Experiment, cells: tuple[int, ...]) -> Floats:
     """Of every marker and instant, simulated less recorded, by the linear law on these cells."""
-    p = replace(of.parameters, body=replace(of.parameters.body, divisions=cells))
+    p = with_given(of.parameters, {"body.cells": cells})
     found = solve(of, of.load(p, folder_of(of)), "linear", of.methods["linear"], p).residuals
     return np.vstack([residual.values for residual in found.values()])
 
@@ -86,7 +85,7 @@ def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     made = declared(tmp_path, shape, tracked=tracked)
-    cells = gridded(made.parameters).body.divisions
+    cells = made.parameters.scene.body.cells
     finer = tuple(3 * n // 2 for n in cells)
     mine, converged = errors(made, cells), errors(made, finer)
     motion = np.abs(converged).max()  # the compared markers were recorded at rest
@@ -102,6 +101,6 @@ def test_refine_sets_all_load_steps_and_no_limit(
     monkeypatch.chdir(tmp_path)
     made = declared(tmp_path, BLOCK, tracked=True)
     assert made.refine is not None
-    assert made.refine(made.parameters, tmp_path) == {"body.budget": "false", "seen.states": "30"}
+    assert made.refine(made.parameters, tmp_path) == {"mesh.budget": "false", "seen.states": "30"}
     words = refused("run", "hanging_bar", "--refine")
     assert "--refine: hanging_bar runs on all its meshes already" in words

@@ -21,7 +21,10 @@ ROWS = [
     for line in (ROOT / "docs" / "capabilities.md").read_text("utf-8").splitlines()
     if line.startswith("| `")
 ]
-DECLARING = ("experiments/", "validate/papers/", "validate/replay/", "validate/study/")
+DECLARING = (
+    "experiments/", "validate/papers/", "validate/replay/", "validate/study/",
+    "validate/cli/new", "validate/scene/indenter.py",
+)  # fmt: skip
 
 
 def parts_of_a_scene() -> set[str]:

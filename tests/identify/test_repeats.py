@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
+from machine_logs import pressed_cylinder
 
 from validate.cli.main import run
 from validate.compare.verdict import Accept
@@ -20,8 +21,10 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.scatter import REPEATS, SHARE, repeats_share
 from validate.recording.types import Recording
 from validate.register.signals import validating
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import Compression, Specimen
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression
+from validate.replay.method import Method
+from validate.solve.fluid import NoFluid
 
 T = np.arange(60) / 10
 D = 0.05 * np.arange(60)  # mm
@@ -78,9 +81,9 @@ def test_the_logs_stay_beside_as_they_were_and_survive_a_file(tmp_path: Path) ->
 def test_a_compression_is_judged_within_the_repeats(tmp_path: Path) -> None:
     found = logs(tmp_path, 0.9, 1.1)
     mean = averaged(found, labels_of("each", found), "mean")
-    parameters = Compression(specimen=Specimen(0.025, 0.02), limit=0.14)
+    parameters = pressed_cylinder(0.025, 0.02, settings=Compression(limit=0.14))
     experiment = compression(
-        "gel", "A gel", "made here", parameters, {"fem": pressed("linear")}, ("fem",),
+        "gel", "A gel", "made here", parameters, {"fem": Method("linear", NoFluid())}, ("fem",),
         (Accept("force@beyond", 1.0, "made here"),),
     )  # fmt: skip
     for recording, share in ((mean, 0.1), (found[0], 0.0)):

@@ -1,24 +1,26 @@
 """Budgets of calibrated parameters: inputs and meshes to first order, or noise alone."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrating import NU, OPEN, E, Open
+from calibrating import NU, OPEN, OPENED, E, known
 
 from validate.replay.calibrated import calibrated, closed, identified_by
 from validate.replay.calibration import Calibrates, Calibration
 from validate.replay.experiment import Experiment, Identified, Uncertainty, vary
+from validate.replay.tree import Tree
 
 INPUTS = (
-    vary("nu", "absolute 0.02, below 0.5", "Poisson ratio"),
-    vary("E", "relative 5 %", "other specimens"),
+    vary("material.nu", "absolute 0.02, below 0.5", "Poisson ratio"),
+    vary("material.E", "relative 5 %", "other specimens"),
 )
 DOUBTED: Experiment = replace(OPEN, uncertainty=Uncertainty(inputs=INPUTS, surrogate="fem"))
 
 
-def identified(experiment: Experiment, p: Open) -> Identified:
-    shipped = experiment.load(p, None)  # type: ignore[arg-type]
+def identified(experiment: Experiment, p: Tree) -> Identified:
+    shipped = experiment.load(p, Path())
     fitted, _ = calibrated(experiment, p, experiment.methods, shipped)
     found = identified_by(experiment, shipped, p, experiment.methods, fitted)
     assert found is not None
@@ -26,10 +28,10 @@ def identified(experiment: Experiment, p: Open) -> Identified:
 
 
 def test_an_input_changes_the_value_as_a_new_identification_does() -> None:
-    (one,) = identified(DOUBTED, Open()).values
-    assert (one.name, one.unit, one.by) == ("E", "Pa", "fem")
+    (one,) = identified(DOUBTED, OPENED).values
+    assert (one.name, one.unit, one.by) == ("material.E", "Pa", "fem")
     exact = [
-        closed(DOUBTED, replace(Open(), nu=nu), DOUBTED.load(Open(), None)).E  # type: ignore[arg-type]
+        closed(DOUBTED, known(nu=nu), DOUBTED.load(OPENED, Path())).scene.material.E
         for nu in (0.3, 0.32)
     ]
     assert one.value == pytest.approx(exact[0], rel=1e-4)
@@ -45,12 +47,12 @@ def test_an_input_changes_the_value_as_a_new_identification_does() -> None:
 def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
     both = Calibration("fem", (E, NU), (Calibrates(("force", "node_B")),))
     several = replace(DOUBTED, calibrations=(both,), accept=())
-    shipped = several.load(Open(), None)  # type: ignore[arg-type]
-    p = Open(nu=None)
+    shipped = several.load(OPENED, Path())
+    p = known(nu=None)
     fitted, _ = calibrated(several, p, several.methods, shipped, anyway=True)
     found = identified_by(several, shipped, p, several.methods, fitted)
     assert found is not None
     one, other = found.values
     assert set(one.parts) == set(other.parts) == {"noise"}
-    assert "correlation with nu" in one.correlation
+    assert "correlation with material.nu" in one.correlation
     assert "does not include inputs and mesh" in one.correlation

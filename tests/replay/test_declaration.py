@@ -17,8 +17,11 @@ from validate.replay.declaration import from_json, to_json
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.measured_body import solid
-from validate.replay.measured_cards import HeldAt, MeasuredBody, Solid, Tissue
+from validate.replay.measured_cards import MeasuredBody
 from validate.replay.tree import Tree
+from validate.scene.geometry import Box
+from validate.scene.material import Material
+from validate.scene.scene import Scene, Support, Weight
 
 NAMES = sorted(experiment_files(shipped().parent))
 
@@ -53,9 +56,11 @@ def test_a_shipped_experiment_is_one_short_declaration_of_its_scene(name: str) -
 
 
 def body(**changes: object) -> Experiment:
-    parameters = MeasuredBody(
-        "none.mcap", Solid(block=(0.1, 0.02, 0.02)), Tissue(E=1e5, nu=0.45), HeldAt(all="xmin")
-    )
+    scene = Scene(
+        Box((0.1, 0.02, 0.02), (5, 1, 1), "hex27"), Material(1e5, 0.45), (Support("xmin"),),
+        loads=(Weight("gravity", "-z", 9.80665),), dilatation="by_element",
+    )  # fmt: skip
+    parameters = Tree("none.mcap", scene, MeasuredBody())
     methods = {"linear": solid("linear", "linear"), "large": solid("large strain")}
     accept = (Accept("marker.x", 1e-3, "a millimetre"),)
     return Experiment("body", "A beam", "made here", replace(parameters, **changes), methods,
@@ -83,7 +88,7 @@ def test_a_declaration_without_code_is_its_json_alone(tmp_path: Path) -> None:
         ({"type": "MeasuredBody", "bodies": 1}, "parameters: 'bodies' is no field of MeasuredBody"),
         ({"like": "parameters"}, "is code"),
         ({"what": 1}, "expected one of type, like, items, code, array, number"),
-        ({"type": "MeasuredBody", "material": {"type": "Material", "E": -1.0, "nu": 0.3}},
+        ({"type": "Scene", "body": 0, "material": {"type": "Material", "E": -1.0, "nu": 0.3}},
          "parameters.material: modulus E = -1 Pa: expected a positive number"),
     ],
 )  # fmt: skip
@@ -105,3 +110,28 @@ def test_other_json_is_no_declaration(text: str, tmp_path: Path) -> None:
     (tmp_path / "x.json").write_text(text, "utf-8")
     with pytest.raises(UsageError, match=r"x\.json: no "):
         load_file(tmp_path / "x.json")
+
+
+OLDER = '''"""A test of older days."""
+from validate.replay.experiment import Experiment
+from validate.replay.measured_cards import HeldAt, MeasuredBody
+
+PARAMETERS = MeasuredBody("log.mcap", held=HeldAt(all="zmin"))
+EXPERIMENT = Experiment(name="older", title="older", source="mine", parameters=PARAMETERS)
+'''
+
+
+def test_a_file_of_the_older_form_is_refused_with_the_command_that_writes_it_anew(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "older.py").write_text(OLDER, "utf-8")
+    line = refused("run", str(tmp_path / "older.py"), cwd=tmp_path)
+    assert "validate new older --from RECORDING --force" in line
+    computed = (
+        "from validate.replay.experiment import Experiment\n"
+        "def declared(**given): return Experiment(**given)\n"
+        "EXPERIMENT = declared(name='other', title='', source='', **{'parameters': 1})\n"
+    )
+    (tmp_path / "other.py").write_text(computed, "utf-8")
+    with pytest.raises(UsageError, match=r"parameters of type int; declare a scene: Experiment"):
+        load_file(tmp_path / "other.py")

@@ -71,14 +71,14 @@ def test_a_mesh_file_is_refined_as_far_as_a_first_answer_allows(
     tmp_path: Path, mesh: Mesh, order: int, levels: int
 ) -> None:
     made, said = declared(tmp_path, mesh)
-    assert made.methods["solid"].scene.order == order
+    assert made.parameters.scene.body.element == ("quadratic" if order == 2 else "linear")
     assert made.uncertainty is not None
     assert made.uncertainty.mesh is not None
     assert len(made.uncertainty.mesh.levels) == levels
     p = made.parameters
     N = unknowns_of(p, order, folder_of(made))
-    assert 8 <= p.seen.states <= 30
-    assert p.seen.states * newton_seconds(N) <= cost.RUNS or p.seen.states == 8
+    assert 8 <= p.settings.seen.states <= 30
+    assert p.settings.seen.states * newton_seconds(N) <= cost.RUNS or p.settings.seen.states == 8
     assert (made.uncertainty.draws == 0) == (16 * linear_seconds(N) > cost.INPUTS)
     expected = estimated(tmp_path / "experiments" / "mine.py")
     assert expected is not None
@@ -86,8 +86,8 @@ def test_a_mesh_file_is_refined_as_far_as_a_first_answer_allows(
     assert f"{expected.unknowns:.0f} unknowns at most" in said
     assert made.refine is not None
     finer = made.refine(p, folder_of(made))
-    assert (finer["body.budget"], finer["seen.states"]) == ("false", "30")
-    assert ("methods.solid.order" in finer) == (order == 1 and not mesh.bricks)
+    assert (finer["mesh.budget"], finer["seen.states"]) == ("false", "30")
+    assert ("body.element" in finer) == (order == 1 and not mesh.bricks)
     used = _refined(made, Options({"seen.states": "9"}))
     assert used.values == {**finer, "seen.states": "9"}  # what the user sets stays
 
@@ -106,7 +106,7 @@ def test_a_large_mesh_file_is_filled_anew_coarser_and_refine_takes_its_own(
     own = grid(SIZE, (18, 18, 18))
     made, said = declared(tmp_path, own)
     p, folder = made.parameters, folder_of(made)
-    assert p.body.halvings == -1
+    assert p.scene.body.halvings == -1
     assert "--refine takes the file's own" in " ".join(said.split())
     assert unknowns_of(p, 1, folder) < own.nodes.size / 3
     assert made.uncertainty is not None

@@ -10,7 +10,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from machine_logs import machine_log, on_a_body
+from machine_logs import machine_log, on_a_body, pressed_cylinder
 from scipy.optimize import brentq
 
 from validate.arrays import Floats
@@ -19,32 +19,27 @@ from validate.compare.verdict import Accept
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.replay import compare
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import (
-    Compression,
-    CompressionRanges,
-    CylinderGrid,
-    Gel,
-    Specimen,
-)
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression, CompressionRanges
 from validate.replay.experiment import Experiment
 from validate.replay.fitted_moduli import Moves, sentence
 from validate.replay.measured_body import solid
-from validate.replay.measured_cards import (
-    HeldAt,
-    MeasuredBody,
-    MovedBy,
-    SeenOf,
-    Solid,
-    Tissue,
-)
+from validate.replay.measured_cards import MeasuredBody, SeenOf
+from validate.replay.method import Method
+from validate.replay.tree import Tree
 from validate.report.store import document, schema
+from validate.scene.geometry import Box
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.solve.fluid import NoFluid
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 
 DIAMETER, HEIGHT, E, NU = 0.03, 0.02, 25e3, 0.45
 AREA = np.pi * DIAMETER**2 / 4
 LAWS = {
-    "linear": pressed("linear", order=1),
-    "neo": pressed("neo-Hooke", "slip", "neo_hooke", 1),
+    "linear": Method("linear", NoFluid()),
+    "neo": Method("neo-Hooke", Tabulated(StaticNewton("none")), {"material.law": "neo_hooke"}),
 }
 
 
@@ -82,10 +77,10 @@ def log(noise: float, *, large: bool, seed: int = 0) -> Recording:
 
 def experiment(folder: Path, seen: Recording, **ranges: float) -> Experiment:
     write_recording(seen, folder / "log.mcap")
-    parameters = Compression(
-        "log.mcap", specimen=Specimen(DIAMETER, HEIGHT), material=Gel(nu=NU),
-        mesh=CylinderGrid(2, 2), ranges=CompressionRanges(**ranges),
-    )  # fmt: skip
+    settings = Compression(ranges=CompressionRanges(**ranges))
+    parameters = pressed_cylinder(
+        DIAMETER, HEIGHT, nu=NU, cells=(2, 2), element="tet4", settings=settings
+    )
     made = compression(
         "gel", "gel", "x", parameters, LAWS, ("linear", "neo"), (Accept("force", 0.1, "test"),)
     )
@@ -193,12 +188,13 @@ def test_a_body_s_modulus_is_its_own_law_s(tmp_path: Path) -> None:
     strain = 0.1 * np.clip((t - 0.5) / 5.0, 0.0, 1.0)
     force = uniaxial(strain) * size[0] * size[1] / AREA
     force = force + np.random.default_rng(5).normal(0.0, 2e-3, len(t))
-    parameters = MeasuredBody(
-        "body.mcap", Solid(block=size, cells=4), Tissue(None, NU),
-        HeldAt(x="xmin", y="ymin", z="zmin"),
-        MovedBy("displacement", "zmax", "-z", sideways=False),
-        SeenOf(force="force", states=16, still=0.4),
+    scene = Scene(
+        Box(size, (4, 4, 4), "hex8"), Material(None, NU),
+        (Support("xmin", (0,)), Support("ymin", (1,)), Support("zmin", (2,))),
+        drives=(Drive("displacement", "zmax", "-z"),), dilatation="by_element",
     )  # fmt: skip
+    settings = MeasuredBody(SeenOf(force="force", states=16, still=0.4))
+    parameters = Tree("body.mcap", scene, settings)
     seen = machine_log(t, strain * HEIGHT, force, 2e-3)
     methods = {"solid": solid("neo-Hooke"), "linear": solid("linear", "linear")}
     result = compare(on_a_body(tmp_path, parameters, seen, methods, {"force": 0.1}))

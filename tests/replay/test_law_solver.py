@@ -5,35 +5,41 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import UsageError
-from validate.replay.compression import pressed
 from validate.replay.experiment import Experiment
-from validate.replay.law_solver import laws_of, with_laws
+from validate.replay.law_solver import laws_of, with_law
+from validate.replay.measured_body import solid
+from validate.replay.method import Method
 from validate.replay.options import Options, all_methods
+from validate.scene.material import LawName
 from validate.solve.fluid import NoFluid
 from validate.solve.newton import StaticNewton
 from validate.solve.pressure_loop import PressureLoop
 from validate.solve.tabulated import Tabulated
 
 
+def pressed(label: str, law: LawName = "linear") -> Method:
+    settings = NoFluid() if law == "linear" else Tabulated(StaticNewton("none"))
+    return replace(solid(label, law), settings=settings)
+
+
 def test_a_static_method_takes_the_solver_of_its_law() -> None:
     declared = {"slip": pressed("slip"), "neo": pressed("neo", law="neo_hooke")}
-    methods, rest = with_laws(declared, {"slip.law": "svk", "neo.law": "linear", "neo.order": "1"})
-    assert methods["slip"].scene.law == "svk"
-    assert isinstance(methods["slip"].settings, Tabulated)
-    assert isinstance(methods["neo"].settings, NoFluid)
-    assert rest == {"neo.order": "1"}
+    large = with_law("slip", declared["slip"], "svk", declared)
+    assert isinstance(large.settings, Tabulated)
+    assert isinstance(with_law("neo", declared["neo"], "linear", declared).settings, NoFluid)
 
 
 def test_newton_where_no_other_method_solves_the_law() -> None:
-    methods, _ = with_laws({"slip": pressed("slip")}, {"slip.law": "neo_hooke"})
-    assert isinstance(methods["slip"].settings, StaticNewton)
+    alone = pressed("slip")
+    large = with_law("slip", alone, "neo_hooke", {"slip": alone})
+    assert isinstance(large.settings, StaticNewton)
 
 
 def test_a_scheme_of_one_law_lists_and_takes_no_other(phantom: Experiment) -> None:
-    loop = {"loop": replace(pressed("loop"), settings=PressureLoop())}
-    assert laws_of(loop["loop"]) == ("linear",)
-    with pytest.raises(UsageError, match=r"methods\.loop\.law=svk: PressureLoop solves linear; "):
-        with_laws(loop, {"loop.law": "svk"})
+    loop = replace(pressed("loop"), settings=PressureLoop())
+    assert laws_of(loop) == ("linear",)
+    with pytest.raises(UsageError, match=r"methods\.loop\.material\.law=svk: PressureLoop solves"):
+        with_law("loop", loop, "svk", {"loop": loop})
     refusal = r"methods\.p1_loop\.material\.law=svk: PressureLoop solves linear; "
     with pytest.raises(UsageError, match=refusal):
         all_methods(phantom, Options({"methods.p1_loop.material.law": "svk"}))

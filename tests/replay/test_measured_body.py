@@ -19,11 +19,9 @@ from validate.errors import (
     SceneError,
     UsageError,
 )
-from validate.parameters import with_values
+from validate.parameters import with_given, with_values
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
-from validate.register.fitting import MarkerFit
 from validate.replay import (
-    body_mesh,
     compare,
     ladder_default,
     measured_drive,
@@ -31,31 +29,29 @@ from validate.replay import (
     measured_outline,
     measured_seen,
 )
-from validate.replay.body_mesh import body_of, gridded
+from validate.replay.body_mesh import mesh_of
 from validate.replay.experiment import Experiment
 from validate.replay.measured_body import solid
-from validate.replay.measured_cards import (
-    BodyRanges,
-    HeldAt,
-    MeasuredBody,
-    MovedBy,
-    SeenOf,
-    Solid,
-    Tissue,
-)
+from validate.replay.measured_cards import BodyRanges, MeasuredBody, SeenOf
+from validate.replay.tree import Tree
 from validate.report.body import _frame as drawn_frame
 from validate.report.loads import held
 from validate.report.markers import markers as drawn_markers
 from validate.report.observed import shown_loads
 from validate.report.registration import registration
 from validate.scene.box import box
+from validate.scene.geometry import Box, MeshFile
+from validate.scene.material import Material
 from validate.scene.mesh_file import write_mesh
 from validate.scene.named_place import axis_of, place_of, point_of
+from validate.scene.scene import Drive, Load, Scene, Support, Weight
 from validate.scene.select import facets_of
+from validate.scene.tracked import Prescribed
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
-ROLLERS = HeldAt(x="xmin", y="ymin", z="zmin")
+ROLLERS = (Support("xmin", (0,)), Support("ymin", (1,)), Support("zmin", (2,)))
+GRAVITY = Weight("gravity", "-z", G)
 PLACES = {"A": (0.04, 0.03, 0.05), "B": (0.0, 0.03, 0.04), "C": (0.04, 0.0, 0.02),
           "D": (0.04, 0.03, 0.03)}  # fmt: skip
 SD = 5e-6
@@ -84,18 +80,21 @@ def log() -> dict[str, Signal]:
     return dict(machine_log(T, d, force, 2e-3).signals)
 
 
-BASE = MeasuredBody(
-    "body.mcap", Solid(block=SIZE, cells=4), Tissue(E, NU, RHO), ROLLERS,
-    MovedBy("displacement", "zmax", "-z", sideways=False),
-    SeenOf(force="force", states=8, still=0.4),
+BASE = Tree(
+    "body.mcap",
+    Scene(Box(SIZE, (4, 4, 4), "hex8"), Material(E, NU, rho=RHO), ROLLERS,
+          drives=(Drive("displacement", "zmax", "-z"),), dilatation="by_element"),
+    MeasuredBody(SeenOf(force="force", states=8, still=0.4)),
 )  # fmt: skip
+FREE = BASE.with_scene(drives=())
+TETS = BASE.with_scene(body=Box(SIZE, (4, 4, 4)))
 
 
 def experiment(
-    folder: Path, parameters: MeasuredBody, seen: Recording, *names: str, order: int = 1
-) -> Experiment:
+    folder: Path, parameters: Tree, seen: Recording, *names: str
+) -> Experiment:  # fmt: skip
     limits = {"force": 0.1, "marker": 1e-4, "contour": 4e-4}
-    methods = {"linear": solid("linear", "linear", order)}
+    methods = {"linear": solid("linear", "linear")}
     return on_a_body(folder, parameters, seen, methods, {n: limits[n] for n in names})
 
 
@@ -112,7 +111,7 @@ def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
 
 def test_a_force_that_differs_has_likely_causes(tmp_path: Path) -> None:
     """Under a displacement it is the modulus: the given one is half of the true one."""
-    soft = replace(BASE, material=replace(BASE.material, E=E / 2))
+    soft = with_given(BASE, {"material.E": E / 2})
     result = compare(experiment(tmp_path, soft, recording(signals=log()), "force"))
     assert "Likely causes, in order: load or modulus" in result.sentence
     assert (
@@ -124,13 +123,13 @@ def test_a_force_that_differs_has_likely_causes(tmp_path: Path) -> None:
 def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> None:
     """States more than a second apart: the force was looked for at rest, where it is zero."""
     slow = {n: replace(s, t=20 * s.t) for n, s in log().items()}
-    p = replace(BASE, seen=replace(BASE.seen, still=8.0))
+    p = with_given(BASE, {"seen.still": 8.0})
     result = compare(experiment(tmp_path, p, recording(signals=slow), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
 
 def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> None:
-    open_ = replace(BASE, material=replace(BASE.material, E=None))
+    open_ = with_given(BASE, {"material.E": None})
     result = compare(experiment(tmp_path, open_, recording(signals=log()), "force"))
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.01)
@@ -149,7 +148,7 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
         signals=log(), markers={"markers": replace(seen, x=seen.x @ R.T + shift)},
         metadata={"marker_layout": layout},
     )  # fmt: skip
-    p = replace(BASE, seen=replace(BASE.seen, markers="markers", layout="recorded"))
+    p = with_given(BASE, {"seen.markers": "markers", "seen.layout": "recorded"})
     result = compare(experiment(tmp_path, p, both, "force", "marker"))
     assert set(verdicts(result).values()) == {"good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
@@ -174,7 +173,7 @@ def test_markers_as_seen_may_stand_anywhere(
     places: dict[str, tuple[float, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(f"{__name__}.PLACES", places)
-    p = replace(BASE, seen=replace(BASE.seen, markers="markers"))
+    p = with_given(BASE, {"seen.markers": "markers"})
     found = recording(signals=log(), markers={"markers": tracked(stretched)})
     result = compare(experiment(tmp_path, p, found, "marker"))
     assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"good enough"}
@@ -186,7 +185,7 @@ def test_a_single_marker_is_enough_in_the_body_s_own_frame(
 ) -> None:
     """Nothing is fitted there; a layout of its own needs four, and says what fewer may do."""
     monkeypatch.setattr(f"{__name__}.PLACES", {n: PLACES[n] for n in some})
-    p = replace(BASE, seen=replace(BASE.seen, markers="markers"))
+    p = with_given(BASE, {"seen.markers": "markers"})
     layout = {name: " ".join(map(repr, at)) for name, at in PLACES.items()}
     found = recording(
         signals=log(), markers={"markers": tracked(stretched)}, metadata={"marker_layout": layout}
@@ -198,10 +197,10 @@ def test_a_single_marker_is_enough_in_the_body_s_own_frame(
         "Nothing was fitted: the markers were recorded in the body's frame, as declared.",
     )
     assert shown.pictures == ()
-    laid = replace(p, seen=replace(p.seen, layout="recorded"))
+    laid = with_given(p, {"seen.layout": "recorded"})
     with pytest.raises(RegistrationError, match=rf"{len(some)} of its .* needs 4\. .*as seen"):
         compare(experiment(tmp_path, laid, found, "marker"))
-    fitted = replace(p, seen=replace(p.seen, registration=MarkerFit(robust=True)))
+    fitted = with_given(p, {"seen.registration.robust": True})
     with pytest.raises(UsageError, match="fits nothing"):
         compare(experiment(tmp_path, fitted, found, "marker"))
 
@@ -214,10 +213,11 @@ def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
         u[:, 2] = -RHO * G * (SIZE[2] * x[:, 2] - x[:, 2] ** 2 / 2) / E
         return u
 
-    p = replace(BASE, moved=MovedBy("gravity", None, "-z"), seen=SeenOf(markers="m", still=0.4),
-                material=replace(BASE.material, nu=0.0), ranges=BodyRanges(E=0.02))  # fmt: skip
+    body = replace(BASE.scene.body, element="hex27")
+    p = FREE.with_scene(body=body, loads=(GRAVITY,), material=Material(E, 0.0, rho=RHO))
+    p = p.with_settings(seen=SeenOf(markers="m", still=0.4), ranges=BodyRanges(E=0.02))
     seen = recording(markers={"m": tracked(sunk)})
-    result = compare(experiment(tmp_path, p, seen, "marker", order=2))
+    result = compare(experiment(tmp_path, p, seen, "marker"))
     assert verdicts(result) == {"marker.max@loaded": "good enough"}
     assert {s.name: s.value for s in result.methods[0].scores}["marker.rms@loaded"] < 2e-5
 
@@ -231,14 +231,13 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
     u[:, 2] = -1e-3 * x[:, 2] / SIZE[2]
     noise = np.random.default_rng(3).normal(0, SD, (len(T), *x.shape))
     seen = recording(markers={"m": Markers(T, names, x + share * u + noise, SD, "body")})
-    p = replace(
-        BASE, material=replace(BASE.material, nu=0.0), held=HeldAt(all="zmin"),
-        moved=MovedBy("markers", "zmax", markers=names[:3]),
-        seen=SeenOf(markers="m", states=8, still=0.4),
-    )  # fmt: skip
+    p = FREE.with_scene(
+        material=Material(E, 0.0), supports=(Support("zmin"),),
+        tracked=(Prescribed("moved", "zmax", labels=names[:3]),),
+    ).with_settings(seen=SeenOf(markers="m", states=8, still=0.4))  # fmt: skip
     result = compare(experiment(tmp_path, p, seen, "marker"))
     assert verdicts(result) == {"marker.max@low": "good enough", "marker.max@high": "good enough"}
-    short = replace(p, moved=MovedBy("markers", "zmax", markers=names[:2]))
+    short = p.with_scene(tracked=(Prescribed("moved", "zmax", labels=names[:2]),))
     with pytest.raises(UsageError, match="three or more are needed"):
         compare(experiment(tmp_path, short, seen, "marker"))
 
@@ -260,17 +259,17 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     contours = Contours(t, shapes, 2e-5, np.eye(4), "image")
     looks = SeenOf(outline="o", pose="fitted", image_x="+x", image_y="+z")
     known = replace(looks, pose="declared", origin=(0.0, 0.015, 0.0))
-    p = replace(BASE, seen=known)
+    p = TETS.with_settings(seen=known)
     seen = recording(signals=log(), contours={"o": contours})
     result = compare(experiment(tmp_path, p, seen, "contour"))
     assert verdicts(result) == {"contour.max@low": "good enough", "contour.max@high": "good enough"}
     aside = recording(signals=log(), contours={"o": replace(contours, outlines=tuple(
         s + np.array([0.3, -0.2]) for s in shapes))})  # fmt: skip
-    fitted = compare(experiment(tmp_path, replace(p, seen=looks), aside, "contour"))
+    fitted = compare(experiment(tmp_path, p.with_settings(seen=looks), aside, "contour"))
     assert set(verdicts(fitted).values()) == {"good enough"}
     assert any("was fitted" in note for note in fitted.notes)
     with pytest.raises(UsageError, match="two directions at right angles"):
-        compare(experiment(tmp_path, replace(p, seen=replace(p.seen, image_y="+x")), seen))
+        compare(experiment(tmp_path, with_given(p, {"seen.image_y": "+x"}), seen))
 
 
 @pytest.mark.slow
@@ -279,22 +278,22 @@ def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> N
     t = np.linspace(0.0, 2.0, 11)
     shapes = tuple(outline(float(v)) for v in np.interp(t, [0, 1, 2], [0, 0.4, 1.0]))
     looks = SeenOf(outline="o", pose="declared", image_y="+z", origin=(0.0, 0.015, 0.0))
-    by = MovedBy("noted", "zmax", "-z", sideways=False, noted=(0.0, 0.4e-3, 1e-3))
-    p = replace(BASE, moved=by, seen=looks)
+    p = TETS.with_scene(drives=(Drive("moved", "zmax", "-z"),))
+    p = p.with_settings(seen=looks, noted=(0.0, 0.4e-3, 1e-3))
     seen = recording(contours={"o": Contours(t, shapes, 2e-5, np.eye(4), "image")})
     names = {"contour.max@low": "good enough", "contour.max@high": "good enough"}
     assert verdicts(compare(experiment(tmp_path, p, seen, "contour"))) == names
-    twice = replace(p, moved=replace(by, noted=(0.0, 2e-3)))
+    twice = p.with_settings(noted=(0.0, 2e-3))
     found = verdicts(compare(experiment(tmp_path, twice, seen, "contour")))
     assert found["contour.max@high"] == "not good enough"
-    for noted in ((), (1e-3,), (1e-3, 1e-3)):
+    for noted in ((1e-3,), (1e-3, 1e-3)):
         with pytest.raises(UsageError, match="two different displacements"):
-            compare(experiment(tmp_path, replace(p, moved=replace(by, noted=noted)), seen))
+            compare(experiment(tmp_path, p.with_settings(noted=noted), seen))
 
 
 def test_a_mesh_file_is_found_beside_the_experiment(tmp_path: Path) -> None:
     write_mesh(box(SIZE, (2, 2, 2)), tmp_path / "body.npz")
-    p = replace(BASE, body=Solid("body.npz"))
+    p = BASE.with_scene(body=MeshFile("body.npz", element="linear"))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
@@ -330,15 +329,13 @@ def test_places_in_words() -> None:
 
 def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path) -> None:
     """A node at its edge stayed where none is in the middle, and all markers were off by that."""
-    for cells in (3, 4, 5):
-        p = replace(BASE, body=Solid(block=SIZE, cells=cells), held=HeldAt(slides="zmin"))
-        x = body_of(gridded(p).body, folder=tmp_path).nodes
-        assert np.isclose(x[:, :2], (0.02, 0.015)).all(axis=1).any()
     write_mesh(box(SIZE, (1, 1, 2)), tmp_path / "b.npz")
-    p = replace(BASE, body=Solid("b.npz"), held=HeldAt(slides="zmin"))
+    rests = (Support("zmin", (2,), rests=True),)
+    file = MeshFile("b.npz", element="linear")
+    p = BASE.with_scene(body=file, supports=rests)
     with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm away.*halvings=1"):
         compare(experiment(tmp_path, p, recording(signals=log()), "force"))
-    p = replace(p, body=Solid("b.npz", halvings=1))
+    p = p.with_scene(body=replace(file, halvings=1))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
@@ -350,49 +347,51 @@ def test_a_place_in_words_is_as_large_on_every_mesh_of_a_file(words: str, tmp_pa
     write_mesh(box(SIZE, (4, 4, 4)), tmp_path / "b.npz")
     areas = []
     for halvings in (0, 1):
-        mesh = body_of(Solid("b.npz", halvings=halvings), folder=tmp_path, places=(words,))
+        file = MeshFile("b.npz", halvings=halvings, element="linear")
+        p = BASE.with_scene(body=file, supports=(Support(words),))
+        mesh = mesh_of(p, tmp_path)
         a, b, c = np.moveaxis(mesh.nodes[facets_of(mesh, place_of(words, mesh))], 1, 0)[:3]
         areas.append(float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()))
     assert areas[0] == pytest.approx(areas[1], rel=1e-9)
 
 
 @pytest.mark.parametrize(("change", "error", "why"), [
-    ({"seen": SeenOf()}, ComparisonError, "no stream of the recording is compared"),
-    ({"moved": MovedBy("stage", "zmax")}, UsageError, "stage: no signal of that name"),
-    ({"moved": MovedBy("displacement")}, UsageError, "moved.place is not set"),
-    ({"moved": MovedBy("displacement", "lid")}, SceneError, "place 'lid': none of"),
-    ({"moved": MovedBy("gravity")}, ComparisonError, "moved.by = gravity is no signal in m"),
-    ({"body": Solid()}, UsageError, "body is given"),
-    ({"material": Tissue(None), "moved": MovedBy("gravity"), "seen": SeenOf(markers="m")},
-     UsageError, "an open modulus is identified on a force"),
+    (BASE.with_settings(seen=SeenOf()), ComparisonError, "no stream of the recording is compared"),
+    (BASE.with_scene(drives=(Drive("stage", "zmax", "-z"),)), UsageError,
+     "'stage' moves the body: no signal of that name"),
+    (BASE.with_scene(drives=(Drive("force", "zmax", "-z"),)), UsageError, "'force' .*: unit N; "),
+    (FREE, UsageError, "0 parts that move or load the body"),
+    (BASE.with_scene(loads=(Load("force", "zmax", "-z"),)), UsageError, "has 2 parts that move"),
+    (BASE.with_scene(drives=(Drive("displacement", "lid", "-z"),)), SceneError,
+     "place 'lid': none of"),
+    (FREE.with_scene(loads=(GRAVITY,)), ComparisonError, "'gravity' is none"),
+    (FREE.with_scene(loads=(GRAVITY,), material=Material(None, NU, rho=RHO)).with_settings(
+        seen=SeenOf(markers="m")), UsageError, "an open modulus is identified on a force"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(
-    tmp_path: Path, change: dict[str, Any], error: type[Exception], why: str
+    tmp_path: Path, change: Tree, error: type[Exception], why: str
 ) -> None:
     seen = recording(signals=log(), markers={"m": tracked(stretched)})
     with pytest.raises(error, match=why):
-        compare(experiment(tmp_path, replace(BASE, **change), seen, "force", "marker"))
+        compare(experiment(tmp_path, change, seen, "force", "marker"))
 
 
 def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
     """A frame whose z points down, or another axis up: 1 mm of rise instead of sag."""
-    p = replace(BASE, moved=MovedBy("gravity", None, "-z"), seen=SeenOf(markers="m", still=0.4))
+    p = FREE.with_scene(loads=(GRAVITY,)).with_settings(seen=SeenOf(markers="m", still=0.4))
     seen = recording(markers={"m": tracked(lambda x: np.array([0.0, 0.0, 0.02]) * x)})
-    with pytest.raises(RegistrationError, match=r"against -z, although 'gravity' acts along it"):
+    with pytest.raises(RegistrationError, match=r"against \(0, 0, -1\), although 'gravity' acts"):
         compare(experiment(tmp_path, p, seen, "marker"))
 
 
 def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path) -> None:
-    p = replace(BASE, held=HeldAt(slides="zmin"))
+    p = BASE.with_scene(supports=(Support("zmin", (2,), rests=True),))
     result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
     method = result.methods[0]
     x, u = method.scene.mesh.nodes, method.run.u[-1]
     widened = 0.3 * 0.02 * (x[:, :2] - (0.02, 0.015))  # nu, strain, from the middle
     assert np.allclose(u[:, :2], widened, rtol=0, atol=1e-8)
-    top = replace(BASE, held=HeldAt(all="zmin", slides="zmin+xmin"))
-    with pytest.raises(SceneError, match="be a plane normal to"):
-        compare(experiment(tmp_path, top, recording(signals=log()), "force"))
 
 
 def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None:
@@ -405,8 +404,6 @@ def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"body.file": "a.vtu", "body.block": "1mm,1mm,1mm"}, "2 are given: block"),
-        ({"body.block": "1mm,1mm"}, r"block \(0.001, 0.001\)"),
         ({"seen.states": "1"}, r"seen.states 1 \(2 to 500\)"),
         ({"seen.fit_to": "1"}, r"fit_to 1 \(between 0 and 1\)"),
         ({"seen.still": "-1s"}, r"still -1 s \(0 or above\)"),
@@ -417,12 +414,10 @@ def test_settings_of_a_body_that_cannot_be(change: dict[str, str], says: str) ->
         with_values(MeasuredBody(), change)
 
 
-def test_a_plane_mesh_is_no_body(monkeypatch: pytest.MonkeyPatch) -> None:
-    flat = SimpleNamespace(dimension=2, kind="tri3")
-    monkeypatch.setattr(body_mesh, "_meshed", lambda *_: flat)
-    card = SimpleNamespace(file="sheet.msh")
-    with pytest.raises(SceneError, match=r"sheet.msh: cells of tri3; expected 3-D cells"):
-        body_mesh.body_of(card, folder=Path())  # type: ignore[arg-type]
+def test_a_plane_mesh_is_no_body(tmp_path: Path) -> None:
+    write_mesh(box((1.0, 1.0), (2, 2)), tmp_path / "sheet.npz")
+    with pytest.raises(SceneError, match=r"cells of tri3; a measured body needs 3-D cells"):
+        mesh_of(FREE.with_scene(body=MeshFile("sheet.npz"), supports=()), tmp_path)
 
 
 def test_layouts_and_markers_that_are_not_given_are_requested(
@@ -437,7 +432,7 @@ def test_layouts_and_markers_that_are_not_given_are_requested(
         UsageError, match=r"seen.layout: .*; a layout must be complete: the columns of a table are"
     ):
         measured_markers._points_in(tmp_path / "a.csv")
-    none = SimpleNamespace(seen=SimpleNamespace(markers=""))
+    none = BASE.with_settings(seen=SeenOf())
     for names in ((), ("left", "right")):
         recording = SimpleNamespace(markers=dict.fromkeys(names))
         with pytest.raises(UsageError, match=r"seen.markers is not set; expected one of "):
@@ -446,11 +441,9 @@ def test_layouts_and_markers_that_are_not_given_are_requested(
     assert measured_markers.markers_topic(one, none) == "left"  # type: ignore[arg-type]
 
 
-def use(**seen: object) -> SimpleNamespace:
-    plain = {"force": None, "markers": None, "outline": None, "states": 4}
-    return SimpleNamespace(
-        seen=SimpleNamespace(**{**plain, **seen}), moved=SimpleNamespace(by=None)
-    )
+def use(**seen: str) -> Tree:
+    """A body that is moved as noted."""
+    return BASE.with_settings(seen=SeenOf(**seen, states=4), noted=(0.0, 1e-3))  # type: ignore[arg-type]
 
 
 def test_streams_that_are_not_there_or_share_no_time_are_refused() -> None:
@@ -460,7 +453,7 @@ def test_streams_that_are_not_there_or_share_no_time_are_refused() -> None:
     recording = SimpleNamespace(name="r", streams={"cell": stream(0, 1), "tip": stream(2, 3)})
     for seen, error, says in (
         ({"force": "load"}, UsageError, r"no stream \['load'\] in r; it has \['cell', 'tip'\]"),
-        ({}, ComparisonError, "no stream of the recording is used: set seen.* or moved.by"),
+        ({}, ComparisonError, r"no stream of the recording is used: set seen\.\*"),
         (
             {"force": "cell", "markers": "tip"}, ComparisonError,
             r"share no time \(latest start 2.000 s, earliest end 1.000 s\)",
@@ -504,10 +497,18 @@ def test_a_body_that_is_not_driven_or_cannot_be_squeezed_has_no_ladder(
     assert ladder_default._squeezable(own.scene)
 
 
-def moved_by(*names: str, noted: tuple[float, ...] = ()) -> SimpleNamespace:
-    seen = SimpleNamespace(markers="m", still=0.5, layout="a.fcsv", outline="o")
-    moved = SimpleNamespace(by="markers", markers=names, noted=noted, scale=1.0)
-    return SimpleNamespace(seen=seen, moved=moved)
+def moved_by(*names: str, noted: tuple[float, ...] = ()) -> Tree:
+    seen = SeenOf(markers="m", still=0.5, layout="a.fcsv", outline="o")
+    tracked = (Prescribed("moved", "x0", labels=names),) if names else ()
+    drives = () if names else BASE.scene.drives
+    p = BASE.with_scene(tracked=tracked, drives=drives)
+    return p.with_settings(seen=seen, noted=noted)
+
+
+def placed(recording: Any, *names: str) -> None:
+    p = moved_by(*names)
+    nothing: Any = None
+    measured_drive.placed_points(recording, p, p.scene.tracked[0], nothing)
 
 
 def test_a_place_that_markers_move_needs_three_that_are_tracked(
@@ -515,18 +516,18 @@ def test_a_place_that_markers_move_needs_three_that_are_tracked(
 ) -> None:
     recording = SimpleNamespace(marker=lambda topic: SimpleNamespace(names=("a", "b", "c", "d")))
     for names, says in (
-        ((), "moved.markers = none: three or more are needed; the recording has a, b, c, d"),
-        (("a", "b"), "moved.markers = a,b: three or more are needed"),
-        (("a", "b", "knee"), r"moved.markers = a,b,knee: \['knee'\] are not recorded"),
+        (("a",), "labels = a: three or more are needed; the recording has a, b, c, d"),
+        (("a", "b"), "tracked.moved.labels = a,b: three or more are needed"),
+        (("a", "b", "knee"), r"labels = a,b,knee: \['knee'\] are not recorded"),
     ):
         with pytest.raises(UsageError, match=says):
-            measured_drive.prescribed(recording, moved_by(*names), "x0", None)  # type: ignore[arg-type]
+            placed(recording, *names)
     at_rest = SimpleNamespace(names=("a", "b"), x=np.zeros((1, 2, 3)))
     monkeypatch.setattr(measured_drive, "registered", lambda *_: at_rest)
     with pytest.raises(
         RegistrationError, match=r"markers \['c'\] on the moved place are not visible at"
     ):
-        measured_drive.prescribed(recording, moved_by("a", "b", "c"), "x0", None)  # type: ignore[arg-type]
+        placed(recording, "a", "b", "c")
 
 
 def test_amounts_that_were_noted_differ_and_markers_that_drive_have_no_gaps(
@@ -534,7 +535,7 @@ def test_amounts_that_were_noted_differ_and_markers_that_drive_have_no_gaps(
 ) -> None:
     t = np.array([0.0, 1.0, 2.0])
     for noted in ((), (1e-3,), (1e-3, 1e-3)):
-        with pytest.raises(UsageError, match=r"moved.noted = .* two different displacements"):
+        with pytest.raises(UsageError, match=r"noted = .* two different displacements"):
             measured_drive._noted(moved_by(noted=noted), t)  # type: ignore[arg-type]
     found = measured_drive._noted(moved_by(noted=(1e-3, 3e-3)), t)  # type: ignore[arg-type]
     assert found.y[:, 0] == pytest.approx([0.0, 1e-3, 2e-3])

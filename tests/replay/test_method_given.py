@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from machine_logs import machine_log, pressed_cylinder
 
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
@@ -19,8 +20,8 @@ from validate.replay import (
     refined,
     remade,
 )
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import Compression, CompressionRanges, Gel, Specimen
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression, CompressionRanges
 from validate.replay.experiment import Variant
 from validate.replay.find import _executed, load_file
 from validate.replay.followed import Followed
@@ -33,7 +34,10 @@ from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.material_point import Meshless
+from validate.solve.fluid import NoFluid
 from validate.solve.newmark import Newmark
+from validate.solve.newton import StaticNewton
+from validate.solve.tabulated import Tabulated
 
 
 @pytest.mark.parametrize("stride", [1, 3])
@@ -42,19 +46,25 @@ def test_a_long_step_is_so_many_of_the_recordings(stride: int) -> None:
 
 
 def test_a_wider_specimen_is_as_much_stiffer_as_its_area_is_larger() -> None:
-    card = Compression(material=Gel(E=10e3), ranges=CompressionRanges(diameter=0.1))
-    methods = {"slip": pressed("slip")}
+    settings = Compression(ranges=CompressionRanges(diameter=0.1))
+    card = pressed_cylinder(None, None, 10e3, settings=settings)
+    methods = {"slip": Method("slip", NoFluid())}
     made = compression("c", "", "", card, methods, ("slip",), (Accept("force", 1.0, ""),))
     assert made.uncertainty is not None
-    inputs = {i.name: i.by(1.0)(card).material.E for i in made.uncertainty.inputs}
+    inputs = {i.name: i.by(1.0)(card).scene.material.E for i in made.uncertainty.inputs}
     assert inputs["diameter"] == pytest.approx(10e3 * 1.1**2)
     assert inputs["modulus"] == pytest.approx(10e3 * 1.05)
 
 
 def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
-    bare = Compression(specimen=Specimen(diameter=0.03, height=0.02), material=Gel(E=10e3))
+    bare = pressed_cylinder(0.03, 0.02, 10e3)
+    bare = bare.with_scene(material=bare.scene.material.of_law("mooney_rivlin"))
     card = with_values(bare, {"material.C01": "500"})
-    methods = {"slip": pressed("slip"), "soft": pressed("mooney", law="mooney_rivlin")}
+    table = Tabulated(StaticNewton("none"))
+    methods = {
+        "slip": Method("slip", NoFluid(), {"material.law": "linear"}),
+        "soft": Method("mooney", table),
+    }
     made = compression("c", "", "", card, methods, ("slip",), (Accept("force", 1.0, ""),))
     recording = Recording("r", Source("x", "", 0, "x"), 0)
     scenes = {n: made.build(recording, card, m.scene) for n, m in methods.items()}
@@ -64,6 +74,18 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
     assert made.identify((), card, methods).parameters == card
     with pytest.raises(UsageError, match=r"material.C01 = 500.0: no method .* only linear; set"):
         made.identify((), card, {"slip": methods["slip"]})
+
+
+def test_one_model_of_two_materials_has_no_modulus_of_its_own() -> None:
+    card = pressed_cylinder(0.03, 0.02)
+    stiff = {"material.nu": 0.4}
+    methods = {"slip": Method("slip", NoFluid()), "other": Method("other", NoFluid(), stiff)}
+    made = compression("c", "", "", card, methods, ("slip",), (Accept("force", 1.0, ""),))
+    t = np.linspace(0.0, 10.0, 101)
+    seen = machine_log(t, 2e-4 * t, t)
+    assert made.identify is not None
+    with pytest.raises(UsageError, match=r"other: another material .* set methods\.other"):
+        made.identify((seen,), card, methods)
 
 
 def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> None:

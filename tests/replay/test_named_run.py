@@ -8,9 +8,13 @@ from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.replay.experiment import Experiment
 from validate.replay.find import find
-from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid
+from validate.replay.measured_cards import MeasuredBody, SeenOf
 from validate.replay.named_run import run_folder, run_name, tag
 from validate.replay.options import Options, folder_of, mesh_files
+from validate.replay.tree import Tree
+from validate.scene.geometry import MeshFile
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
 
 def name(experiment: Experiment, *, quick: bool = False, methods: str = "", **values: str) -> str:
@@ -80,6 +84,7 @@ def test_files_of_a_measured_body_lie_beside_the_experiment(tmp_path: Path) -> N
     for name in ("more.inc", "b c.inc", "points.fcsv"):
         (tmp_path / name).write_text("1\n")
     (tmp_path / "more.inc").write_text("1, 0., 0., 0.\n")
-    p = MeasuredBody(body=Solid("deck.INP"), seen=SeenOf(layout="points.fcsv"))
+    scene = Scene(MeshFile("deck.INP"), Material(1.0, 0.3))
+    p = Tree("", scene, MeasuredBody(SeenOf(layout="points.fcsv")))
     found = {f.name for f in mesh_files(p, tmp_path)}
     assert found == {"deck.INP", "nodes.inc", "more.inc", "b c.inc", "points.fcsv"}

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from machine_logs import pressed_cylinder
 
 from validate.parameters import describe
-from validate.replay.compression_cards import Specimen
 from validate.replay.pressed import pressed_log
 from validate.replay.refined import Refined
 
@@ -44,6 +44,5 @@ def test_what_is_rounding_is_the_larger_of_two_bounds() -> None:
 
 
 def test_both_sizes_of_a_specimen_are_asked_for() -> None:
-    asked = {p.path: p.asked for p in describe(Specimen())}
-    assert asked == {"diameter": True, "height": True, "mesh": False, "mesh_unit": False,
-                     "fluid": False}  # fmt: skip
+    asked = {p.path for p in describe(pressed_cylinder(None, None)) if p.asked}
+    assert asked == {"body.diameter", "body.height"}

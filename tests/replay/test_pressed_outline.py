@@ -8,30 +8,31 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from machine_logs import pressed_cylinder
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult
 from validate.errors import ComparisonError, RegistrationError, SceneError, UsageError
+from validate.fem.system import build as build_system
 from validate.recording.types import Contours, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay import compare
-from validate.replay.compression import compression, pressed
-from validate.replay.compression_cards import (
-    Compression,
-    CylinderGrid,
-    Gel,
-    PressedOutline,
-    Specimen,
-)
+from validate.replay.compression import compression
+from validate.replay.compression_cards import Compression, PressedOutline
 from validate.replay.experiment import Experiment, Uncertainty
-from validate.replay.pressed_outline import with_outline, with_surface
+from validate.replay.method import Method
+from validate.replay.pressed_outline import with_outline
+from validate.replay.tree import Tree
 from validate.scene.cylinder import whole_cylinder
+from validate.scene.geometry import MeshFile
 from validate.scene.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_file import write_mesh
+from validate.scene.scene import Cavity, Drive
+from validate.solve.fluid import ExactPressure, NoFluid
 
 T = np.linspace(0.0, 10.0, 51)
 D, H = 0.02, 0.03
@@ -70,7 +71,7 @@ def log() -> Registered:
 
 @pytest.fixture(scope="module")
 def body() -> Mesh:
-    return with_surface(whole_cylinder(D, H, 2, 2))
+    return whole_cylinder(D, H, 2, 2)
 
 
 def registered(body: Mesh, card: PressedOutline = PLACE, **made: object) -> Registered:
@@ -128,24 +129,39 @@ def test_outlines_of_what_the_model_does_not_have_are_refused(body: Mesh) -> Non
         registered(body, start=30.0)
 
 
-def experiment(card: Compression, *, fluid: bool = False) -> Experiment:
-    method = pressed("linear", order=1, fluid=fluid)
-    return compression("gel", "gel", "gel.mcap", card, {"slip": method}, ("slip",), ())
+def experiment(card: Tree, folder: Path = Path(), *, fluid: bool = False) -> Experiment:
+    methods = {"slip": Method("linear", ExactPressure() if fluid else NoFluid())}
+    return compression("gel", "gel", "gel.mcap", card, methods, ("slip",), (), folder=folder)
 
 
 def test_outlines_named_after_the_declaration_are_refused(body: Mesh) -> None:
-    card = Compression(specimen=Specimen(D, H), mesh=CylinderGrid(2, 2))
-    late = replace(card, outline=PLACE)
+    card = pressed_cylinder(D, H, cells=(2, 2), element="tet4")
+    late = replace(card, settings=Compression(outline=PLACE))
     one = experiment(card)
     with pytest.raises(UsageError, match="name the topic there"):
         one.place(recorded(), late, one.build(recorded(), late, one.methods["slip"].scene))
 
 
+def test_outlines_show_all_of_the_body() -> None:
+    card = pressed_cylinder(D, H, settings=Compression(outline=PLACE))
+    with pytest.raises(UsageError, match=r"body\.part: .* not a quarter; declare part='whole'"):
+        experiment(card)
+
+
+def test_a_scene_that_no_plate_presses_is_refused() -> None:
+    card = pressed_cylinder(D, H)
+    for drives in ((), (Drive("stage", "upper_plate", (1.0, 0.0, 0.0)),)):
+        with pytest.raises(UsageError, match=r'drives: .* declare Drive\("stage", "upper_plate"'):
+            experiment(card.with_scene(drives=drives))
+
+
 def test_fluid_in_a_body_wants_its_modulus_and_the_linear_law() -> None:
-    with pytest.raises(UsageError, match="fluid needs the linear law, not svk"):
-        pressed("x", law="svk", fluid=True)
-    card = Compression(specimen=Specimen(D, H, fluid="wall"), material=Gel())
+    card = pressed_cylinder(D, H).with_scene(cavities=(Cavity("inclusion", "wall"),))
     one = experiment(card, fluid=True)
+    svk = pressed_cylinder(D, H, 1e4)
+    svk = svk.with_scene(material=svk.scene.material.of_law("svk"))
+    with pytest.raises(SceneError, match="ExactPressure cannot solve the law 'svk'"):
+        one.methods["slip"].settings.prepare(build_system(one.build(recorded(), svk, None)))
     assert one.identify is not None
     with pytest.raises(UsageError, match=r"material\.E is not set: a body with fluid inside"):
         one.identify((recorded(),), card, one.methods)
@@ -163,16 +179,18 @@ def cyst(path: Path) -> None:
 def test_an_inclusions_wall_of_a_mesh_file_is_judged_with_its_fluid(tmp_path: Path) -> None:
     """Outlines of the fluid-filled model itself: it reads them again, an empty one does not."""
     cyst(tmp_path / "cyst.npz")
-    sized = Specimen(0.05, 0.036, mesh=str(tmp_path / "cyst.npz"), fluid="wall")
     place = replace(PLACE, surface="wall", holds=2)
-    card = Compression(specimen=sized, material=Gel(E=10e3, nu=0.48), outline=place,
-                       fit_to=0.02, limit=0.05)  # fmt: skip
+    settings = Compression(outline=place, fit_to=0.02, limit=0.05)
+    card = pressed_cylinder(None, None, 10e3, 0.48, element="tet4", whole=True, settings=settings)
+    card = card.with_scene(
+        body=MeshFile("cyst.npz", element="linear"), cavities=(Cavity("inclusion", "wall"),)
+    )
 
     def judged(outline: Callable[[float], Floats], *, fluid: bool) -> MethodResult:
         made = recorded(outline)
         return compare(
             replace(
-                experiment(card, fluid=fluid),
+                experiment(card, tmp_path, fluid=fluid),
                 uncertainty=Uncertainty(),
                 load=lambda p, folder: (made,),
                 path=tmp_path / "gel.py",

@@ -12,7 +12,6 @@ from validate.errors import UsageError
 from validate.parameters import Parameter, describe
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
-from validate.replay.law_solver import laws_of
 from validate.replay.options import Options, configure
 
 FILES = sorted(experiment_files(Path(__file__).resolve().parents[2]).values(), key=name_of)
@@ -43,16 +42,9 @@ def changes(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:
             value = getattr(method, part)
             fields = describe(value) if is_dataclass(value) else ()
             usable = [(p.path, other(p)) for p in fields if "tuple" not in p.type]
-            if part == "scene":  # of the laws, those that the method's scheme solves
-                usable = [u for u in usable if u[0] != "law"] + _other_law(method)
             numbers = [(path, text) for path, text in usable if text is not None]
             for path, text in numbers[:1]:
                 yield name, part, path, text
-
-
-def _other_law(method: Any) -> list[tuple[str, str | None]]:
-    laws = [law for law in laws_of(method) or () if law != method.scene.law]
-    return [("law", law) for law in laws[:1]]
 
 
 def found(experiment: Experiment, values: dict[str, str]) -> dict[str, Any]:

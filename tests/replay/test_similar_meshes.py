@@ -1,6 +1,5 @@
 """Mesh families: every refinement scales every direction by the same factor."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,22 +8,21 @@ import pytest
 
 from validate.arrays import Floats
 from validate.catalogue import experiment_files
-from validate.errors import UsageError
+from validate.cli.new_scene import geometry_of
 from validate.fem.system import build
 from validate.parameters import describe, with_values
 from validate.recording.types import Recording, Source
 from validate.replay import cost, load
-from validate.replay.body_mesh import body_of, gridded, unknowns_of
+from validate.replay.body_mesh import mesh_of, unknowns_of
+from validate.replay.cards import Meshes
 from validate.replay.cost import fits
 from validate.replay.measured_body import measured_body, solid, static_scene
-from validate.replay.measured_cards import (
-    HeldAt,
-    MeasuredBody,
-    MovedBy,
-    Solid,
-    SolidModel,
-    Tissue,
-)
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.solid_model import model_of
+from validate.replay.tree import Tree
+from validate.scene.geometry import Box
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
 from validate.scene.similar_grids import divided, fitting, member, similarity
 from validate.solve.quasi_static import QuasiStatic
 
@@ -41,22 +39,38 @@ OPEN = {
 }
 
 
-def family(p: MeasuredBody) -> list[tuple[int, ...]]:
+def declared(cells: int = 6, *, budget: bool = True, **answers: str) -> Tree:
+    """A body as answers make it, on a plate that it rests on where one `slides`."""
+    slides = answers.pop("slides", "")
+    said = {f"body.{name}": text for name, text in answers.items()}
+    said |= {"body.shape": next(iter(answers)), "held.slides": slides}
+    supports = (Support("zmin", (2,), rests=True),) if slides else (Support("zmin"),)
+    drives = (Drive("load", "zmax", "-z"),)
+    scene = Scene(geometry_of(said, cells, 2), Material(1e4, 0.4999), supports, drives=drives,
+                  dilatation="by_element")  # fmt: skip
+    return Tree("", scene, MeasuredBody(noted=(0.0, 1e-3), mesh=Meshes(budget=budget)))
+
+
+def text(size: tuple[float, ...]) -> str:
+    return ",".join(map(str, size))
+
+
+def family(p: Tree) -> list[tuple[int, ...]]:
     """Cells per axis of the nominal mesh and of every level."""
     made = measured_body("b", "b", "x", p, {"m": solid("m")}, ("m",), (), Path())
     assert made.uncertainty is not None
     assert made.uncertainty.mesh is not None
-    levels = [level(p).body.divisions for level in made.uncertainty.mesh.levels]
-    return [gridded(p).body.divisions, *levels]
+    levels = [level(p).scene.body.cells for level in made.uncertainty.mesh.levels]
+    return [p.scene.body.cells, *levels]
 
 
 @pytest.mark.parametrize("size", [PAD, BAR, BRICK])
 @pytest.mark.parametrize("cells", [4, 5, 6, 8, 10, 12])
-@pytest.mark.parametrize("slides", [None, "zmin"])
+@pytest.mark.parametrize("slides", ["", "zmin"])
 def test_every_grid_of_a_block_is_similar_to_the_nominal_one(
-    size: tuple[float, ...], cells: int, slides: str | None
+    size: tuple[float, ...], cells: int, slides: str
 ) -> None:
-    p = MeasuredBody(body=Solid(block=size, cells=cells, budget=False), held=HeldAt(slides=slides))
+    p = declared(cells, budget=False, block=text(size), slides=slides)
     nominal, *levels = family(p)
     across = 2 * max(size) / min(size) / 2  # cells twice as long as they are thick
     assert max(nominal) == pytest.approx(max(cells, across), abs=2)
@@ -70,29 +84,24 @@ def test_every_grid_of_a_block_is_similar_to_the_nominal_one(
 
 @pytest.mark.parametrize("cells", [4, 6, 7, 9])
 def test_every_grid_of_a_cylinder_is_similar(cells: int) -> None:
-    nominal, *levels = family(MeasuredBody(body=Solid(cylinder=(0.03, 0.04), cells=cells)))
+    nominal, *levels = family(declared(cells, cylinder="0.03,0.04"))
     assert {round(similarity(nominal, grid), 12) for grid in levels} == {1.0}
     assert len({nominal, *levels}) >= 3
 
 
 def test_the_grids_of_the_issue() -> None:
-    assert family(MeasuredBody(body=Solid(block=PAD))) == [
+    assert family(declared(block=text(PAD))) == [
         (6, 6, 2), (3, 3, 1), (3, 3, 1), (9, 9, 3)
     ]  # fmt: skip
-    assert family(MeasuredBody(body=Solid(block=BAR))) == [
+    assert family(declared(block=text(BAR))) == [
         (6, 3, 3), (2, 1, 1), (4, 2, 2), (8, 4, 4)
     ]  # fmt: skip
 
 
-def test_divisions_that_are_given_are_kept_and_refined_alike(tmp_path: Path) -> None:
-    p = MeasuredBody(body=Solid(block=PAD, divisions=(8, 8, 4)))
+def test_cells_that_are_given_are_kept_and_refined_alike(tmp_path: Path) -> None:
+    p = declared(block=text(PAD)).with_scene(body=Box(PAD, (8, 8, 4), "hex8"))
     assert family(p) == [(8, 8, 4), (4, 4, 2), (6, 6, 3), (12, 12, 6)]
-    assert len(body_of(p.body, folder=tmp_path).nodes) == 9 * 9 * 5
-    for wrong in ((8, 8), (8, 8, 0)):
-        with pytest.raises(UsageError, match="3 positive numbers of cells"):
-            Solid(block=PAD, divisions=wrong)
-    with pytest.raises(UsageError, match="a mesh file: none"):
-        Solid(file="x.npz", divisions=(1, 1, 1))
+    assert len(mesh_of(p, tmp_path).nodes) == 9 * 9 * 5
 
 
 def test_a_grid_that_does_not_fit_into_the_memory_is_replaced_by_a_coarser_similar_one(
@@ -108,26 +117,28 @@ def test_a_grid_that_does_not_fit_into_the_memory_is_replaced_by_a_coarser_simil
     assert similarity((12, 12, 6), smaller) == 1.0
     monkeypatch.setattr(cost, "free_memory", lambda: 1.0)
     assert fitting((12, 12, 6), in_memory) == (2, 2, 1)
-    p = MeasuredBody(body=Solid(cylinder=(0.03, 0.04), cells=6))
+    p = declared(cylinder="0.03,0.04")
     assert min(family(p)[1:]) == family(p)[-1]
 
 
 def test_a_grid_too_slow_for_a_first_answer_waits_for_refine() -> None:
-    quick = MeasuredBody(body=Solid(block=BRICK, cells=20))
-    whole = replace(quick, body=replace(quick.body, budget=False))
+    quick = declared(20, block=text(BRICK))
+    whole = quick.with_settings(mesh=Meshes(budget=False))
     assert np.prod(family(quick)[-1]) < np.prod(family(whole)[-1])
     assert family(quick)[0] == family(whole)[0]
 
 
 @pytest.mark.parametrize("body", [
-    Solid(block=(0.1, 0.01, 0.01)), Solid(block=(0.05, 0.05, 0.001)), Solid(cylinder=(0.01, 0.1)),
+    {"block": "0.1,0.01,0.01"}, {"block": "0.05,0.05,0.001"}, {"cylinder": "0.01,0.1"},
 ])  # fmt: skip
-def test_a_slender_or_thin_body_has_two_cells_across_and_stays_small(body: Solid) -> None:
-    grid = gridded(MeasuredBody(body=body)).body.divisions
+def test_a_slender_or_thin_body_has_two_cells_across_and_stays_small(body: dict[str, str]) -> None:
+    p = declared(**body)
+    grid = p.scene.body.cells
     assert min(grid) >= 2
-    lengths = body.block or (body.cylinder[0] / 2, body.cylinder[1])
+    sides = [float(part) for part in next(iter(body.values())).split(",")]
+    lengths = sides if len(sides) == 3 else (sides[0] / 2, sides[1])
     edges = np.array(lengths) / grid
-    unknowns = unknowns_of(MeasuredBody(body=body), 2, Path())
+    unknowns = unknowns_of(p, 2, Path())
     assert unknowns < 1.6e4
     assert edges.max() / edges.min() < 2.5 or unknowns > 6e3
 
@@ -207,15 +218,14 @@ def test_a_bonded_pad_that_keeps_its_volume_does_not_lock() -> None:
     """Its force on the nominal grid is that of one twice as fine within 4 %; without the mixed
     dilatation it is far stiffer."""
 
-    def force(divisions: tuple[int, ...], order: Literal[1, 2]) -> float:
-        p = MeasuredBody(
-            body=Solid(block=PAD, divisions=divisions), material=Tissue(E=1e4, nu=0.4999),
-            held=HeldAt(all="zmin"), moved=MovedBy("noted", "zmax", noted=(0.0, 1e-3)),
-        )  # fmt: skip
+    def force(cells: tuple[int, ...], order: Literal[1, 2]) -> float:
+        element: Any = "hex27" if order == 2 else "hex8"
+        p = declared(block=text(PAD)).with_scene(body=Box(PAD, cells, element))
+        across = (Support("zmin"), Support("zmax", (0, 1)))
         nothing = Recording("log", Source("x", "", 0, "x"), 0)
-        scene = static_scene(nothing, p, SolidModel("linear", order), Path())
+        scene = static_scene(nothing, p.with_scene(supports=across), model_of("linear"), Path())
         stepper = QuasiStatic().prepare(build(scene))
-        return stepper.step(stepper.rest(), np.array([1e-3])).numbers["moved.force"]
+        return stepper.step(stepper.rest(), np.array([1e-3])).numbers["load.force"]
 
     converged = force((12, 12, 4), 2)
     assert force((6, 6, 2), 2) == pytest.approx(converged, rel=0.04)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from test_measured_body import (
     BASE,
+    FREE,
     PLACES,
     SIZE,
     E,
@@ -23,11 +24,11 @@ from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay import compare
-from validate.replay.measured_cards import BodyRanges, HeldAt, MovedBy, SeenOf
+from validate.replay.measured_cards import BodyRanges, SeenOf
 from validate.replay.uncertain_drives import drive_inputs
 from validate.scene.box import box
 from validate.scene.material import Material
-from validate.scene.scene import Scene, Support
+from validate.scene.scene import Load, Scene, Support
 from validate.scene.tracked import Prescribed
 
 SD = 2e-5
@@ -42,9 +43,9 @@ def noisy(sd: float) -> dict[str, Signal]:
 
 def test_the_sd_of_a_displacement_is_sd_times_stiffness(tmp_path: Path) -> None:
     """u_input = sd dF/du, and the mean of the samples at rest, from which it is counted."""
-    p = replace(BASE, ranges=SURE)
+    p = BASE.with_settings(ranges=SURE)
     result = compare(experiment(tmp_path, p, recording(signals=noisy(SD)), "force"))
-    zeroed = SD * np.sqrt(1 + 1 / int((p.seen.still >= T).sum()))
+    zeroed = SD * np.sqrt(1 + 1 / int((p.settings.seen.still >= T).sum()))
     assert [i.name for i in result.inputs][-1] == "sd of displacement"
     assert result.inputs[-1].source == "recorded"
     for check in result.checks:
@@ -69,8 +70,8 @@ def test_a_force_that_pulls(tmp_path: Path) -> None:
     x = np.array(list(PLACES.values()))
     share = np.clip((T - 0.5) / 3.0, 0, 1)[:, None, None]
     seen = Markers(T, tuple(PLACES), x + share * stretched(x), 1e-6, "body")
-    moved = MovedBy("force", "zmax", "-z")
-    p = replace(BASE, moved=moved, seen=SeenOf(markers="m", states=9, still=0.4), ranges=SURE)
+    p = FREE.with_scene(loads=(Load("force", "zmax", "-z"),))
+    p = p.with_settings(seen=SeenOf(markers="m", states=9, still=0.4), ranges=SURE)
     result = compare(
         experiment(tmp_path, p, recording(signals={"force": pull}, markers={"m": seen}), "marker")
     )
@@ -127,11 +128,10 @@ def test_markers_that_move_a_body(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     markers = Markers(T, tuple(places), x + share * u + rng.normal(0, SD, (len(T), *x.shape)), SD,
                       "body")  # fmt: skip
-    p = replace(
-        BASE, material=replace(BASE.material, nu=0.0), held=HeldAt(all="zmin"),
-        moved=MovedBy("markers", "zmax", markers=tuple(corners)),
-        seen=SeenOf(markers="m", states=6, still=0.4), ranges=SURE,
-    )  # fmt: skip
+    p = FREE.with_scene(
+        material=Material(E, 0.0), supports=(Support("zmin"),),
+        tracked=(Prescribed("moved", "zmax", labels=tuple(corners)),),
+    ).with_settings(seen=SeenOf(markers="m", states=6, still=0.4), ranges=SURE)  # fmt: skip
     made = experiment(tmp_path, p, recording(markers={"m": markers}), "marker")
     result = compare(replace(made, accept=(Accept("marker", 1e-4, "of a test"),)))
     drive = result.methods[0].registered[0].drives[0]

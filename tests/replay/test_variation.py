@@ -1,6 +1,7 @@
 """Variations: one meaning of a path and a rule, over all experiments."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -9,12 +10,28 @@ from hypothesis import strategies as st
 from validate.catalogue import experiment_files
 from validate.errors import UsageError
 from validate.parameters import describe, value_at
+from validate.replay.cards import TrackedTwin
 from validate.replay.experiment import Case, vary
 from validate.replay.find import load_file
-from validate.replay.measured_cards import MeasuredBody, Tissue
+from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 from validate.replay.variation import Shift, change_of
+from validate.scene.contact import RigidContact
+from validate.scene.geometry import Box
+from validate.scene.indenter import Indenter
+from validate.scene.material import Material
+from validate.scene.scene import Scene
 
-BODY = MeasuredBody(material=Tissue(E=10e3, nu=0.45))
+
+def of(material: Material) -> Tree:
+    """A block that an indenter presses."""
+    shape: Any = Indenter("sphere", 5e-3)
+    pressed = RigidContact("stage", "zmax", shape, (0.0, 0.0, -1.0))
+    body = Box((0.03,) * 3, (6, 6, 6), "hex8")
+    return Tree("", Scene(body, material, contacts=(pressed,)), MeasuredBody())
+
+
+BODY, GAP = of(Material(10e3, 0.45)), "contacts.stage.shape.gap"
 ROOT3 = 3**0.5
 SHIPPED = sorted(experiment_files(Path(__file__).parents[2]).items())
 
@@ -22,45 +39,47 @@ SHIPPED = sorted(experiment_files(Path(__file__).parents[2]).items())
 @given(z=st.floats(-ROOT3, ROOT3), share=st.floats(0.0, 0.5))
 def test_a_relative_uncertainty_is_a_share_of_the_value(z: float, share: float) -> None:
     moved = Shift(("material.E",), f"relative {100 * share} %")(BODY, z)
-    assert pytest.approx(10e3 * (1 + z * share), rel=1e-12) == moved.material.E
+    assert pytest.approx(10e3 * (1 + z * share), rel=1e-12) == moved.scene.material.E
 
 
 @given(z=st.floats(-ROOT3, ROOT3), sd=st.floats(1e-5, 0.1), nu=st.floats(0.0, 0.4999))
 def test_no_input_passes_its_bound_and_one_uncertainty_stays_one(
     z: float, sd: float, nu: float
 ) -> None:
-    body = MeasuredBody(material=Tissue(E=1.0, nu=nu))
+    body = of(Material(1.0, nu))
     rule = Shift(("material.nu",), f"absolute {sd!r}, below 0.5")
-    assert rule(body, z).material.nu <= 0.4999
-    assert abs(rule(body, 1.0).material.nu - nu) == pytest.approx(sd, abs=1e-12)
+    assert rule(body, z).scene.material.nu <= 0.4999
+    assert abs(rule(body, 1.0).scene.material.nu - nu) == pytest.approx(sd, abs=1e-12)
 
 
 @pytest.mark.parametrize(
     ("bound", "moved"), [("below 0.5", 0.47), ("at most 0.5", 0.5), ("at least 0.5", 0.51)]
 )
 def test_a_bound_turns_a_value_round_or_stops_it(bound: str, moved: float) -> None:
-    body = MeasuredBody(material=Tissue(E=1.0, nu=0.49))
-    at = Shift(("material.nu",), f"absolute 0.02, {bound}")(body, 1.0).material.nu
+    path = "contacts.stage.friction"
+    body = change_of({path: 0.49})(BODY)
+    at = value_at(Shift((path,), f"absolute 0.02, {bound}")(body, 1.0), path)[0]
     assert at == pytest.approx(moved, abs=1e-12)
 
 
 def test_an_amount_has_a_unit_or_is_another_parameter() -> None:
     by_path = Shift(("material.E",), "relative ranges.E")
-    assert pytest.approx(10e3 * 1.05) == by_path(BODY, 1.0).material.E
-    assert Shift(("indenter.gap",), "absolute 1 mm")(BODY, 2.0).indenter.gap == pytest.approx(2e-3)
+    assert pytest.approx(10e3 * 1.05) == by_path(BODY, 1.0).scene.material.E
+    moved = Shift((GAP,), "absolute 1 mm")(BODY, 2.0)
+    assert moved.scene.contacts[0].shape.gap == pytest.approx(2e-3)
     for wrong in ("absolute 1 kPa", "absolute 1 mm, under 3", "twice", "relative"):
-        with pytest.raises(UsageError, match=r"indenter\.gap"):
-            Shift(("indenter.gap",), wrong)(BODY, 1.0)
+        with pytest.raises(UsageError, match=r"shape\.gap"):
+            Shift((GAP,), wrong)(BODY, 1.0)
 
 
 def test_values_by_path_are_texts_with_units_numbers_factors_and_steps() -> None:
-    change = change_of({"material.E": "x 1.5", "body.cells": "+ 2", "body.block": "1cm,2cm,30mm",
+    change = change_of({"material.E": "x 1.5", "seen.states": "+ 2", "body.size": "1cm,2cm,30mm",
                         "material.nu": 0.3})  # fmt: skip
     changed = change(BODY)
-    assert (changed.material.E, changed.body.cells) == (15e3, 8)
-    assert (changed.body.block, changed.material.nu) == ((0.01, 0.02, 0.03), 0.3)
-    one = change_of({"body.cells": 1})(BODY)
-    assert [change_of({"body.cells": by})(one).body.cells for by in ("- 1", "x 0.3")] == [3, 1]
+    assert (changed.scene.material.E, changed.settings.seen.states) == (15e3, 32)
+    assert (changed.scene.body.size, changed.scene.material.nu) == ((0.01, 0.02, 0.03), 0.3)
+    one = TrackedTwin(every=1)
+    assert [change_of({"every": by})(one).every for by in ("- 1", "x 0.3")] == [3, 1]
     assert Case("a", "b", {}).change(BODY) is BODY
     with pytest.raises(UsageError, match=r"nearest: material\.nu"):
         change_of({"material.mu": 1.0})(BODY)

@@ -262,7 +262,7 @@ def test_the_command_asks_for_the_unit_and_writes_what_experiments_take(tmp_path
     assert shown.exit_code == 0, shown.output
     assert "10 x 20 x 30 mm" in shown.output
     assert set(read_mesh(tmp_path / "b.npz").facets) == {"plate", "label 8"}
-    with pytest.raises(SceneError, match=r"no unit of length; .*mesh_unit or body.unit=mm"):
+    with pytest.raises(SceneError, match=r"no unit of length; give it: body\.unit=mm"):
         read_mesh(path)
     pv.Icosphere().save(tmp_path / "s.stl")
     odd = run.invoke(cli, ["body", str(path), "--unit", "mm", "--edge", "2mm"])

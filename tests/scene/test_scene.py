@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from validate.scene.box import box
 from validate.scene.geometry import Box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
-from validate.scene.scene import Cavity, Drive, Foundation, Scene, Support
+from validate.scene.scene import Cavity, Drive, Foundation, Pin, Scene, Support
 from validate.scene.select import Chosen, Nearest
 from validate.scene.tool import Needle, require_usable
 from validate.solve.entry import Surface
@@ -113,3 +114,13 @@ def test_what_rests_on_a_plate_keeps_its_middle_and_does_not_turn() -> None:
         declared.resolved(aside)
     with pytest.raises(SceneError, match="rests on z0 along one axis"):
         replace(declared, supports=(Support("z0", rests=True),)).resolved(scene.mesh)
+
+
+@pytest.mark.parametrize("part", [
+    {"supports": (Support("z0", (3,)),)}, {"supports": (Support("z0", ()),)},
+    {"pins": (Pin((0.0, 0.0, 0.0), (0, -1)),)}, {"foundations": (Foundation("z0", (7,), 1.0),)},
+])  # fmt: skip
+def test_what_holds_a_body_has_components_of_its_dimension(part: Any) -> None:
+    """The component 3 of a node was the first one of its neighbour."""
+    with pytest.raises(SceneError, match=r"components .*: expected some of 0, 1, 2 "):
+        Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), **part)

@@ -41,7 +41,7 @@ def declare(name: str, named: tuple[Path, ...]) -> None:
 def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
     """Every settable path of an experiment, methods included; a method's law with those choices
     alone that it can take, and what it changes of a declared scene as the scene says it."""
-    laws = {f"methods.{name}.law": laws_of(m) for name, m in experiment.methods.items()}
+    laws = {f"methods.{name}.material.law": laws_of(m) for name, m in experiment.methods.items()}
     own = describe(experiment.parameters)
     by_path = {p.path: p for p in own}
 

@@ -23,7 +23,7 @@ from validate.cli.new_kind import NewKind
 from validate.cli.new_plates import PLATES
 from validate.cli.recordings import ask_back
 from validate.compare.result import Kind
-from validate.errors import UsageError
+from validate.errors import SceneError, UsageError
 from validate.places import try_folder, write_whole
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
@@ -33,7 +33,7 @@ from validate.replay.run_estimate import RunEstimate, estimated
 KINDS = (PLATES, INCLUSION, BODY)
 _LARGEST = 20_000  # bytes of such a file
 _FIRST = 60.0  # s, estimated: a first answer that would take longer is given on a coarser mesh
-_COARSER = ("-1", "-2")
+_HALVINGS, _COARSER = "body.halvings", ("-1", "-2")
 
 
 def new(
@@ -73,11 +73,16 @@ def new(
         return estimated(path)
 
     expected = written_with(found)
-    for halvings in _COARSER if kind.halvings and found.get("body.file") else ():
+    for halvings in _COARSER if found.get("body.file") else ():
         if expected is None or expected.seconds <= _FIRST:
             break
-        found = {**found, kind.halvings: halvings}
-        expected = written_with(found)
+        coarser = {**found, _HALVINGS: halvings}
+        try:
+            expected = written_with(coarser)
+        except SceneError:  # too few nodes, or no closed surface: many steps are what takes long
+            expected = written_with(found)
+            break
+        found = coarser
     for line in kind.assumed(recording, found):
         complain(line)
     for topic in _unused(recording, kind.used(recording, found)):
@@ -85,7 +90,7 @@ def new(
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
     if expected:
         say(f"first answer: {_about(expected)}", indent="  ")
-    if found.get(kind.halvings):
+    if found.get(_HALVINGS):
         say(
             f"its mesh is coarser: {found['body.file']} filled anew with larger cells; "
             f"validate run {_called(name, path)} --refine takes the file's own",

@@ -1,11 +1,8 @@
 """Any body under what a recording says moved it: questions by the paths of its parameters."""
 
-import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +10,9 @@ from validate.cli.asking import Answers, Question
 from validate.cli.holdings import beside
 from validate.cli.new_body_questions import (
     NONE,
+    NOTED,
     RECORDED,
+    RELEASE,
     UNKNOWN,
     a_known_modulus,
     a_layout,
@@ -28,7 +27,7 @@ from validate.cli.new_body_questions import (
     three_of,
     unit_of,
 )
-from validate.cli.new_contact import CONTACT_WORDS, contact_values, of_the_indenter
+from validate.cli.new_contact import of_the_indenter
 from validate.cli.new_kind import (
     NewKind,
     accept_line,
@@ -36,32 +35,31 @@ from validate.cli.new_kind import (
     quadratic_fits,
     reason_question,
 )
-from validate.cli.new_law import LINEAR, law_questions, left_open
+from validate.cli.new_law import LINEAR, law_questions
 from validate.cli.new_motion import (
     DYNAMIC,
     cells_for,
     judged_markers,
     motion_questions,
-    motion_values,
     moving_methods,
     require_dynamic,
 )
-from validate.cli.rendered import rendered
+from validate.cli.new_scene import CELLS, answered_mesh, tree_of
+from validate.cli.rendered import imports, rendered
 from validate.errors import UsageError
-from validate.parameters import describe, with_values
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
-from validate.replay.body_mesh import body_of, unknowns_of
+from validate.replay.body_mesh import unknowns_of
 from validate.replay.cost import (
     FEWEST_STATES,
     RUNS,
     newton_seconds,
     states_within,
 )
-from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_drive import NOTED, RELEASE
 from validate.replay.measured_markers import AS_SEEN
+from validate.replay.tree import Tree
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.geometry import MeshFile
 from validate.scene.laws import law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
@@ -69,11 +67,9 @@ from validate.scene.named_place import axis_of
 _SHAPES = ("file", "block", "cylinder")
 _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker, as 0.5mm"),
              "contour": ("m", "distance between outlines, as 0.5mm")}  # fmt: skip
-_MOVED = "from validate.replay.measured_body import solid"
-_PRESSED = "from validate.replay.measured_contact import touching"
-_MOVING = "from validate.replay.moving_body import moving"
-_MANY = 5  # classes whose lines would make the file longer than 60
-_PATHS = {p.path for p in describe(MeasuredBody())}
+_MOVED = {"validate.replay.measured_body": ("solid",)}
+_PRESSED = {"validate.replay.measured_body": ("touching",)}
+_MOVING = {"validate.replay.moving_body": ("moving",)}
 
 
 def _fits(recording: Recording) -> bool:
@@ -90,7 +86,7 @@ def _dynamic(found: Answers) -> bool:
 
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
     asked = _of_the_body(recording, found)
-    mesh = _mesh_of(found)
+    mesh = answered_mesh(found)
     asked += known_size("body.size", mesh, found.get("body.unit", "m"))
     asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
@@ -98,7 +94,7 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     if forces and unit_of(recording, found.get("moved.by", "")) == "m":
         asked.append(by_topic("seen.force", "force on the moved place to compare", forces))
     asked += _of_the_material(recording, found)
-    asked += motion_questions(recording, found, mesh, _values(found))
+    asked += motion_questions(recording, found, mesh)
     return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
 
 
@@ -127,7 +123,7 @@ def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
         by_path("material.nu", "Poisson ratio"),
         *([Question("law", "law of the material", LINEAR, "the pressure acts on the "
                     "undeformed surface", choices=(LINEAR,))] if pressed else
-          law_questions(MeasuredBody(), found, "neo_hooke", "large strain; the linear law is run "
+          law_questions(found, "neo_hooke", "large strain; the linear law is run "
                         "in addition")),
     ]  # fmt: skip
 
@@ -264,29 +260,8 @@ def _judged(found: Answers) -> set[str]:
 # --- what is written ------------------------------------------------------------------------------
 
 
-def _mesh_of(found: Answers) -> Mesh | None:
-    """The body, once it is known; raises what reading it does."""
-    shape = found.get("body.shape", "")
-    file = found.get("body.file", "")
-    needed = f"body.{shape}" if shape != "file" else "body.unit"
-    if shape == "file" and (not file or Path(file).suffix.lower() not in FOREIGN):
-        needed = "body.file"
-    if not found.get(needed):
-        return None
-    changed = Path(file).resolve() if file else Path(), Path(file).stat().st_mtime_ns if file else 0
-    return _read(tuple(sorted((k, v) for k, v in found.items() if k.startswith("body."))), changed)
-
-
-@lru_cache(maxsize=4)
-def _read(said: tuple[tuple[str, str], ...], changed: tuple[Path, int]) -> Mesh:
-    """The body that is answered; its file is read again where it has `changed`."""
-    values = {k: v for k, v in said if k in _PATHS and v}
-    card = with_values(MeasuredBody(), values).body
-    return body_of(card, folder=Path())
-
-
 def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> Mapping[str, str]:
-    mesh = _mesh_of(found)
+    mesh = answered_mesh(found)
     if not any(found.get(f"held.{c}") for c in ("all", "x", "y", "z", "slides")):
         raise UsageError(
             "held.all, .x, .y, .z and .slides are all empty: name at least one held place"
@@ -296,29 +271,33 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
             "seen.force, seen.markers and seen.outline are all none: choose at least one to compare"
         )
     require_dynamic(found)
-    here = with_values(MeasuredBody(), _values(found))
-    order = 2 if found["body.shape"] != "file" or _few(mesh, here) else 1
-    parameters = _card(source, folder, found, contact_values(recording, found))
     pressed = found.get("indenter.shape", "none") != "none"
+    cells = cells_for(found) if _dynamic(found) else CELLS
+    order = 2 if found["body.shape"] != "file" or _few(recording, found, mesh) else 1
+    order = 1 if pressed and not _dynamic(found) else order
+    here = tree_of(recording, found, cells, order)
+    names: tuple[str, ...] = ()
     if _dynamic(found):
-        parameters, here = (
-            replace(p, body=replace(p.body, cells=cells_for(p))) for p in (parameters, here)
-        )
         methods = moving_methods(recording, here, found, order)
         names = judged_markers(recording, here)
         accepted = "large" if found["law"] != "linear" else "implicit"
     else:
-        maker = "touching" if pressed else "solid"
-        order = 1 if pressed else order
         if found["law"] != "linear" and not pressed:
-            states = states_within(RUNS, unknowns_of(here, order, Path()), here.seen.states)
-            parameters = replace(parameters, seen=replace(parameters.seen, states=states))
-        methods = _methods(found["law"], maker, order, _cells(found, mesh, order))
-        names, accepted = (), "solid" if found["law"] != "linear" else "linear"
+            seen = here.settings.seen
+            states = states_within(RUNS, unknowns_of(here, order, Path()), seen.states)
+            here = here.with_settings(seen=replace(seen, states=states))
+        maker = "touching" if pressed else "solid"
+        methods = _methods(found["law"], maker, _cells(found, mesh, order))
+        accepted = "solid" if found["law"] != "linear" else "linear"
+    declared = _beside(here, folder)
     return {
-        "imports": _MOVING if _dynamic(found) else _PRESSED if pressed else _MOVED,
-        "cards": _names(sorted(_classes(parameters))),
-        "parameters": rendered(parameters),
+        "imports": imports((declared.scene, declared.settings), {
+            "validate.compare.verdict": ("Accept",),
+            "validate.replay.experiment": ("Experiment",),
+            **(_MOVING if _dynamic(found) else _PRESSED if pressed else _MOVED),
+        }),
+        "scene": rendered(declared.scene, 2),
+        "settings": rendered(declared.settings, 2),
         "methods": "\n        ".join(methods),
         "accepted": accepted,
         "accept": "\n        ".join(
@@ -328,32 +307,21 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     }  # fmt: skip
 
 
-def _card(source: str, folder: Path, found: Answers, more: Mapping[str, str]) -> MeasuredBody:
-    values = _values(found)
-    for key in ("body.file", "seen.layout"):
-        if values.get(key, AS_SEEN) not in (AS_SEEN, RECORDED):
-            values[key] = beside(Path(values[key]), folder / "x.py")
-    values |= {**more, "recording": source}
-    card: MeasuredBody = with_values(MeasuredBody(), values)
-    return card
+def _beside(here: Tree, folder: Path) -> Tree:
+    """With files as they are found from the experiment's folder."""
+    body, seen = here.scene.body, here.settings.seen
+    if isinstance(body, MeshFile):
+        here = here.with_scene(body=replace(body, file=beside(Path(body.file), folder / "x.py")))
+    if seen.layout not in (AS_SEEN, RECORDED):
+        layout = beside(Path(seen.layout), folder / "x.py")
+        here = here.with_settings(seen=replace(seen, layout=layout))
+    return here
 
 
-def _values(found: Answers) -> dict[str, str]:
-    """The answers that are parameters, by path."""
-    skipped = ("", UNKNOWN)
-    paths = _PATHS - left_open(found)
-    values = {k: v for k, v in found.items() if k in paths and v not in skipped}
-    nothing = ("seen.markers", "seen.force", "seen.outline")
-    values = {k: v for k, v in values.items() if k not in nothing or v != NONE}
-    if values.get("indenter.friction") in CONTACT_WORDS:  # a parameter of another path
-        del values["indenter.friction"]
-    return values | motion_values(found)
-
-
-def _few(mesh: Mesh | None, p: MeasuredBody) -> bool:
+def _few(recording: Recording, found: Answers, mesh: Mesh | None) -> bool:
     """Whether quadratic cells of a mesh file fit into a first answer, at large strain, too."""
-    fewest = FEWEST_STATES * newton_seconds(unknowns_of(p, 2, Path())) <= RUNS
-    return fewest and quadratic_fits(mesh)
+    unknowns = unknowns_of(tree_of(recording, found), 2, Path())
+    return FEWEST_STATES * newton_seconds(unknowns) <= RUNS and quadratic_fits(mesh)
 
 
 def _cells(found: Answers, mesh: Mesh | None, order: int) -> str:
@@ -363,26 +331,12 @@ def _cells(found: Answers, mesh: Mesh | None, order: int) -> str:
     return "quadratic hexahedra" if order == 2 else "mixed hexahedra"
 
 
-def _methods(law: str, maker: str, order: int, cells: str) -> list[str]:
-    lines = [f'"linear": {maker}("linear law, {cells}", "linear", {order}),']
+def _methods(law: str, maker: str, cells: str) -> list[str]:
+    lines = [f'"linear": {maker}("linear law, {cells}", "linear"),']
     if law != "linear":
         words = f"{law_kind(law).title}, {cells}"
-        lines.insert(0, f'"solid": {maker}("{words}", "{law}", {order}),')
+        lines.insert(0, f'"solid": {maker}("{words}", "{law}"),')
     return lines
-
-
-def _classes(card: Any) -> set[str]:
-    """Names of the classes that the file writes out."""
-    inner = (getattr(card, f.name) for f in fields(card) if getattr(card, f.name) != f.default)
-    found = {type(card).__name__}
-    return found.union(*(_classes(value) for value in inner if is_dataclass(value)))
-
-
-def _names(classes: Sequence[str]) -> str:
-    """The imported names, one a line; several a line where they are many."""
-    if len(classes) <= _MANY:
-        return ",\n    ".join(classes) + ","
-    return "\n    ".join(textwrap.wrap(", ".join(classes) + ",", 90))
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:
@@ -395,7 +349,7 @@ def _used(recording: Recording, found: Answers) -> set[str]:
 
 def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
     """Streams whose metres are another unit, beside the body's size."""
-    mesh = _mesh_of(found)
+    mesh = answered_mesh(found)
     size = float(np.ptp(mesh.nodes, axis=0).max()) if mesh is not None else np.inf
     judged = {t: recording.streams[t] for t in _used(recording, found) if t in recording.streams}
     doubts = {topic: another_unit(stream, size) for topic, stream in judged.items()}
@@ -414,5 +368,4 @@ BODY = NewKind(
     _fields,
     _used,
     _assumed,
-    halvings="body.halvings",
 )

@@ -1,6 +1,6 @@
 """Kinds of questions about a measured body: what each takes, checked as it is answered."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,12 @@ from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import recorded_sides
 from validate.replay.measured_cards import MeasuredBody
-from validate.replay.measured_drive import FEWEST, NOTED
+from validate.replay.measured_drive import FEWEST
 from validate.replay.measured_markers import AS_SEEN
 from validate.scene.body_facts import SAME, largest_side, odd_size
+from validate.scene.contact import RigidContact
+from validate.scene.indenter import Indenter
+from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import GRAMMAR, place_of
 
@@ -24,7 +27,22 @@ _SIDES = {
     ),
     "cylinder": (("diameter", "height"), "diameter and height, axis z, as 25mm,30mm"),
 }
+NOTED, RELEASE = "noted", "release"  # answers to what loads the body
 UNKNOWN, NONE, RECORDED = "unknown", "none", "recorded"
+
+
+_OWNERS: Mapping[str, Any] = {
+    "material": Material(1.0, 0.3, rho=1.0),
+    "indenter": Indenter("plate"),
+}
+_INDENTER: Any = Indenter("plate")
+_PARTS: Mapping[str, tuple[Any, str]] = {
+    "moved.noted": (MeasuredBody(), "noted"),
+    "indenter.friction": (RigidContact("moved", "zmax", _INDENTER), "friction"),
+}
+
+
+_SIDES_OF = {"body.block": 3, "body.cylinder": 2}
 
 
 def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
@@ -49,6 +67,14 @@ def size_question(recording: Recording, shape: str) -> Question:
     )
 
 
+def sides(text: str, count: int) -> tuple[float, ...]:
+    """So many lengths m; raises `UsageError` for another number of them."""
+    found = tuple(map(quantity_in("m"), text.split(",")))
+    if len(found) != count:
+        raise UsageError(f"'{text}': {len(found)} lengths; expected {count}")
+    return found
+
+
 def a_known_modulus(text: str) -> None:
     if text == UNKNOWN:
         raise UsageError("identifying it needs a compared force (seen.force) and a displacement "
@@ -56,8 +82,14 @@ def a_known_modulus(text: str) -> None:
     parsed("material.E")(text)
 
 
-def parsed(path: str, skip: str = "") -> Callable[[str], Any]:
-    return lambda text: None if text == skip else with_values(MeasuredBody(), {path: text})
+def parsed(key: str, skip: str = "") -> Callable[[str], Any]:
+    """A check of the parameter that an answer is of."""
+    if key in _SIDES_OF:
+        return lambda text: sides(text, _SIDES_OF[key])
+    first, _, last = key.partition(".")
+    part, path = _PARTS.get(key) or ((_OWNERS[first], last) if first in _OWNERS else (
+        MeasuredBody(), key))  # fmt: skip
+    return lambda text: None if text == skip else with_values(part, {path: text})
 
 
 def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:

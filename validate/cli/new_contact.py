@@ -1,23 +1,30 @@
 """Questions about a rigid indenter on a measured body, and about the machine that moves it."""
 
-from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
 from validate.cli.asking import Answers, Question
-from validate.cli.new_body_questions import UNKNOWN, by_path, parsed
+from validate.cli.new_body_questions import NONE, NOTED, UNKNOWN, by_path, parsed
 from validate.errors import UsageError
+from validate.parameters import with_values
 from validate.recording.types import Recording
-from validate.replay.contact_cards import ROUND
-from validate.replay.measured_drive import NOTED
+from validate.scene.geometry import Geometry
+from validate.scene.indented import IndentedBlock, IndentedCylinder
+from validate.scene.indenter import ROUND, Indenter
 from validate.scene.named_place import axis_of
+from validate.scene.similar_grids import divided
 from validate.units import in_si, split
 
 FRICTIONLESS, BONDED = "frictionless", "bonded"
 CONTACT_WORDS = {FRICTIONLESS: ("friction", "0"), BONDED: ("bonded", "true")}
 _SHAPES = ("none", "plate", *ROUND)
-_CELLS, _FINER, _STATES = "14", "1.25", "12"  # contact is solved some ten times a state
+_CELLS, _FINER, _STATES = 14, "1.25", "12"  # contact is solved some ten times a state
+_PER_REACH = 4.0  # cells along the radius of contact on the nominal mesh
+_LEAST = 0.02  # cells are not clustered further
+_WAYS = {"zmax": "-z", "zmin": "+z"}  # places that a quarter keeps, and the way towards them
+_MIDDLE = 1e-6  # of the body's size: so far a tip lies from the axis of symmetry
 _POWER = {"sphere": 1.5, "cylinder": 1.0, "plate": 1.0, "punch": 1.0}  # of force over depth
 _RANGES = ((0.02, 0.3), (0.01, 0.1))  # shares of the largest force that find the first touch
 _FEWEST = 8  # samples there
@@ -48,8 +55,7 @@ def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
         *asked,
         Question("indenter.friction", f"contact: {FRICTIONLESS}, {BONDED} while it presses, or "
                                       f"Coulomb's "
-                 "friction coefficient", open=True, check=_friction,
-                 words=(FRICTIONLESS, BONDED)),
+                 "friction coefficient", open=True, check=_friction),
         Question("indenter.tip", "point below the indenter's middle, as 20mm,20mm,12mm; empty: "
                  "the middle of the place", check=parsed("indenter.tip")),
         by_path("indenter.gap", "displacement from the first sample to first contact, as 0.3mm",
@@ -65,42 +71,89 @@ def of_the_machine(found: Answers) -> list[Question]:
     asked = [Question("machine.compliance", "compliance of frame, load cell and grips, m/N, as "
                       f"2e-6; {UNKNOWN}: the report estimates its effect", UNKNOWN,
                       "the recording does not contain "
-                      "it", check=parsed("machine.compliance", UNKNOWN),
-                      words=(UNKNOWN,))]  # fmt: skip
+                      "it", check=parsed("machine.compliance", UNKNOWN))]  # fmt: skip
     if found.get("machine.compliance", UNKNOWN) == UNKNOWN:
         return asked
     return [*asked, by_path("machine.sd", "standard uncertainty of the compliance, m/N, as 1e-7")]
 
 
-def contact_values(recording: Recording, found: Answers) -> Mapping[str, str]:
-    """Return the parameters that follow from the answers; none without an indenter."""
-    shape = found.get("indenter.shape", "none")
-    if shape == "none":
+def contact_settings(found: Answers) -> dict[str, str]:
+    """Settings by path of a body that an indenter presses; none without one: contact is solved some
+    ten times a state."""
+    if found.get("indenter.shape", "none") == "none":
         return {}
-    answer = found["indenter.friction"]
-    key, value = CONTACT_WORDS.get(answer, ("friction", answer))
-    values = {
-        "indenter.friction": "0",
-        f"indenter.{key}": value,
-        "body.cells": _CELLS,
-        "body.finer": _FINER,
-        "seen.states": _STATES,
-    }
-    reach = _reach(recording, found)
-    return values | ({"indenter.reach": f"{reach:.3g}"} if reach > 0 else {})
+    return {"mesh.finer": _FINER, "seen.states": _STATES}
 
 
-def _reach(recording: Recording, found: Answers) -> float:
+def reach_of(recording: Recording, found: Answers) -> float:
     """Hertz's radius of contact sqrt(R d) at the largest depth, m; that of a punch; 0 for a
-    plate."""
-    if found.get("indenter.shape") not in ROUND:
+    plate; -1 without an indenter."""
+    if found.get("indenter.shape", "none") == "none":
+        return -1.0
+    if found["indenter.shape"] not in ROUND or not found.get("indenter.radius"):
         return 0.0
-    way = recording.signal(found["moved.by"], "m").y[:, 0]
-    depth = float(np.abs(way - way[0]).max()) - _metres(found["indenter.gap"])
     radius = _metres(found["indenter.radius"])
     if found["indenter.shape"] == "punch":
         return radius
-    return float(np.sqrt(radius * min(max(depth, 0.0), radius)))
+    way = recording.signal(found["moved.by"], "m").y[:, 0]
+    depth = float(np.abs(way - way[0]).max()) - _metres(found.get("indenter.gap") or "0")
+    return float(f"{np.sqrt(radius * min(max(depth, 0.0), radius)):.3g}")
+
+
+def indented(found: Answers, sides: tuple[float, ...], reach: float) -> Geometry:
+    """The block or cylinder with cells that are small below the indenter: of a quarter, where that
+    is enough. Raises `UsageError` for a cylinder that is not pressed so."""
+    quarter, round_ = _is_quarter(found, sides), len(sides) == 2
+    if round_ and not quarter:
+        raise UsageError(
+            "an indenter on a cylinder must press along -z on zmax (or +z on zmin) in its middle, "
+            "with the body held at zmin and zmax only and only its force compared; otherwise give "
+            "the body as a mesh file"
+        )
+    by = 2 if quarter else 1
+    spans = (sides[0] / 2, sides[1]) if round_ else (sides[0] / by, sides[1] / by, sides[2])
+    nominal = tuple(_CELLS * s / max(spans) for s in spans)
+    shares = tuple(1.0 for _ in spans)
+    if reach > 0:
+        shares = tuple(round(max(_LEAST, min(1.0, reach / _PER_REACH / (s / n))), 4)
+                       for s, n in zip(spans, nominal, strict=True))  # fmt: skip
+    cells = divided(nominal)
+    if round_:
+        end: Any = found["moved.place"]
+        return IndentedCylinder(sides[0], sides[1], cells, shares, end)
+    if found["indenter.shape"] == "cylinder":  # along its axis nothing is concentrated
+        along = axis_of(found["indenter.axis"])
+        shares = tuple(1.0 if a else s for a, s in zip(along, shares, strict=True))
+    tip = _point(found["indenter.tip"]) if found.get("indenter.tip") else ()
+    middle = np.array(sides) / 2 * (1 - np.array(axis_of(found["moved.along"])))
+    at = tip or tuple(middle.tolist())
+    return IndentedBlock(sides, cells, at, shares, "quarter" if quarter else "whole")
+
+
+def _is_quarter(found: Answers, sides: tuple[float, ...]) -> bool:
+    """Whether two planes of symmetry leave a quarter: a block or cylinder that is pressed in its
+    middle along z, held at its ends alone, of which nothing but the force is judged."""
+    if any(found.get(key, NONE) != NONE for key in ("seen.markers", "seen.outline")):
+        return False
+    place = found.get("moved.place", "")
+    if place not in _WAYS or axis_of(found["moved.along"]) != axis_of(_WAYS[place]):
+        return False
+    if not {found.get("held.all", ""), found.get("held.z", "")} <= {"", *_WAYS}:
+        return False
+    if any(found.get(f"held.{c}") for c in ("x", "y", "slides")):
+        return False
+    axis = found.get("indenter.axis", "+y").lstrip("+-")
+    if found["indenter.shape"] == "cylinder" and axis not in ("x", "y"):
+        return False
+    tip = _point(found["indenter.tip"]) if found.get("indenter.tip") else ()
+    middle = np.array(sides[:2]) / 2 if len(sides) == 3 else np.zeros(2)
+    off = np.abs(np.array(tip[:2]) - middle) if tip else np.zeros(2)
+    return bool((off <= _MIDDLE * max(sides)).all())
+
+
+def _point(text: str) -> tuple[float, ...]:
+    found: tuple[float, ...] = with_values(Indenter("plate"), {"tip": text}).tip
+    return found
 
 
 def _first_touch(recording: Recording, found: Answers, shape: str) -> tuple[float, float] | None:

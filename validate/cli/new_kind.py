@@ -29,7 +29,6 @@ class NewKind:
     fields: Callable[[Recording, str, Path, Answers], Mapping[str, str]]
     used: Callable[[Recording, Answers], set[str]]
     assumed: Callable[[Recording, Answers], Sequence[str]]
-    halvings: str = ""
 
 
 _NOISY = ("contour",)  # many points of one image, each as uncertain as speckle: judged by their rms

@@ -12,14 +12,14 @@ LINEAR = "linear"
 LAW_NAMES = (*(kind.name for kind in LAWS), LINEAR)
 
 
-def law_questions(card: Any, found: Answers, default: str, why: str) -> list[Question]:
+def law_questions(found: Answers, default: str, why: str) -> list[Question]:
     """Return the question about the law, and those about the coefficients that it has beyond the
-    modulus and Poisson ratio; `card` are the parameters, with `material`."""
+    modulus and Poisson ratio."""
     known = ", ".join(f"{kind.name} ({kind.title})" for kind in LAWS)
     law = Question("law", f"law of the material: {LINEAR}, or at large strain {known}", default,
                    why, choices=LAW_NAMES)  # fmt: skip
     names = law_kind(found.get("law", LINEAR)).coefficients
-    return [law, *(_of_coefficient(card, found, name, last=name == names[-1]) for name in names)]
+    return [law, *(_of_coefficient(found, name, last=name == names[-1]) for name in names)]
 
 
 def coefficient_values(found: Answers) -> dict[str, str]:
@@ -37,26 +37,26 @@ def left_open(found: Answers) -> set[str]:
     return set() if paths <= found.keys() else paths
 
 
-def _of_coefficient(card: Any, found: Answers, name: str, *, last: bool) -> Question:
+def _of_coefficient(found: Answers, name: str, *, last: bool) -> Question:
     (f,) = (f for f in fields(Coefficients) if f.name == name)
     unit = f.metadata["unit"]
     text = f"{f.metadata['doc']}{'' if unit == '1' else f'; {unit}'}"
     may_be_empty = f.default == ()
     return Question(
         f"material.{name}", text + ("; empty: none" if may_be_empty else ""),
-        open=not may_be_empty, check=_checked(card, found, f, last=last),
+        open=not may_be_empty, check=_checked(found, f, last=last),
     )  # fmt: skip
 
 
-def _checked(card: Any, found: Answers, f: Any, *, last: bool) -> Callable[[str], Any]:
+def _checked(found: Answers, f: Any, *, last: bool) -> Callable[[str], Any]:
     """A check of one number; lists have to agree and are checked with the last one."""
-    path = f"material.{f.name}"
 
     def check(text: str) -> None:
-        values: Mapping[str, str] = {path: text}
+        values: Mapping[str, str] = {f.name: text}
         if last:
-            values = {**coefficient_values(found), **values}
+            own = coefficient_values(found)
+            values = {**{k.removeprefix("material."): v for k, v in own.items()}, **values}
         if last or isinstance(f.default, float):
-            with_values(card, values)
+            with_values(Coefficients(), values)
 
     return check

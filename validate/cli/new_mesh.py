@@ -4,6 +4,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from validate.cli.asking import Answers, Question
+from validate.cli.holdings import beside
 from validate.cli.new_body_questions import known_size, there
 from validate.cli.new_kind import quadratic_fits
 from validate.replay.mesh_sizes import PLATES, sizes_of_mesh
@@ -17,27 +18,27 @@ def mesh_questions(found: Answers, *, needed: bool) -> list[Question]:
     plates = " and ".join(f'"{plate}"' for plate in PLATES)
     asked = [
         Question(
-            "specimen.mesh",
+            "body.file",
             f"mesh file of the specimen, axis z, with the facet sets {plates}"
             + ("; it needs the wall of the inclusion, too" if needed else "; empty: a cylinder"),
             open=needed, check=_readable, words=(),
         )
     ]  # fmt: skip
-    file = found.get("specimen.mesh", "")
+    file = found.get("body.file", "")
     if not _foreign(file):
         return asked
     asked.append(
-        Question("specimen.mesh_unit", "unit of the file's lengths, as mm", open=True,
+        Question("body.unit", "unit of the file's lengths, as mm", open=True,
                  check=lambda unit: sizes_of_mesh(read_mesh(Path(file), unit), Path(file).name))
     )  # fmt: skip
-    if unit := found.get("specimen.mesh_unit"):
-        asked += known_size("specimen.mesh_size", specimen_mesh(found), unit)
+    if unit := found.get("body.unit"):
+        asked += known_size("body.size", specimen_mesh(found), unit)
     return asked
 
 
 def specimen_mesh(found: Answers) -> Mesh | None:
     """Return the mesh that the answers name; None without one, or before its unit is known."""
-    file, unit = found.get("specimen.mesh", ""), found.get("specimen.mesh_unit")
+    file, unit = found.get("body.file", ""), found.get("body.unit")
     if not file or (_foreign(file) and not unit):
         return None
     return _read(file, unit, Path(file).stat().st_mtime_ns)
@@ -46,17 +47,18 @@ def specimen_mesh(found: Answers) -> Mesh | None:
 def mesh_sizes(found: Answers) -> dict[str, float]:
     """Return height and diameter of equal area m of the mesh, by parameter; none without one."""
     mesh = specimen_mesh(found)
-    return {} if mesh is None else sizes_of_mesh(mesh, Path(found["specimen.mesh"]).name)
+    return {} if mesh is None else sizes_of_mesh(mesh, Path(found["body.file"]).name)
 
 
-def specimen_arguments(found: Answers, fluid: str = "") -> str:
-    """Return the line of an experiment file that names the mesh; empty without one."""
-    if not found.get("specimen.mesh"):
+def declared_mesh(found: Answers, folder: Path) -> str:
+    """Return the mesh file as an experiment file in `folder` declares it; empty without one."""
+    if not found.get("body.file"):
         return ""
-    values = {"mesh": found["specimen.mesh"], "mesh_unit": found.get("specimen.mesh_unit"),
-              "fluid": fluid}  # fmt: skip
-    told = ", ".join(f"{k}={v!r}" for k, v in values.items() if v)
-    return f"        {told},  # from where `validate run` is called\n"
+    file = beside(Path(found["body.file"]), folder / "x.py")
+    unit = f", unit={found['body.unit']!r}" if found.get("body.unit") else ""
+    halvings = f", halvings={found['body.halvings']}" if found.get("body.halvings") else ""
+    element = "linear" if linear_cells(found) else "quadratic"
+    return f'MeshFile({file!r}{unit}{halvings}, element="{element}"),'
 
 
 def linear_cells(found: Answers) -> str:
@@ -65,8 +67,8 @@ def linear_cells(found: Answers) -> str:
     if mesh is None or quadratic_fits(mesh):
         return ""
     return (
-        f"{found['specimen.mesh']} has {len(mesh.cells)} cells: linear ones are proposed "
-        "(order=1), as quadratic ones do not fit into a first answer of 30 s"
+        f"{found['body.file']} has {len(mesh.cells)} cells: linear ones are proposed "
+        "(element=linear), as quadratic ones do not fit into a first answer of 30 s"
     )
 
 

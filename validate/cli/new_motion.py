@@ -1,8 +1,7 @@
 """Questions about a body that moves in time, and the methods of its experiment."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import cast
@@ -11,28 +10,37 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.cli.asking import Answers, Question
-from validate.cli.new_body_questions import by_path, parsed
+from validate.cli.new_body_questions import RELEASE, by_path, parsed
+from validate.cli.new_scene import CELLS, IDENTIFIED, damping, held, sides_of, tree_of
 from validate.errors import UsageError, ValidateError
 from validate.estimate.filters import FILTERS
+from validate.estimate.load_scale import OVERDAMPED
 from validate.fem.system import build
 from validate.identify.recorded_motion import FRACTION, motion_of
-from validate.parameters import with_values
 from validate.recording.types import Recording
-from validate.replay.body_mesh import body_of, mesh_of, unknowns_of
+from validate.replay.body_mesh import mesh_of, unknowns_of
 from validate.replay.first_modes import first_frequencies
 from validate.replay.measured_body import static_scene
-from validate.replay.measured_cards import MeasuredBody, SolidModel
-from validate.replay.measured_drive import RELEASE, drive_kind
-from validate.replay.moving_body import METHODS, against_mode, fits_motion, model_law
+from validate.replay.measured_drive import drive_kind, mover, weight_beside
+from validate.replay.measured_markers import leading
+from validate.replay.moving_body import (
+    EXPLICIT_FILTERS,
+    METHODS,
+    against_mode,
+    fits_motion,
+    model_law,
+)
 from validate.replay.moving_seen import started, steps_of, without_rest
+from validate.replay.solid_model import model_of
+from validate.replay.tree import Tree
+from validate.scene.geometry import MeshFile
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of
 from validate.scene.scene import Scene
 from validate.solve.explicit_linear import ExplicitLinear, stable_step
-from validate.units import in_si, split
 
-DYNAMIC, STATIC, IDENTIFIED = "dynamic", "static", "identified"
+DYNAMIC, STATIC = "dynamic", "static"
 _ACROSS = 2  # cells across the shortest side: a bending body with one is too stiff
 _UNKNOWNS = 6000  # of quadratic cells, at most
 _QUADRATIC = 15_000  # unknowns of quadratic cells up to which a first mode is found in seconds
@@ -41,17 +49,17 @@ _OF_A_MODE = ("body.", "material.", "held.", "moved.", "seen.markers", "indenter
 _FILTERED = 900  # unknowns of a filter of all nodes: its modes are all taken
 _MARGIN = 0.9  # of the critical step
 _LOAD = 0.1  # of its largest value: how unsure a filter is of the load
+_GRAVITY = 9.80665  # m/s^2
 _STILL = 0.05  # of the largest motion: a marker that moves less teaches a filter little
 GIVEN, CHOSEN = "filters.markers", "methods"
 #: Methods in the order of a file: what is checked first, the cheapest last.
 _ORDER = (
     "large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf",
-    "roukf", "ensemble_kf", "filterpy", "load_scale", "node_ekf", "reduced_ekf", "modal",
+    "roukf", "ensemble_kf", "filterpy", "load_scale", "reduced_ekf", "modal",
 )  # fmt: skip
 _USUAL = ("large", "implicit", "explicit", "static", "kf_fem", "modal_kf", "reduced_kf", "roukf",
           "modal")  # fmt: skip
-_OF_NODES = ("kf_fem", "modal_kf", "node_ekf")  # whose cost grows with the cube of the nodes
-_EXPLICIT = ("node_ekf", "reduced_ekf")  # tetrahedra without stiffness damping only
+_OF_NODES = ("kf_fem", "modal_kf")  # whose cost grows with the cube of the nodes
 #: Entries of the registries that no body in motion is offered, and why.
 NOT_OFFERED = {
     **dict.fromkeys(("NoFluid", "ExactPressure", "PressureLoop", "ElasticPressure",
@@ -63,6 +71,7 @@ NOT_OFFERED = {
     "ContactNewton": "statics of a body that an indenter touches: `touching`",
     "NeedleLoop": "a needle that is held by hand",
     "AsyncRegions": "regions with steps of their own under a stylus",
+    "NodeEKF": "it uses markers that are nodes of the mesh; those of a recording lie between them",
     "HapticLoop": "the loop of a haptic device",
     "TouchedKrylov": "a body that a stylus touches",
 }  # fmt: skip
@@ -76,45 +85,55 @@ class Proposal:
     why: str
 
 
-def proposal(recording: Recording, p: MeasuredBody, folder: Path) -> Proposal:
+def proposal(recording: Recording, p: Tree, folder: Path) -> Proposal:
     """Dynamic where the recorded motion has what statics would miss, against the body's first mode
     (or rings down, where its modulus is unknown)."""
     try:
         shown = motion_of(recording, _topic(recording, p))
     except ValidateError as none:
         return Proposal(STATIC, str(none))
-    first = _first(recording, p, folder) if p.material.E else None
+    first = _first(recording, p, folder) if p.scene.material.E else None
     facts = against_mode(shown, first, p)
     if shown.inertia_matters(first):
         return Proposal(DYNAMIC, f"{facts}: inertia matters above {FRACTION:.2g} of it")
     return Proposal(STATIC, f"{facts}: slow enough for statics")
 
 
-def _topic(recording: Recording, p: MeasuredBody) -> str | None:
-    return p.seen.markers if p.seen.markers in recording.markers else None
+def _topic(recording: Recording, p: Tree) -> str | None:
+    return p.settings.seen.markers if p.settings.seen.markers in recording.markers else None
 
 
-def _first(recording: Recording, p: MeasuredBody, folder: Path) -> float | None:
+def _first(recording: Recording, p: Tree, folder: Path) -> float | None:
     try:
-        if p.body.file is not None and unknowns_of(p, 1, folder) > _QUADRATIC:
-            p = replace(p, body=replace(p.body, halvings=-1))
+        body = p.scene.body
+        if isinstance(body, MeshFile) and unknowns_of(p, 1, folder) > _QUADRATIC:
+            p = p.with_scene(body=replace(body, halvings=-1))
         order = 2 if unknowns_of(p, 2, folder) <= _QUADRATIC else 1
         return first_frequencies(_scene(recording, p, folder, order), 1)[0]
     except (ValidateError, np.linalg.LinAlgError):
         return None
 
 
-def _scene(recording: Recording, p: MeasuredBody, folder: Path, order: int) -> Scene:
-    model = SolidModel("linear", 2 if order == 2 else 1)
-    return static_scene(recording, p, model, folder)
+def _scene(recording: Recording, p: Tree, folder: Path, order: int) -> Scene:
+    return static_scene(recording, p, model_of("linear", element(p, order)), folder)
+
+
+def element(p: Tree, order: int) -> str:
+    """That of the body's kind of cells in this order."""
+    body = p.scene.body
+    if isinstance(body, MeshFile):
+        return "quadratic" if order == 2 else "linear"
+    if body.element.startswith("hex"):
+        return "hex27" if order == 2 else "hex8"
+    return "tet10" if order == 2 else "tet4"
 
 
 # --- questions ------------------------------------------------------------------------------------
 
 
 def motion_questions(
-    recording: Recording, found: Answers, mesh: Mesh | None, values: Mapping[str, str]
-) -> list[Question]:
+    recording: Recording, found: Answers, mesh: Mesh | None
+) -> list[Question]:  # fmt: skip
     """Whether the motion in time is solved, and what follows; none until the body, its supports,
     material and load are known, or where nothing moves in time."""
     if mesh is None or not all(found.get(k) for k in ("material.E", "material.nu", "moved.by")):
@@ -124,7 +143,7 @@ def motion_questions(
     if found["moved.by"] == RELEASE:
         proposed = Proposal(DYNAMIC, "a release is a motion in time")
     else:
-        needed = ((k, v) for k, v in values.items() if k.startswith(_OF_A_MODE))
+        needed = ((k, v) for k, v in found.items() if k.startswith(_OF_A_MODE) and v)
         proposed = _proposed(recording, tuple(sorted(needed)))
     asked = [Question("motion.how", "dynamic: solve the motion in time; static: solve states of "
                       "rest, without inertia", proposed.how, proposed.why,
@@ -134,10 +153,9 @@ def motion_questions(
     if found["moved.by"] != "gravity":
         asked.append(by_path("material.rho", "density, kg/m3"))
     asked += _of_the_start(found) + _of_the_damping(found)
-    p = with_values(MeasuredBody(), dict(values))
-    asked += _of_the_filters(recording, p)
+    asked += _of_the_filters(recording, tree_of(recording, found))
     if not [q for q in asked if q.key not in found]:
-        p = replace(p, body=replace(p.body, cells=cells_for(p)))
+        p = tree_of(recording, found, cells_for(found))
         asked += _of_the_methods(recording, p, found)
     return [
         *asked,
@@ -177,7 +195,7 @@ def _of_the_damping(found: Answers) -> list[Question]:
     return asked
 
 
-def _of_the_filters(recording: Recording, p: MeasuredBody) -> list[Question]:
+def _of_the_filters(recording: Recording, p: Tree) -> list[Question]:
     """Which markers filters are given; none where there is no choice."""
     names = judged_markers(recording, p)
     if len(names) < 2:
@@ -203,32 +221,6 @@ def _listed(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-def held(text: str) -> tuple[str, str]:
-    """The parameter that the answer is of, and its value."""
-    parts = split(text)
-    for unit, name in (("N", "motion.held_force"), ("m", "motion.held_displacement")):
-        if parts and parts[1] and in_si(parts[0], parts[1], unit) is not None:
-            return name, text
-    raise UsageError("expected a force, as 0.2N, or a displacement, as 5mm, with its unit")
-
-
-def damping(text: str) -> tuple[str, str]:
-    """The parameter that the answer is of, and its value."""
-    if text == IDENTIFIED:
-        return "", text
-    parts = split(text)
-    name = "motion.stiffness_damping" if parts and parts[1] else "motion.damping_ratio"
-    parsed(name)(text)
-    return name, text
-
-
-def motion_values(found: Answers) -> dict[str, str]:
-    """Parameters by path that the answers on release and damping set."""
-    asked = [held(found["moved.held"])] if found.get("moved.held") else []
-    asked += [damping(found["motion.damping"])] if found.get("motion.damping") else []
-    return {name: text for name, text in asked if name}
-
-
 class _LastProposal:
     """The last proposal with its recording and answers: questions are listed again and again."""
 
@@ -239,7 +231,7 @@ def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Prop
     last = _LastProposal.last
     if last and last[0] is recording and last[1] == values:
         return last[2]
-    found = proposal(recording, with_values(MeasuredBody(), dict(values)), Path())
+    found = proposal(recording, tree_of(recording, dict(values)), Path())
     _LastProposal.last = (recording, values, found)
     return found
 
@@ -247,19 +239,19 @@ def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Prop
 # --- what is written ------------------------------------------------------------------------------
 
 
-def cells_for(p: MeasuredBody) -> int:
+def cells_for(found: Answers) -> int:
     """Cells along the longest edge of a block or cylinder: two across the shortest, as long as the
     quadratic mesh stays small."""
-    sides = p.body.block or tuple(p.body.cylinder)
-    if not sides:
-        return p.body.cells
+    if found["body.shape"] == "file":
+        return CELLS
+    sides = sides_of(found)
     wanted = ceil(_ACROSS * max(sides) / min(sides) - 1e-9)
     share = np.prod([s / max(sides) for s in sides]) ** (1 / 3)  # of a cube as large
     most = int(((_UNKNOWNS / 3) ** (1 / 3) - 1) / 2 / share)
-    return max(p.body.cells, min(wanted, most))
+    return max(CELLS, min(wanted, most))
 
 
-def moving_methods(recording: Recording, p: MeasuredBody, found: Answers, order: int) -> list[str]:
+def moving_methods(recording: Recording, p: Tree, found: Answers, order: int) -> list[str]:
     """Lines of the chosen methods, in the order of `offered`."""
     law, given = cast(LawName, found["law"]), _measurements(recording, p, found)
     chosen = _listed(found.get(CHOSEN, "")) or proposed_methods(recording, p, found)
@@ -267,28 +259,40 @@ def moving_methods(recording: Recording, p: MeasuredBody, found: Answers, order:
     return [_line(name, (recording, p), law, order, given) for name in names]
 
 
-def offered(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+def offered(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
     """Names of the methods that fit the body and the recording; the cheapest is the last."""
     kind = drive_kind(recording, p)
-    preloaded = kind == "releases" or bool(p.motion.gravity)
-    measured = bool(judged_markers(recording, p) or p.seen.outline)
+    preloaded = kind == "releases" or weight_beside(p.scene) is not None
+    measured = bool(judged_markers(recording, p) or p.settings.seen.outline)
     law = cast(LawName, found.get("law", "linear"))
-    undamped = not (p.motion.stiffness_damping or p.motion.damping_ratio or p.motion.fit_window)
-    explicit = undamped and not mesh_of(p, partial(body_of, folder=Path())).bricks
+    motion, beta = p.settings.motion, p.scene.material.stiffness_damping
+    undamped = not (beta or motion.damping_ratio or motion.fit_window)
+    explicit = undamped and not mesh_of(p, Path()).bricks
     small = unknowns_of(p, 1, Path()) <= _FILTERED
+    creeps = measured and not preloaded and _creeps(recording, p)
     return tuple(
         name for name in _ORDER
-        if (small or name not in _OF_NODES) and (explicit or name not in _EXPLICIT)
+        if (small or name not in _OF_NODES) and (explicit or name not in EXPLICIT_FILTERS)
+        and (creeps or name != "load_scale")
         and fits_motion(name, law, kind, preloaded=preloaded, measured=measured)
     )  # fmt: skip
 
 
-def proposed_methods(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+def _creeps(recording: Recording, p: Tree) -> bool:
+    """Whether the body returns without swinging, as a filter without inertia takes it."""
+    ratio, beta = p.settings.motion.damping_ratio, p.scene.material.stiffness_damping
+    if ratio is None:
+        first = _first(recording, p, Path()) if beta else None
+        ratio = np.pi * first * beta if first else 0.0
+    return bool(ratio >= OVERDAMPED)
+
+
+def proposed_methods(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
     """The usual ones of those that are offered."""
     return tuple(n for n in offered(recording, p, found) if n in _USUAL)
 
 
-def _of_the_methods(recording: Recording, p: MeasuredBody, found: Answers) -> list[Question]:
+def _of_the_methods(recording: Recording, p: Tree, found: Answers) -> list[Question]:
     names = offered(recording, p, found)
     needed = "large" if found.get("law", "linear") != "linear" else "implicit"
 
@@ -308,7 +312,7 @@ def _of_the_methods(recording: Recording, p: MeasuredBody, found: Answers) -> li
 
 def _line(
     name: str,
-    of: tuple[Recording, MeasuredBody],
+    of: tuple[Recording, Tree],
     law: LawName,
     order: int,
     given: tuple[str, ...],
@@ -317,8 +321,8 @@ def _line(
     settings, kind = METHODS[name][0], drive_kind(*of)
     used = model_law(name, law)
     parts = [f'"{name}"', *([f'"{used}"'] if used != "linear" else [])]
-    explicit = name == "explicit" or name in _EXPLICIT
-    parts.append(f"order={1 if explicit or name in _OF_NODES else order}")
+    explicit = name == "explicit" or name in EXPLICIT_FILTERS
+    parts.append(f'element="{element(p, 1 if explicit or name in _OF_NODES else order)}"')
     parts += [f"markers={given!r}"] if isinstance(settings, FILTERS) else []
     parts += [f"split={_parts(recording, p)}"] if explicit else []
     if kind not in ("moves", "follows"):
@@ -328,7 +332,7 @@ def _line(
     return f'"{name}": moving({", ".join(parts)}),'
 
 
-def _parts(recording: Recording, p: MeasuredBody) -> int:
+def _parts(recording: Recording, p: Tree) -> int:
     """Explicit steps in one of the recording's."""
     system = build(_scene(recording, p, Path(), 1))
     limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
@@ -336,18 +340,20 @@ def _parts(recording: Recording, p: MeasuredBody) -> int:
     return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
 
 
-def _measurements(recording: Recording, p: MeasuredBody, found: Answers) -> tuple[str, ...]:
+def _measurements(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
     """What filters are given: markers, or the outline where only one marker is compared."""
     names, answer = judged_markers(recording, p), found.get(GIVEN, "")
-    if not names and not p.seen.outline:
+    if not names and not p.settings.seen.outline:
         return ()
-    given = _given(recording, p, names) if len(names) > 1 else (p.seen.outline or names[0],)
+    given = (
+        _given(recording, p, names) if len(names) > 1 else (p.settings.seen.outline or names[0],)
+    )
     return _listed(answer) if answer not in ("", ",".join(given)) else given
 
 
-def _given(recording: Recording, p: MeasuredBody, names: tuple[str, ...]) -> tuple[str, ...]:
+def _given(recording: Recording, p: Tree, names: tuple[str, ...]) -> tuple[str, ...]:
     """Every second marker by size of motion, without the largest; of three that move two."""
-    seen = recording.marker(str(p.seen.markers))
+    seen = recording.marker(str(p.settings.seen.markers))
     x = {n: seen.x[:, seen.names.index(n)] for n in names}
     size = {n: float(np.nanmax(np.ptp(_seen(x[n]), axis=0), initial=0.0)) for n in names}
     order = sorted(names, key=lambda n: -size[n])
@@ -360,20 +366,21 @@ def _seen(x: Floats) -> Floats:
     return kept if len(kept) else np.zeros((1, x.shape[1]))
 
 
-def _largest(recording: Recording, p: MeasuredBody, kind: str) -> float:
+def _largest(recording: Recording, p: Tree, kind: str) -> float:
     """Of the load, in its unit."""
     if kind == "weighs":
-        return p.moved.amount
+        return _GRAVITY
     if kind == "releases":
-        return p.motion.held_force or 0.1
-    return float(np.ptp(recording.signals[p.moved.by].y))
+        return p.settings.motion.held_force or 0.1
+    return float(np.ptp(recording.signals[mover(p.scene).name].y))
 
 
-def judged_markers(recording: Recording, p: MeasuredBody) -> tuple[str, ...]:
+def judged_markers(recording: Recording, p: Tree) -> tuple[str, ...]:
     """Markers that are compared: all of the topic but those that move the body."""
-    if not p.seen.markers:
+    if not p.settings.seen.markers:
         return ()
-    return tuple(n for n in recording.marker(p.seen.markers).names if n not in p.moved.markers)
+    names = recording.marker(p.settings.seen.markers).names
+    return tuple(n for n in names if n not in leading(p.scene))
 
 
 def require_dynamic(found: Answers) -> None:

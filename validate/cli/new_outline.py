@@ -14,14 +14,14 @@ from validate.cli.new_kind import (
     quantity_in,
     reason_question,
 )
-from validate.cli.new_mesh import linear_cells, specimen_arguments, specimen_mesh
+from validate.cli.new_mesh import linear_cells, specimen_mesh
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression
 from validate.scene.named_place import axis_of
 
 _EDGE, _WALL, _OTHER, _RECORDED = "edge", "inclusion", "other", "recorded"
-_WIDTH = 88  # characters of a line inside a card
+_WIDTH = 84  # characters of a line inside a card
 _FRAME = "in the body's frame (z: the axis, 0 at the resting plate; x, y: across, 0 on the axis)"
 
 
@@ -52,7 +52,7 @@ def filled(found: Answers) -> bool:
 
 def place_questions(recording: Recording, found: Answers) -> Sequence[Question]:
     """Return the questions about the inclusion and the images' place; none if not compared."""
-    if not recording.contours or found.get("outline.shows", _OTHER) == _OTHER:
+    if not recording.contours or not whole(found):
         return []
     asked = _of_the_inclusion(found) if inside(found) else []
     return [*asked, *_of_the_place(recording, found)]
@@ -99,7 +99,7 @@ def _path(path: str) -> Callable[[str], Any]:
 
 def used(recording: Recording, found: Answers) -> set[str]:
     """The outlines that are judged, and the images that they were found in."""
-    if found.get("outline.shows", _OTHER) == _OTHER:
+    if not whole(found):
         return set()
     topic = found["outline.topic"]
     return {topic, recording.contour(topic).images} - {""}
@@ -112,20 +112,25 @@ def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
     return tuple(line for line in (linear_cells(found),) if line)
 
 
+def whole(found: Answers) -> bool:
+    """Whether images show the body, which is then meshed as a whole."""
+    return found.get("outline.shows", _OTHER) != _OTHER
+
+
+def modulus(found: Answers) -> str:
+    """Return Young's modulus Pa, which an inclusion needs; else it is identified."""
+    return f"{quantity_in('Pa')(found['material.E']):.6g}" if inside(found) else "None"
+
+
 def fields(found: Answers) -> dict[str, str]:
     """What stands in the file: empty where no outlines are judged."""
-    order = ", order=1" if linear_cells(found) else ""
-    if found.get("outline.shows", _OTHER) == _OTHER:
-        return {"outline": "", "accept_outline": "", "body": specimen_arguments(found),
-                "fluid": order, "E": "None"}  # fmt: skip
-    fluid = filled(found)
+    if not whole(found):
+        return {"outline": "", "accept_outline": ""}
     return {
-        "outline": f"    # The images and their position, m.\n    outline={_card(found)},\n",
+        "outline": "        # The images and their position, m.\n"
+                   f"        outline={_card(found)},\n",
         "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
-        "body": specimen_arguments(found, found["outline.surface"] if fluid else ""),
-        "E": f"{quantity_in('Pa')(found['material.E']):.6g}" if inside(found) else "None",
-        "fluid": order + (", fluid=True" if fluid else ""),
-    }
+    }  # fmt: skip
 
 
 def _card(found: Answers) -> str:
@@ -136,10 +141,13 @@ def _card(found: Answers) -> str:
     told = [
         f"{f.name}={v!r}" for f in attributes(card) if (v := getattr(card, f.name)) != f.default
     ]
+    short_call = f"PressedOutline({', '.join(told)})"
+    if len(short_call) < _WIDTH:
+        return short_call
     lines: list[str] = []
     last = told[0]
     for piece in told[1:]:  # a text may hold spaces: no piece is broken
         short = len(last) + len(piece) < _WIDTH
         lines, last = (lines, f"{last}, {piece}") if short else ([*lines, last], piece)
-    body = "".join(f"        {line},\n" for line in (*lines, last))
-    return f"cards.PressedOutline(\n{body}    )"
+    body = "".join(f"            {line},\n" for line in (*lines, last))
+    return f"PressedOutline(\n{body}        )"

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +11,20 @@ from validate.cli import new_outline
 from validate.cli.asking import Answers, Question
 from validate.cli.new_kind import NewKind, quantity_in, reason_question
 from validate.cli.new_law import LINEAR, coefficient_values, law_questions
-from validate.cli.new_mesh import mesh_questions, mesh_sizes, specimen_mesh
+from validate.cli.new_mesh import (
+    declared_mesh,
+    linear_cells,
+    mesh_questions,
+    mesh_sizes,
+    specimen_mesh,
+)
 from validate.identify.modulus import stated_test
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.replay.compression_cards import Compression, stated_sizes
 from validate.scene.body_facts import SAME
 from validate.scene.laws import law_kind
+from validate.scene.material import Material
 
 _USUAL = Compression()  # the windows of strain, unless a test ends earlier
 _TENTH = 0.1  # of a force: the proposed limit of its error
@@ -42,28 +50,28 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     if not stated_test(recording):
         asked.append(Question("test", "whether the test presses or pulls", open=True,
                               choices=tuple(_WORDS)))  # fmt: skip
-    if found.get("specimen.mesh") is not None:
+    if found.get("body.file") is not None:
         asked += _of_the_sizes(recording, found)
     asked += new_outline.place_questions(recording, found)
     if not new_outline.filled(found):  # a fluid inside needs the linear law
-        asked += law_questions(_USUAL, found, LINEAR, "it holds to strains of about 0.1")
+        asked += law_questions(found, LINEAR, "it holds to strains of about 0.1")
     return [*asked, *_accepts(recording, found)]
 
 
 def _of_the_sizes(recording: Recording, found: Answers) -> list[Question]:
     known, length = _known_sizes(recording, found), quantity_in("m")
-    if found["specimen.mesh"] and specimen_mesh(found) is None:
+    if found["body.file"] and specimen_mesh(found) is None:
         return []  # its unit is still open
     return [
-        Question(f"specimen.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
+        Question(f"body.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
                  check=length)
-        for name in _SIZES if f"specimen.{name}" not in known
+        for name in _SIZES if f"body.{name}" not in known
     ]  # fmt: skip
 
 
 def _known_sizes(recording: Recording, found: Answers) -> dict[str, float]:
-    """Sizes m by parameter: those of the recording, then those of the mesh."""
-    return {**mesh_sizes(found), **stated_sizes(recording)}
+    """Sizes m by path: those of the mesh, else those of the recording."""
+    return {**stated_sizes(recording), **mesh_sizes(found)}
 
 
 def _accepts(recording: Recording, found: Answers) -> tuple[Question, Question]:
@@ -102,9 +110,9 @@ def _called(size: str) -> str:
 
 def _judged(recording: Recording, found: Answers) -> tuple[float, float | None, float, str]:
     """Strain limit, height m, limit of the error N, and what that is a tenth of."""
-    said = found.get("specimen.height", "")
+    said = found.get("body.height", "")
     answered = quantity_in("m")(said) if said else None
-    height = _known_sizes(recording, found).get("specimen.height", answered)
+    height = _known_sizes(recording, found).get("body.height", answered)
     moved = recording.signal("displacement", "m").y[:, 0]
     force = recording.signal("force", "N").y[:, 0]
     limit, inside, judged = _USUAL.limit, np.full(len(force), True), "the largest force recorded"
@@ -123,9 +131,14 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     said = quantity_in("N")(own) if own else accepted
     default = "" if own and f"{said:.3g}" != f"{accepted:.3g}" else f"a tenth of {judged}"
     reason = found.get("why.force") or default
+    law, mesh = found.get("law", LINEAR), declared_mesh(found, folder)
     return {
-        "test": f'"{test}",  # {"recorded" if stated_test(recording) else "answered"}',
-        **{name: _size(name, recording, found) for name in _SIZES},
+        "imports": "\n".join(sorted(_imports(found))),
+        "body": mesh or _cylinder(recording, found),
+        "test": f"{test}, {'recorded' if stated_test(recording) else 'answered'}",
+        "along": "-z" if test == "compression" else "+z",
+        "rests": ", rests=True" if mesh or new_outline.whole(found) else "",
+        "parts": _parts(found),
         "fit_from": f"{_USUAL.fit_from / _USUAL.limit * limit:.3g}",
         "fit_to": f"{_USUAL.fit_to / _USUAL.limit * limit:.3g}",
         "limit": f"{limit:.3g}",
@@ -134,40 +147,85 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         "free": free,
         "fixed": fixed,
         "ends": ends,
-        **_of_the_law(found, new_outline.fields(found)),
+        "E": new_outline.modulus(found),
+        "law": "" if law == LINEAR else f', "{law}"{_coefficients(found)}',
+        "title_of_law": law_kind(law).title,
+        "solver": _solver(found),
+        **new_outline.fields(found),
     }
 
 
-def _of_the_law(found: Answers, outlined: dict[str, str]) -> dict[str, str]:
-    """The law in the models' words and arguments, and its coefficients beside the modulus."""
-    law = found.get("law", LINEAR)
-    if law == LINEAR:
-        return {**outlined, "law": LINEAR}
-    given = with_values(_USUAL, coefficient_values(found)).material.coefficients
+def _solver(found: Answers) -> str:
+    if found.get("law", LINEAR) != LINEAR:
+        return 'Tabulated(StaticNewton("none"))'
+    return "ExactPressure()" if new_outline.filled(found) else "NoFluid()"
+
+
+def _imports(found: Answers) -> set[str]:
+    """The lines that import what the file uses."""
+    solver = {
+        "T": {"newton import StaticNewton", "tabulated import Tabulated"},
+        "E": {"fluid import ExactPressure"},
+        "N": {"fluid import NoFluid"},
+    }[_solver(found)[0]]
+    outline = ", PressedOutline" if new_outline.whole(found) else ""
+    laws = {"from validate.scene.laws import Coefficients"} if _coefficients(found) else set()
+    cavity = "Cavity, " if new_outline.filled(found) else ""
+    body = "MeshFile" if found.get("body.file") else "Cylinder"
+    return laws | {f"from validate.solve.{line}" for line in solver} | {
+        "from validate.compare.verdict import Accept",
+        "from validate.replay.compression_cards import BONDED_PLATES, Compression, "
+        f"CompressionRanges{outline}",
+        "from validate.replay.experiment import Experiment",
+        "from validate.replay.method import Method",
+        f"from validate.scene.geometry import {body}",
+        "from validate.scene.material import Material",
+        f"from validate.scene.scene import {cavity}Drive, Scene, Support",
+    }  # fmt: skip
+
+
+def _parts(found: Answers) -> str:
+    """The fluid, and whose volume change counts in linear cells."""
+    lines = []
+    if new_outline.filled(found):
+        lines.append(f'cavities=(Cavity("inclusion", {found["outline.surface"]!r}),),')
+    if linear_cells(found):
+        lines.append('dilatation="nodal_mean",')
+    return "".join(f"        {line}\n" for line in lines)
+
+
+def _coefficients(found: Answers) -> str:
+    """What the law has beyond modulus and Poisson ratio, as an argument; empty for none."""
+    if found.get("law", LINEAR) == LINEAR:
+        return ""
+    given = with_values(_of_law(found), coefficient_values(found))["material"].coefficients
     parts = ", ".join(
         f"{f.name}={value!r}"
         for f in fields(given) if (value := getattr(given, f.name)) != f.default
     )  # fmt: skip
-    extra = f", coefficients=cards.Coefficients({parts})" if parts else ""
-    return {
-        **outlined,
-        "law": law_kind(law).title,
-        "E": outlined["E"] + extra,
-        "fluid": f', law="{law}"{outlined["fluid"]}',
-    }
+    return f", coefficients=Coefficients({parts})" if parts else ""
+
+
+def _of_law(found: Answers) -> dict[str, Any]:
+    """What the coefficients of the chosen law are checked with."""
+    law: Any = found.get("law", LINEAR)
+    return {"material": Material(None, None, law)}  # type: ignore[arg-type]
+
+
+def _cylinder(recording: Recording, found: Answers) -> str:
+    part = "" if new_outline.whole(found) else ', part="quarter"'
+    sizes = "".join(f"            {name}={_size(name, recording, found)}\n" for name in _SIZES)
+    return f'Cylinder(\n{sizes}            cells=(4, 4), element="tet10"{part},\n        ),'
 
 
 def _size(name: str, recording: Recording, found: Answers) -> str:
     """A value and its comment with its source; what nobody says is left open."""
-    path = f"specimen.{name}"
-    recorded, of_mesh, said = stated_sizes(recording), mesh_sizes(found), found.get(path, "")
+    path = f"body.{name}"
+    recorded, said = stated_sizes(recording), found.get(path, "")
     if path in recorded:
         by_area = name == "diameter" and "diameter_m" not in recording.metadata["specimen"]
         how = "of the header's cross-section" if by_area else "in the header"
         return f"{recorded[path]:.6g},  # m, recorded: {how}"
-    if path in of_mesh:
-        how = " of equal area" if name == "diameter" else ""
-        return f"{of_mesh[path]:.6g},  # m,{how} of the mesh file"
     if said:
         return f"{quantity_in('m')(said):.6g},  # m, answered"
     return "None,  # m, not in the recording: measure it and write it here"
@@ -178,7 +236,7 @@ def _assumed(recording: Recording, found: Answers) -> Sequence[str]:
     recorded, of_mesh = stated_sizes(recording), mesh_sizes(found)
     odd = [
         f"{path}: {1e3 * recorded[path]:.4g} mm in the header, {1e3 * size:.4g} mm in "
-        f"{found['specimen.mesh']}: check which of them is this specimen's"
+        f"{found['body.file']}, which counts: check which of them is this specimen's"
         for path, size in of_mesh.items()
         if abs(recorded.get(path, size) / size - 1) > SAME
     ]

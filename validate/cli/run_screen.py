@@ -208,7 +208,7 @@ def _next(result: Result, name: str) -> Iterator[str]:
     steps: list[tuple[str, str]] = []
     if result.quick:
         steps.append((f"validate run {name}", "the full run"))
-    if not found.passed and any(p.path == "body.budget" and p.default for p in result.parameters):
+    if not found.passed and any(p.path == "mesh.budget" and p.default for p in result.parameters):
         steps.append((f"validate run {name} --refine", "finer meshes, more load steps"))
     if result.identified_values and not found.passed:
         steps.append((f"validate identify {name}", "identify uncertain parameters"))

@@ -33,7 +33,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 
-_OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
+OVERDAMPED = 2.0  # damping ratio below which inertia shows in the shape's answer
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ def _core(
     free = system.free
     m, c, k = (float(s @ (X[free][:, free] @ s)) for X in (system.M, system.C, system.K))
     ratio = c / (2 * np.sqrt(m * k))
-    if ratio < _OVERDAMPED:
+    if ratio < OVERDAMPED:
         raise SceneError(
             f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
-            f"without inertia needs {_OVERDAMPED:g}; use ReducedKf"
+            f"without inertia needs {OVERDAMPED:g}; use ReducedKf"
         )
     per_newton = float(s @ system.loads[free, 0]) / k
     return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton, care)

@@ -229,8 +229,9 @@ def require_test(recording: Recording, test: TestKind) -> None:
     if said and said != test:
         presses = "presses" if test == "compression" else "pulls"
         raise RecordingError(
-            f"{recording.name} is a test in {said}, but the experiment is one in {test}: --set "
-            f"test={said}; or if it {presses}, import it again with --map test={test}"
+            f"{recording.name} is a test in {said}, but the experiment is one in {test}: its "
+            f"drive is along '{'+z' if said == 'tension' else '-z'}'; or if it {presses}, import "
+            f"it again with --map test={test}"
         )
 
 

@@ -36,28 +36,30 @@ from validate.replay.fitted_moduli import (
     sentence,
     with_move,
 )
-from validate.replay.measured_cards import MeasuredBody, SolidModel
-from validate.replay.measured_drive import drive_kind
+from validate.replay.measured_drive import drive_kind, mover
 from validate.replay.measured_seen import LOW
 from validate.replay.method import Method
+from validate.replay.solid_model import Changes, law_of
 from validate.replay.solved import run_on
+from validate.replay.tree import Tree
+from validate.scene.geometry import Box, Cylinder, MeshFile
+from validate.scene.indented import IndentedBlock, IndentedCylinder
 from validate.scene.laws import Coefficients
-from validate.scene.scene import Scene
+from validate.scene.scene import Drive, Scene, Support
 
 _UNIT = 1e3  # Pa: a modulus to scale
 _OTHER = 10 * _UNIT  # Pa: another one, to check that force is in proportion to it
 _NEWTON = 1e-4  # relative: equilibrium is found to less than this
-_FORCE = "moved.force"
 
 
-def model_name(model: SolidModel) -> str:
-    """What parameters call a model."""
-    return f"{model.law}, order {model.order}"
+def model_name(model: Changes) -> str:
+    """What parameters call a model: its law and element, where it has its own."""
+    return ", ".join(str(value) for value in (model or {}).values())
 
 
 def identify_body(
     recordings: Sequence[Recording],
-    p: MeasuredBody,
+    p: Tree,
     methods: Mapping[str, Method],
     *,
     experiment: Experiment,
@@ -67,16 +69,17 @@ def identify_body(
     Raises `UsageError` where no force under a displacement is judged, and for a law with further
     moduli, with which no force is in proportion to E.
     """
-    if p.material.E is not None:
+    material, settings = p.scene.material, p.settings
+    if material.E is not None:
         return Identified(p, (), ())
-    if p.material.coefficients != Coefficients():
+    if material.coefficients != Coefficients():
         raise UsageError(
             "material.E is not set, but other coefficients of its law are: give them all"
         )
-    if p.seen.force is None or drive_kind(recordings[0], p) != "moves":
+    if settings.seen.force is None or drive_kind(recordings[0], p) != "moves":
         raise UsageError(
             "material.E is not set: an open modulus is identified on a force under a displacement "
-            "(seen.force, moved.by a signal in m); give it with --set material.E=VALUE"
+            "(seen.force, a drive or an indenter); give it with --set material.E=VALUE"
         )
     bench = _Bench(experiment, recordings[0], p, methods)
     first = next((n for n in experiment.accepted if n in methods), next(iter(methods)))
@@ -84,10 +87,10 @@ def identify_body(
     fits = {name: bench.fitted(name) for name in names}
     entries = {model_name(methods[n].scene): (f.scale, 0.0) for n, f in reversed(fits.items())}
     E, sd = fits[first].scale, fits[first].sd
-    material = replace(
-        p.material, E=E, by_method=tuple((name, *both) for name, both in entries.items())
+    fitted = _of_modulus(p, E).with_settings(
+        by_method=tuple((name, *both) for name, both in entries.items()),
+        ranges=replace(settings.ranges, E=sd / E),
     )
-    fitted = replace(p, material=material, ranges=replace(p.ranges, E=sd / E))
     judged = {n: f for n, f in fits.items() if n in experiment.accepted} or {first: fits[first]}
     moved = bench.moved()
     meshes = {n: bench.on_meshes(n, f.scale) for n, f in judged.items()}
@@ -127,12 +130,11 @@ class _Bench:
     """Forces of a unit modulus at the compared instants, by method and parameters."""
 
     def __init__(
-        self, experiment: Experiment, recording: Recording, p: MeasuredBody,
+        self, experiment: Experiment, recording: Recording, p: Tree,
         methods: Mapping[str, Method],
     ) -> None:  # fmt: skip
         self.experiment, self.recording, self.methods = experiment, recording, methods
-        material = replace(p.material, E=_UNIT, by_method=())
-        self.p = replace(p, material=material)
+        self.p = _of_modulus(p, _UNIT).with_settings(by_method=())
         assert experiment.uncertainty is not None
         wanted = experiment.uncertainty.surrogate
         self.surrogate = wanted if wanted in methods else list(methods)[-1]
@@ -143,13 +145,13 @@ class _Bench:
         self.low = np.isin(self.cell.t, low.t)
         self.measured = self.cell.y[:, 0]
 
-    def scene(self, name: str, p: MeasuredBody) -> Scene:
+    def scene(self, name: str, p: Tree) -> Scene:
         scene = self.experiment.build(self.recording, p, self.methods[name].scene)
         assert isinstance(scene, Scene)
         return scene
 
     def forces(
-        self, name: str, p: MeasuredBody, seen: Registered | None = None, steps: int | None = None
+        self, name: str, p: Tree, seen: Registered | None = None, steps: int | None = None
     ) -> Floats:
         """Force (nt,) N at the compared instants, up to where the run ends or `steps` of it.
 
@@ -158,7 +160,7 @@ class _Bench:
         method = replace(self.methods[name], steps=steps)
         seen = seen or self.seen
         (run,) = run_on(self.experiment, name, method, p, self.scene(name, p), (seen,))
-        done = run.traces[_FORCE].y[: len(run.t)]
+        done = run.traces[f"{mover(p.scene).name}.force"].y[: len(run.t)]
         t = (
             self.cell.t[self.cell.t <= run.t[len(done) - 1] + 1e-9]
             if len(done)
@@ -183,8 +185,7 @@ class _Bench:
         Raises `ComparisonError` where it is not.
         """
         f = self.forces(name, self.p)
-        material = replace(self.p.material, E=_OTHER)
-        first = self.forces(name, replace(self.p, material=material), steps=2)
+        first = self.forces(name, _of_modulus(self.p, _OTHER), steps=2)
         own = f[: len(first)] * _OTHER / _UNIT
         off = np.abs(first - own).max(initial=0.0)
         allowed = max(_NEWTON, PROPORTIONAL) * np.abs(own).max(initial=0.0)
@@ -204,16 +205,16 @@ class _Bench:
             self.p, ladder, E, lambda p: self.fit(self._whole(name, p, last + 1)).scale
         )
 
-    def _whole(self, name: str, p: MeasuredBody, steps: int) -> Floats:
+    def _whole(self, name: str, p: Tree, steps: int) -> Floats:
         return self.forces(name, p, steps=steps)
 
     def moved(self) -> Mapping[str, _Moved]:
         """Every uncertain input but the fit's noise, by the surrogate."""
-        p, name = self.p, self.surrogate
+        p, name, ranges = self.p, self.surrogate, self.p.settings.ranges
         base = self.forces(name, p)
         found: dict[str, _Moved] = {}
 
-        def add(what: str, changed: MeasuredBody, seen: Registered | None = None) -> None:
+        def add(what: str, changed: Tree, seen: Registered | None = None) -> None:
             found[what] = self._effect(base, self.forces(name, changed, seen))
 
         assert self.experiment.uncertainty is not None
@@ -225,21 +226,21 @@ class _Bench:
                 add(declared.name, p, self.experiment.place(
                     self.recording, changed, self.scene(name, changed)
                 ))  # fmt: skip
-        add("load", p, self._driven(1 + p.ranges.load, 0.0))
-        zero = hypot(p.ranges.contact, *(d.sd for d in self.seen.drives))
+        add("load", p, self._driven(1 + ranges.load, 0.0))
+        zero = hypot(ranges.contact, *(d.sd for d in self.seen.drives))
         if zero > 0:
             add("contact point", p, self._driven(1.0, zero))
         for what, changed in _sizes(p).items():
             add(what, changed)
-        if p.body.file is not None:
-            found["size"] = _Moved(1 / (1 + p.ranges.size), 0.0)
+        if isinstance(p.scene.body, MeshFile):
+            found["size"] = _Moved(1 / (1 + ranges.size), 0.0)
         held = _held_sideways(p)
-        if held is not None and p.ranges.friction > 0:
+        if held is not None and ranges.friction > 0:
             try:
                 stiff = self.forces(name, held)
             except SceneError:  # held twice over: nothing slides there
                 return found
-            mixed = base + p.ranges.friction * (stiff[: len(base)] - base[: len(stiff)])
+            mixed = base + ranges.friction * (stiff[: len(base)] - base[: len(stiff)])
             found["friction"] = self._effect(base, mixed)
         return found
 
@@ -265,41 +266,54 @@ class _Bench:
         signal = self.recording.signals.get(topic)
         if signal is None:
             return 0.0
-        until = max(float(self.seen.t[0]) + self.p.seen.still, float(signal.t[0]))
-        sd = self.cell.sd if topic == self.p.seen.force else signal.sd
+        until = max(float(self.seen.t[0]) + self.p.settings.seen.still, float(signal.t[0]))
+        sd = self.cell.sd if topic == self.p.settings.seen.force else signal.sd
         return sd / sqrt(max(int((signal.t <= until).sum()), 1))
 
     def zero_of_force(self, fit: ScaledFit, f: Floats) -> float:
         """Standard uncertainty of the modulus from the zero of the force, Pa."""
-        sd = self._rest_sd(str(self.p.seen.force))
+        sd = self._rest_sd(str(self.p.settings.seen.force))
         return abs(self.fit(f, sd).scale - fit.scale)
 
 
-def _sizes(p: MeasuredBody) -> dict[str, MeasuredBody]:
+def _of_modulus(p: Tree, E: float) -> Tree:
+    return p.with_scene(material=replace(p.scene.material, E=E))
+
+
+def _sizes(p: Tree) -> dict[str, Tree]:
     """The body with one size after the other larger by its standard uncertainty."""
-    by, body = 1 + p.ranges.size, p.body
-
-    def larger(sizes: tuple[float, ...], i: int) -> tuple[float, ...]:
-        return tuple(by * s if i == j else s for j, s in enumerate(sizes))
-
-    blocks = {
-        f"size {axis}": replace(body, block=larger(body.block, i))
-        for i, axis in enumerate("xyz"[: len(body.block)])
-    }
-    cylinders = {
-        name: replace(body, cylinder=larger(body.cylinder, i))
-        for i, name in enumerate(("diameter", "height")[: len(body.cylinder)])
-    }
-    return {name: replace(p, body=changed) for name, changed in (blocks | cylinders).items()}
+    by, body = 1 + p.settings.ranges.size, p.scene.body
+    found: dict[str, Any] = {}
+    if isinstance(body, Box | IndentedBlock):
+        found = {f"size {axis}": _widened(body, i, by) for i, axis in enumerate("xyz")}
+    if isinstance(body, Cylinder | IndentedCylinder):
+        found = {n: replace(body, **{n: by * getattr(body, n)}) for n in ("diameter", "height")}
+    return {name: p.with_scene(body=changed) for name, changed in found.items()}
 
 
-def _held_sideways(p: MeasuredBody) -> MeasuredBody | None:
+def _widened(body: Any, i: int, by: float) -> Any:
+    """A block larger along the axis i; the point that is pressed moves along."""
+
+    def larger(at: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(by * x if i == j else x for j, x in enumerate(at))
+
+    pressed = {"at": larger(body.at)} if isinstance(body, IndentedBlock) else {}
+    return replace(body, size=larger(body.size), **pressed)
+
+
+def _held_sideways(p: Tree) -> Tree | None:
     """The body with everything that slides held; None where nothing does."""
-    if p.moved.sideways and not p.held.slides:
+    scene, moved = p.scene, mover(p.scene)
+    across: tuple[int, ...] = ()
+    if isinstance(moved, Drive):
+        across = tuple(c for c in range(3) if not moved.direction[c])
+        held = {c for s in scene.supports if s.facets == moved.facets for c in s.components}
+        across = () if held >= set(across) else across
+    if not across and not any(s.rests for s in scene.supports):
         return None
-    every = "+".join(text for text in (p.held.all, p.held.slides) if text)
-    held = replace(p.held, slides=None, all=every or None)
-    return replace(p, held=held, moved=replace(p.moved, sideways=True))
+    supports = tuple(Support(s.facets) if s.rests else s for s in scene.supports)
+    sideways = (Support(moved.facets, across),) if isinstance(moved, Drive) and across else ()
+    return p.with_scene(supports=(*supports, *sideways))
 
 
 def _value(
@@ -320,7 +334,7 @@ def _value(
         **{what: abs(m.ratio - 1) * E for what, m in moved.items()},
         "repeats": repeats_share(bench.recording) * E,
     }
-    on = f"force of {bench.recording.name} up to {100 * p.seen.fit_to:g} % of the load"
+    on = f"force of {bench.recording.name} up to {100 * p.settings.seen.fit_to:g} % of the load"
     called = "material.E" if first else f"material.E of {name}"
     return IdentifiedValue(
         called, E, "Pa", name, on, {k: u for k, u in parts.items() if u > 0},
@@ -343,7 +357,7 @@ def _finding(
     order = np.argsort(load, kind="stable")
     followed = np.stack([force, np.ones(n)], axis=1)[order]
     residual = (bench.measured[:n] - force)[order]
-    law = bench.methods[name].scene.law
+    law = law_of(bench.methods[name], bench.p)
     off = misfit((bench.measured[:n] - force)[~bench.low[:n]], fit.noise, u, fit.dependence)
     return finding(law, pattern(load[order], residual, followed, fit.noise), off)
 

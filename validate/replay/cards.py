@@ -2,17 +2,11 @@
 
 from dataclasses import dataclass, fields, replace
 from math import sqrt
-from pathlib import Path
-from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import quantity
-from validate.recording.readers import read_recording
-from validate.recording.types import Recording
-from validate.replay.experiment import Change
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
-from validate.scene.similar_grids import member
 from validate.twin.tracked import Camera, require_noise
 
 
@@ -20,6 +14,16 @@ from validate.twin.tracked import Camera, require_noise
 class TimeSteps:
     dt: float = quantity(1e-3, "s", "time step")
     steps: int = quantity(1000, "1", "steps")
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """Meshes in addition to that of the body, for u_num."""
+
+    finer: float = quantity(1.5, "1", "of a grid: how many times finer the finest mesh is")
+    budget: bool = quantity(
+        True, "1", "keep a first answer to about 30 s by fewer meshes; false: as --refine"
+    )
 
 
 @dataclass(frozen=True)
@@ -45,23 +49,6 @@ class TrackedTwin:
         """The models' material as the twin has it."""
         nu = material.nu if self.nu is None else self.nu
         return replace(material, E=self.stiffness * material.E, nu=nu)
-
-
-def beside(parameters: Any, folder: Path) -> tuple[Recording, ...]:
-    """The one recording that lies beside the experiment's own file, under the name it gives."""
-    return (read_recording(folder / parameters.recording),)
-
-
-def scaled(share: float | None, *counts: str) -> Change:
-    """The similar mesh with about `share` of the cells along every edge (none: its own `finer`), in
-    the fields `counts`."""
-
-    def change(p: Any) -> Any:
-        by = p.mesh.finer if share is None else share
-        cells = member([getattr(p.mesh, k) for k in counts], by)
-        return replace(p, mesh=replace(p.mesh, **dict(zip(counts, cells, strict=True))))
-
-    return change
 
 
 def require_used(given: Coefficients, laws: set[LawName]) -> None:

@@ -1,5 +1,5 @@
 """What the library adds to a declaration: an experiment of one of its kinds is complete by its
-parameters alone."""
+settings alone."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -7,6 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from validate.errors import UsageError
 from validate.replay.experiment import Experiment
 from validate.replay.tree import Tree
 
@@ -16,8 +17,8 @@ DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "acc
 
 @cache
 def kinds() -> Mapping[type, Callable[..., Experiment]]:
-    """What makes an experiment, by the class of its settings (or of parameters without a scene);
-    they read all formats, so that they are imported where one is asked for."""
+    """What makes an experiment, by the class of its settings; they read all formats, so that they
+    are imported where one is asked for."""
     from validate.replay.compression import compression
     from validate.replay.compression_cards import Compression
     from validate.replay.inclusion import InclusionTest, inclusion_test
@@ -26,7 +27,7 @@ def kinds() -> Mapping[type, Callable[..., Experiment]]:
 
     return MappingProxyType({
         MeasuredBody: measured_body,
-        Compression: _without_folder(compression),
+        Compression: compression,
         InclusionTest: _without_folder(inclusion_test),
     })  # fmt: skip
 
@@ -35,21 +36,25 @@ def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment
     return lambda *, folder, **given: make(**given)
 
 
-def kind_of(experiment: Experiment) -> type:
-    """The class that says what the experiment measures: of its settings beside a scene."""
-    parameters = experiment.parameters
-    return type(parameters.settings if isinstance(parameters, Tree) else parameters)
-
-
 def of_a_kind(experiment: Experiment) -> bool:
     """Whether its scene and settings say all that is declared of it."""
-    return kind_of(experiment) in kinds()
+    return _kind(experiment) in kinds()
+
+
+def _kind(experiment: Experiment) -> type:
+    """The class that says what the experiment measures."""
+    return type(experiment.parameters.settings)
 
 
 def completed(experiment: Experiment, path: Path) -> Experiment:
     """The experiment declared in that file, with what its kind adds."""
+    if not isinstance(experiment.parameters, Tree):
+        raise UsageError(
+            f"{path}: parameters of type {type(experiment.parameters).__name__}; declare a scene: "
+            "Experiment(scene=Scene(...), settings=...)"
+        )
     if of_a_kind(experiment) and not experiment.complete:
         given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
-        make = kinds()[kind_of(experiment)]
+        make = kinds()[_kind(experiment)]
         experiment = make(**given, folder=path.resolve().parent)
     return experiment.at(path)

@@ -1,29 +1,25 @@
 """Bodies pressed between two plates, or pulled between two grips, from a log of displacement and
-force: what a file of one's own declares, and the experiment that follows.
+force: the experiment that follows from a scene and its `Compression`.
 
-The body is a cylinder or a mesh file. Displacement counts from contact less the toe (where the
-fitted line reaches zero force), force from the cell's own offset; the first window of strain fits
-the modulus where none is given, the second predicts.
+The body is a cylinder or a mesh file (`replay.pressed_scene`). Displacement counts from contact
+less the toe (where the fitted line reaches zero force), force from the cell's own offset; the first
+window of strain fits the modulus where none is given, the second predicts.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
-
-import numpy as np
+from typing import Any, cast
 
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.files import modified
 from validate.identify.modulus import MIN_SAMPLES, fit_modulus
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.cards import beside, scaled
-from validate.replay.compression_cards import Compression, Pressed, stated_sizes
+from validate.replay.compression_cards import stated_sizes
 from validate.replay.cost import INPUTS, affordable, linear_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
@@ -34,107 +30,96 @@ from validate.replay.experiment import (
     Uncertainty,
     vary,
 )
-from validate.replay.fitted_moduli import modulus_in, toe_in
+from validate.replay.fitted_moduli import toe_in
+from validate.replay.mesh_sizes import DIAMETER
 from validate.replay.method import Method
 from validate.replay.pressed import pressed_log
-from validate.replay.pressed_modulus import by_model, identify_pressed, model_name
-from validate.replay.pressed_outline import (
-    OUTLINE_INPUTS,
-    with_outline,
-    with_surface,
-)
-from validate.scene.coarser import coarser, size_against
-from validate.scene.cylinder import quarter_cylinder, whole_cylinder
-from validate.scene.material import LawName, Material
-from validate.scene.mesh import Mesh, cell_volumes
-from validate.scene.mesh_file import read_mesh
-from validate.scene.plates import Contact
-from validate.scene.refine import of_element, refined
-from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.replay.pressed_modulus import identify_pressed
+from validate.replay.pressed_outline import MODULI, OUTLINE_INPUTS, stiffer, with_outline
+from validate.replay.pressed_scene import BuiltPressed, by_model, kind_of_test, pressed_size
+from validate.replay.tree import CellSize, ScaledBody, Tree, beside, changed_by, mesh_of
+from validate.scene.geometry import Cylinder, MeshFile
+from validate.scene.scene import Scene
 
-STAGE = Drive("stage", "upper_plate", (0.0, 0.0, -1.0))
-PULLED = Drive("stage", "upper_plate", (0.0, 0.0, 1.0))
-SYMMETRY = (Support("symmetry_x", (0,)), Support("symmetry_y", (1,)))  # of a quarter
 _LOAD_STEPS = 20  # of a table of loads at large strain, to the strain limit
-
-
-def pressed(
-    label: str,
-    plates: Contact = "slip",
-    law: LawName = "linear",
-    order: Literal[1, 2] = 2,
-    *,
-    fluid: bool = False,
-) -> Method:
-    """A static model of the body between plates that slip or hold it, in a law; a linear one may
-    have fluid of constant volume in `specimen.fluid`. Raises `UsageError` for another with it."""
-    linear = law == "linear"
-    if fluid and not linear:
-        raise UsageError(f"method '{label}': fluid needs the linear law, not {law}")
-    slow = Tabulated(StaticNewton("none"))
-    settings = ExactPressure() if fluid else NoFluid() if linear else slow
-    return Method(label, settings, Pressed(plates, law, order))
 
 
 def compression(
     name: str,
     title: str,
     source: str,
-    parameters: Compression,
+    parameters: Tree,
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
     kind: Kind = "measured",
+    *,
+    folder: Path = Path(),
 ) -> Experiment:
-    """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that
-    `parameters` name at images of their own."""
-    shown = parameters.outline.topic is not None
+    """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that the
+    settings name at images of their own.
+
+    `folder` is that of the experiment's file, from which a mesh file is found. Raises `UsageError`
+    for a scene that is not of this kind.
+    """
+    kind_of_test(parameters)
+    shown = parameters.settings.outline.topic is not None
+    if shown and getattr(parameters.scene.body, "part", "whole") != "whole":
+        raise UsageError(
+            "body.part: outlines show all of the body, not a quarter; declare part='whole' and "
+            "Support('lower_plate', (2,), rests=True)"
+        )
+    filed, build = isinstance(parameters.scene.body, MeshFile), BuiltPressed(folder)
+    # A mesh file has no coarser ones. The corners of bonded plates limit the order.
+    levels = (_halved(1), _halved(2)) if filed else (ScaledBody(0.5), ScaledBody(0.75), _finer)
+    ladder = MeshLadder(levels, CellSize(folder), CORNER_ORDER)
     inputs = (
-        vary(("material.E", "material.E_bonded"), "relative ranges.E", "modulus",
-             "E within its declared uncertainty"),
+        vary(MODULI, "relative ranges.E", "modulus", "E within its declared uncertainty"),
         Input("diameter", _wider_body if shown else _stiffer_by_area,
               "diameter within its declared range", "assumed"),
         *(OUTLINE_INPUTS if shown else ()),
     )  # fmt: skip
     return Experiment(
-        name, title, source, parameters, methods, accepted, accept, beside, _build,
-        partial(_place, shown=shown), sets=_sets, stated=stated_sizes,
+        name, title, source, parameters, methods, accepted, accept, beside, build,
+        partial(_place, folder=folder, shown=shown), sets=partial(_sets, folder=folder),
+        stated=stated_sizes,
         identify=partial(
-            identify_pressed, build=_build, ladder=_MESHES, accepted=accepted,
+            identify_pressed, build=build, ladder=ladder, accepted=accepted,
             declared=inputs if shown else (),
         ),
-        follows=_affordable,
-        refine=lambda p, _: {} if p.specimen.mesh is None else {"mesh.budget": "false"},
+        follows=partial(_affordable, folder=folder),
+        refine=_refined,
         frames=2,
         kind=kind,
-        uncertainty=Uncertainty(
-            mesh=_MESHES,
-            inputs=inputs,
-            surrogate=accepted[0],
-        ),
+        uncertainty=Uncertainty(mesh=ladder, inputs=inputs, surrogate=accepted[0]),
     )  # fmt: skip
 
 
+def _refined(tree: Tree, folder: Path) -> Mapping[str, str]:
+    """What --refine sets: of a mesh file its own mesh, and no time limit."""
+    body = tree.scene.body
+    if not isinstance(body, MeshFile):
+        return {}
+    return {"mesh.budget": "false", **({"body.halvings": "0"} if body.halvings < 0 else {})}
+
+
 def _affordable(
-    experiment: Experiment, recordings: Sequence[Recording], p: Compression
+    experiment: Experiment, recordings: Sequence[Recording], tree: Tree, *, folder: Path
 ) -> Experiment:
     """The experiment with those halvings of a mesh file that fit into memory and `mesh.budget`;
     where its inputs are dear, they are moved one by one only."""
-    if p.specimen.mesh is None:
+    declared = experiment.uncertainty
+    if not isinstance(tree.scene.body, MeshFile) or declared is None or declared.mesh is None:
         return experiment
-    assert experiment.uncertainty is not None
-    first = experiment.methods[experiment.accepted[0]].scene
-    scene = _build(recordings[0], p, first)
-    N, declared = scene.mesh.nodes.size, experiment.uncertainty
-    finer = [8 * N, 64 * N]
-    levels = affordable((_level(None, 1), _level(None, 2)), finer, budget=p.mesh.budget)
-    levels = levels or (_level(None, -1),)
-    ladder = replace(_MESHES, levels=levels)
+    budget = tree.settings.mesh.budget
+    first = changed_by(tree, experiment.methods[experiment.accepted[0]].scene or {})
+    N = mesh_of(None, first, folder).nodes.size
+    coarser = -tree.scene.body.halvings  # its own mesh is then the finest
+    finer = declared.mesh.levels[: coarser if coarser > 0 else None]
+    levels = affordable(finer, [8 * N, 64 * N][: len(finer)], budget=budget)
+    ladder = replace(declared.mesh, levels=levels or (_halved(-1),))
     runs = 1 + len(declared.inputs) + declared.draws
-    dear = p.mesh.budget and runs * linear_seconds(N) > INPUTS
+    dear = budget and runs * linear_seconds(N) > INPUTS
     return replace(
         experiment,
         uncertainty=replace(declared, mesh=ladder, draws=0 if dear else declared.draws),
@@ -142,80 +127,25 @@ def _affordable(
     )
 
 
-# --- the scene ------------------------------------------------------------------------------------
-
-
-def _build(recording: Recording, p: Compression, model: Pressed) -> Scene:
-    mesh, whole = _body(p), p.specimen.mesh is not None or p.outline.topic is not None
-    own = modulus_in(p.material.by_method, model_name(model.law, model.plates, model.order))
-    own = own or (p.material.E_bonded if model.plates == "bonded" else None)
-    scene = Scene(
-        mesh,
-        Material(
-            own or p.material.E or 1.0,
-            p.material.nu,
-            model.law,
-            coefficients=p.material.coefficients.known_to(model.law),
-        ),
-        (*between(model.plates), *(() if whole else SYMMETRY)),
-        pins=_pins(mesh) if whole and model.plates == "slip" else (),
-        drives=(STAGE if p.test == "compression" else PULLED,),
-        copies=1 if whole else 4,
-        cavities=(Cavity("inclusion", p.specimen.fluid),) if p.specimen.fluid else (),
-    )
-    for _ in range(p.mesh.halvings if p.specimen.mesh else 0):
-        scene = refined(scene)
-    return of_element(scene, "P2" if model.order == 2 else "MD")
-
-
-def _body(p: Compression) -> Mesh:
-    """The body of the mesh file, or a quarter of the cylinder; all of it where images show it."""
-    if p.specimen.mesh is not None:
-        return with_surface(_of_file(Path(p.specimen.mesh), p.specimen.mesh_unit, p.mesh.halvings))
-    size, grid = p.specimen.size, p.mesh
-    if p.outline.topic is not None:
-        whole = whole_cylinder(size.diameter, size.height, grid.radial, grid.axial)
-        return with_surface(whole)
-    return quarter_cylinder(size.diameter, size.height, grid.radial, grid.axial)
-
-
-def _of_file(path: Path, unit: str | None, halvings: int) -> Mesh:
-    """The mesh of a file, or a coarser filling of it."""
-    return _coarse(path, unit, modified(path)) if halvings < 0 else read_mesh(path, unit)
-
-
-@lru_cache(maxsize=2)
-def _coarse(path: Path, unit: str | None, changed: int) -> Mesh:
-    return coarser(read_mesh(path, unit))
-
-
-def between(contact: Contact) -> tuple[Support, ...]:
-    """The fixed plate below, and what the moving one above holds sideways."""
-    if contact == "slip":
-        return (Support("lower_plate", (2,)),)
-    return (Support("lower_plate", (0, 1, 2)), Support("upper_plate", (0, 1)))
-
-
-def _pins(mesh: Mesh) -> tuple[Pin, ...]:
-    return Support("lower_plate", (2,), rests=True).pins(mesh)
-
-
 # --- the recording in it --------------------------------------------------------------------------
 
 
-def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -> Registered:
+def _place(
+    recording: Recording, tree: Tree, scene: Scene, *, folder: Path, shown: bool
+) -> Registered:
+    p, size, test = tree.settings, pressed_size(tree, folder), kind_of_test(tree)
     if p.outline.topic is not None and not shown:
         raise UsageError(
             "outline.topic: the uncertain inputs of outlines are chosen in the experiment's file; "
             "name the topic there, PressedOutline(topic=...)"
         )
-    fit = fit_modulus(recording, p.specimen.size, (p.fit_from, p.fit_to), p.test)
+    fit = fit_modulus(recording, size, (p.fit_from, p.fit_to), test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
     seen = pressed_log(
-        recording, fit, p.specimen.size.height, p.limit, strains, noise,
-        share=repeats_share(recording), test=p.test,
-        toe=toe_in(p.material.by_method, by_model(scene)) if p.material.by_method else None,
+        recording, fit, size.height, p.limit, strains, noise,
+        share=repeats_share(recording), test=test,
+        toe=toe_in(p.by_method, by_model(scene)) if p.by_method else None,
     )  # fmt: skip
     for window in seen.selections:
         if window.t is not None and len(window.t) < MIN_SAMPLES:
@@ -228,50 +158,38 @@ def _place(recording: Recording, p: Compression, scene: Scene, *, shown: bool) -
     return with_outline(seen, recording, p.outline, scene.mesh)
 
 
-def _sets(p: Compression, seen: Registered) -> Mapping[str, Any]:
+def _sets(tree: Tree, seen: Registered, *, folder: Path) -> Mapping[str, Any]:
     """Large strain is solved on a grid of loads to the limit."""
-    return {"step": p.limit * p.specimen.size.height / _LOAD_STEPS}
+    height = pressed_size(tree, folder).height
+    return {"step": tree.settings.limit * height / _LOAD_STEPS}
 
 
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
-def _level(share: float | None, halvings: int) -> Change:
-    """The cylinder with `share` of its cells an edge, or the mesh file with its edges halved."""
+def _finer(tree: Tree) -> Tree:
+    return ScaledBody(tree.settings.mesh.finer)(tree)
 
-    def change(p: Compression) -> Any:
-        if p.specimen.mesh is None:
-            return scaled(share, "radial", "axial")(p)
-        return replace(p, mesh=replace(p.mesh, halvings=p.mesh.halvings + halvings))
+
+def _halved(times: int) -> Change:
+    """The mesh file with its cells' edges halved so many times more."""
+
+    def change(tree: Tree) -> Tree:
+        body = tree.scene.body
+        return tree.with_scene(body=replace(body, halvings=body.halvings + times))
 
     return change
 
 
-def _cell(p: Compression) -> float:
-    """The edge m of a cube as large as a mean cell."""
-    if p.specimen.mesh is None:
-        cells: int = p.mesh.radial**2 * p.mesh.axial
-        return float(p.specimen.size.height / cells ** (1 / 3))
-    own = _body(replace(p, mesh=replace(p.mesh, halvings=0)))
-    size = float(np.cbrt(cell_volumes(own).mean()))
-    return size * size_against(own, _body(p)) if p.mesh.halvings < 0 else size / 2**p.mesh.halvings
-
-
-# A mesh file has no coarser ones. The corners of bonded plates limit the order.
-_MESHES = MeshLadder((_level(0.5, 0), _level(0.75, 1), _level(None, 2)), _cell, CORNER_ORDER)
-
-
-def _wider_body(p: Compression, z: float) -> Compression:
+def _wider_body(tree: Tree, z: float) -> Tree:
     """Of a mesh file, whose shape is its own, only the force is changed."""
-    size = p.specimen.diameter
-    if p.specimen.mesh is not None or size is None:
-        return _stiffer_by_area(p, z)
-    return replace(p, specimen=replace(p.specimen, diameter=size * (1 + z * p.ranges.diameter)))
+    body = tree.scene.body
+    if not isinstance(body, Cylinder) or body.diameter is None:
+        return _stiffer_by_area(tree, z)
+    by = 1 + z * tree.settings.ranges.diameter
+    return tree.given({DIAMETER: body.diameter * by})
 
 
-def _stiffer_by_area(p: Compression, z: float) -> Compression:
+def _stiffer_by_area(tree: Tree, z: float) -> Tree:
     """A wider specimen is as much stiffer as its area is larger."""
-    by = (1 + z * p.ranges.diameter) ** 2
-    moduli = {k: getattr(p.material, k) for k in ("E", "E_bonded")}
-    stiffer: dict[str, Any] = {k: None if E is None else E * by for k, E in moduli.items()}
-    return replace(p, material=replace(p.material, **stiffer))
+    return stiffer(tree, (1 + z * tree.settings.ranges.diameter) ** 2)

@@ -1,40 +1,40 @@
-"""What a user decides of a body between two plates, or between grips: its sizes, material, mesh,
-declared uncertainties, windows of strain, and what images show of it."""
+"""What a user decides of a body between two plates, or between grips, besides its scene: declared
+uncertainties, windows of strain, and what images show of it."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from types import MappingProxyType
+from typing import Any
 
-from validate.identify.modulus import CylinderSize, TestKind, stated_test
-from validate.parameters import Ranges, known, part, quantity
+from validate.identify.modulus import stated_test
+from validate.parameters import Ranges, quantity
 from validate.recording.exports.geometry import loaded_area
 from validate.recording.types import Recording
-from validate.replay.mesh_sizes import sizes_of_file
+from validate.replay.cards import Meshes
+from validate.replay.mesh_sizes import DIAMETER, HEIGHT, PLATES
 from validate.replay.pressed_outline import PressedOutline
-from validate.scene.laws import Coefficients
-from validate.scene.material import LawName
-from validate.scene.plates import Contact
+from validate.scene.scene import Support
 
-
-def size_of(diameter: float | None, height: float | None) -> CylinderSize:
-    """The cylinder of a card; raises `UsageError` while a size is not set."""
-    return CylinderSize(known(diameter, "specimen.diameter"), known(height, "specimen.height"))
+#: What a method changes of a declared scene where both plates, or grips, hold the body.
+BONDED_PLATES: Mapping[str, Any] = MappingProxyType(
+    {"supports": (Support(PLATES[0]), Support(PLATES[1], (0, 1)))}
+)
 
 
 def stated_sizes(recording: Recording) -> dict[str, float]:
-    """What a recording's record `specimen` says of a cylinder, m, by parameter.
+    """What a recording's record `specimen` says of a cylinder, m, by path.
 
     Another cross-section has the diameter of the circle of its area.
     """
     found = _record(recording)
     area, sizes = loaded_area(found, stated_test(recording)), {}
     if "diameter_m" in found:
-        sizes["specimen.diameter"] = found["diameter_m"]
+        sizes[DIAMETER] = found["diameter_m"]
     elif area is not None:
-        sizes["specimen.diameter"] = 2 * math.sqrt(area / math.pi)
+        sizes[DIAMETER] = 2 * math.sqrt(area / math.pi)
     if "height_m" in found:
-        sizes["specimen.height"] = found["height_m"]
+        sizes[HEIGHT] = found["height_m"]
     return sizes
 
 
@@ -61,49 +61,6 @@ def _above_zero(text: str) -> float | None:
 
 
 @dataclass(frozen=True)
-class Specimen:
-    """A cylinder; or the body of a mesh file of linear tetrahedra, axis z, with the facet sets
-    "lower_plate" and "upper_plate", whose equivalent diameter is then that of equal area."""
-
-    diameter: float | None = quantity(None, "m", "diameter; none: the recording's", asked=True)
-    height: float | None = quantity(None, "m", "height; none: the recording's", asked=True)
-    mesh: str | None = quantity(None, "1", "mesh file (npz, inp, msh, vtu); none: a cylinder")
-    mesh_unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
-    fluid: str | None = quantity(None, "1", "facet set around a fluid inside; none: no fluid")
-
-    @property
-    def size(self) -> CylinderSize:
-        """Raises `UsageError` while a size is not set."""
-        return size_of(self.diameter, self.height)
-
-
-@dataclass(frozen=True)
-class Gel:
-    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified, slipping plates")
-    E_bonded: float | None = quantity(
-        None, "Pa", "of models with bonded plates; none: E, or identified with bonded plates"
-    )
-    nu: float = quantity(0.499, "1", "Poisson ratio, nearly incompressible")
-    by_method: tuple[tuple[str, float, float], ...] = quantity(
-        (), "1", "set by the run: modulus (Pa) and start of the load (m) of each model"
-    )
-    coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
-
-
-@dataclass(frozen=True)
-class CylinderGrid:
-    radial: int = quantity(4, "1", "elements from axis to rim")
-    axial: int = quantity(4, "1", "elements along the axis")
-    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
-    halvings: int = quantity(
-        0, "1", "of a mesh file: times its cells' edges are cut in half; -1: filled anew, coarser"
-    )
-    budget: bool = quantity(
-        True, "1", "of a mesh file: keep a first answer to about 30 s; false: as --refine"
-    )
-
-
-@dataclass(frozen=True)
 class CompressionRanges(Ranges):
     E: float = quantity(0.05, "1", "relative, of a given modulus")
     diameter: float = quantity(0.005, "1", "relative, of the diameter")
@@ -117,34 +74,17 @@ class CompressionRanges(Ranges):
 
 @dataclass(frozen=True)
 class Compression:
-    """Everything a user decides of a compression test; `recording` lies beside the file."""
+    """A test between plates or grips, besides its scene (`replay.pressed_scene`)."""
 
-    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
-    test: TestKind = quantity("compression", "1", "whether the upper plate presses or pulls")
-    specimen: Specimen = Specimen()
-    material: Gel = Gel()
-    mesh: CylinderGrid = CylinderGrid()
     ranges: CompressionRanges = CompressionRanges()
     outline: PressedOutline = PressedOutline()
     fit_from: float = quantity(0.005, "1", "strain from which the modulus is fitted")
     fit_to: float = quantity(0.05, "1", "strain to which the modulus is fitted")
     limit: float = quantity(0.10, "1", "largest strain compared; linear laws hold to about 0.1")
-
-    def stated_by_files(self) -> Mapping[str, float]:
-        """Return the sizes m that a mesh file holds, by parameter; none of a cylinder.
-
-        Raises what reading the file does.
-        """
-        body = self.specimen
-        if body.mesh is None or None not in (body.diameter, body.height):
-            return {}
-        return sizes_of_file(body.mesh, body.mesh_unit)
-
-
-@dataclass(frozen=True)
-class Pressed:
-    """What a method's scene is built with."""
-
-    plates: Contact = quantity("slip", "1", "contact of both plates")
-    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
-    order: Literal[1, 2] = quantity(2, "1", "element order; 1 means nodal mean dilatation")
+    mesh: Meshes = Meshes()
+    E_bonded: float | None = quantity(
+        None, "Pa", "of models with bonded plates; none: material.E, or identified with them"
+    )
+    by_method: tuple[tuple[str, float, float], ...] = quantity(
+        (), "1", "set by the run: modulus (Pa) and start of the load (m) of each model"
+    )

@@ -29,11 +29,13 @@ _LEAVES = (str, bool, int, float, type(None))
 _MODULES = (
     "compare.effects", "compare.expected", "compare.published", "compare.verdict",
     "estimate.filters", "register.fitting", "register.sensing", "replay.calibration",
-    "replay.cards", "replay.compression_cards", "replay.contact_cards", "replay.experiment",
+    "replay.cards", "replay.compression_cards", "replay.experiment",
     "replay.inclusion", "replay.inclusion_body", "replay.measured_cards", "replay.method",
-    "replay.tree", "replay.variation", "scene.contact", "scene.geometry", "scene.hollow_block",
-    "scene.laws", "scene.material", "scene.prony", "scene.scene", "scene.select", "scene.sheet",
-    "scene.tool", "scene.tracked", "solve.schemes",
+    "replay.tree",
+    "replay.variation", "scene.contact", "scene.geometry", "scene.hollow_block",
+    "scene.indented", "scene.indenter", "scene.laws", "scene.material", "scene.prony",
+    "scene.scene", "scene.select", "scene.sheet", "scene.tool",
+    "scene.tracked", "solve.schemes",
 )  # fmt: skip
 _RUNS_PROGRAMS = ("Guest", "GuestLetGo")  # settings whose command would be a stranger's
 

@@ -6,8 +6,8 @@ from validate.errors import ValidateError
 from validate.recording.types import Recording
 from validate.replay.experiment import Experiment
 from validate.replay.first_modes import assumed_density, first_frequencies
-from validate.replay.measured_cards import MeasuredBody
 from validate.replay.origins import Opened, opened
+from validate.replay.tree import Tree
 from validate.report.motion_words import motion_lines
 from validate.scene.scene import Scene
 
@@ -32,8 +32,7 @@ def _lines(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
 def _modes(experiment: Experiment, found: Opened) -> tuple[str, ...]:
     """Of the first model; empty without one of known modulus that is held."""
     p = found.parameters
-    of_body = isinstance(p, MeasuredBody)
-    if of_body and p.material.E is None:
+    if isinstance(p, Tree) and isinstance(p.scene, Scene) and p.scene.material.E is None:
         return ()
     model = next(iter(experiment.methods.values())).scene
     try:
@@ -42,5 +41,5 @@ def _modes(experiment: Experiment, found: Opened) -> tuple[str, ...]:
     except (ValidateError, np.linalg.LinAlgError):
         return ()
     words = ", ".join(f"{f:.3g}" for f in modes)
-    assumed = assumed_density(p) if of_body else ""
+    assumed = assumed_density(p)
     return (f"first modes of the body: {words} Hz{assumed and f' ({assumed})'}",) if modes else ()

@@ -306,10 +306,9 @@ def _sets_nothing(parameters: Any, seen: Registered) -> Mapping[str, Any]:
 class Experiment:
     """One experiment; see the fields of each part for units.
 
-    Declared, it has a `scene`, whose numbers are its parameters by path; `settings` is a dataclass
-    of what no scene holds, `recording` the file from the experiment's folder. A method's `scene` is
-    then its changes by path: {"body.cells": (9, 9, 24)}. Kinds of
-    `validate new` in the older form have `parameters` of a dataclass of their own, and `build`.
+    It is declared by a `scene`, whose numbers are its parameters by path; `settings` is a dataclass
+    of what no scene holds, `recording` the file from the experiment's folder: its `parameters` are
+    the `Tree` of these. A method's `scene` is its changes by path: {"body.cells": (9, 9, 24)}.
 
     `methods` maps a name to a `Method`. `load` gets the parameters and the experiment's folder;
     `build` a recording, the parameters and a method's `scene` options; `place` registers a
@@ -416,7 +415,7 @@ class Experiment:
     def _find_from(self, folder: Path) -> None:
         """Mesh files of a declared body are found from the experiment's folder."""
         if isinstance(self.build, Built):
-            object.__setattr__(self, "build", Built(folder))
+            object.__setattr__(self, "build", replace(self.build, folder=folder))
         declared = self.uncertainty
         if declared and declared.mesh and isinstance(declared.mesh.size, CellSize):
             mesh = replace(declared.mesh, size=CellSize(folder))

@@ -1,26 +1,33 @@
 """The first natural frequencies of a body as it is held."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from validate.errors import SceneError
 from validate.fem.modes import modes_of
 from validate.fem.system import build
-from validate.replay.measured_cards import MeasuredBody, Tissue
+from validate.replay.measured_cards import MeasuredBody
 from validate.replay.own_body import with_law
-from validate.scene.scene import Scene
+from validate.replay.tree import Tree
+from validate.scene.scene import Scene, Weight
 
 COUNT = 3
+WATER = 1000.0  # kg/m3: the density of a body of which nobody said one
 _MOST = 60_000  # unknowns
 _RIGID = 1e-3  # Hz: below it a motion is one of the whole body
 
 
-def assumed_density(p: MeasuredBody) -> str:
-    """Words on a density that nobody stated; empty of one that was asked for, or set."""
-    if p.motion.how == "dynamic" or p.moved.by == "gravity" or p.material.rho != Tissue().rho:
+def assumed_density(p: Any) -> str:
+    """Words on a density that nobody stated, of a measured body; empty of one that counts in what
+    is simulated, or that was set, and of other experiments."""
+    if not isinstance(p, Tree) or not isinstance(p.settings, MeasuredBody):
         return ""
-    return f"with an assumed density of {p.material.rho:g} kg/m3, near that of water"
+    rho, weighed = p.scene.material.rho, any(isinstance(x, Weight) for x in p.scene.loads)
+    if p.settings.motion.how == "dynamic" or weighed or rho != WATER:
+        return ""
+    return f"with an assumed density of {rho:g} kg/m3, near that of water"
 
 
 def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:

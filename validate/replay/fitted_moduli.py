@@ -54,8 +54,7 @@ def toe_in(entries: tuple[Entry, ...], name: str) -> float | None:
 
 def moving(p: Any, moves: Moves, z: float) -> Any:
     """Parameters with the moduli of every model moved."""
-    entries = moves.of(p.material.by_method, z)
-    return replace(p, material=replace(p.material, by_method=entries))
+    return p.with_settings(by_method=moves.of(p.settings.by_method, z))
 
 
 def with_move(

@@ -15,7 +15,7 @@ from validate.errors import ComparisonError, UsageError
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
-from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 
 # What machines for soft materials yield, m/N: a stiff frame, and a small one with its load cell.
 USUAL = (1e-7, 1e-6)
@@ -24,16 +24,17 @@ _UPPER = 0.8  # of the largest force: above it the specimen's own slope is read
 _FEWEST = 5  # samples of a slope
 
 
-def yielding(p: MeasuredBody, folder: Path) -> MeasuredBody:
-    """Return the parameters with the compliance that a recording of a rigid block shows.
+def yielding(p: Tree, folder: Path, displacement: str) -> Tree:
+    """Return the parameters with the compliance that a recording of a rigid block shows, in the
+    signals of these names.
 
     Raises `ComparisonError` where it shows none, `RecordingError` where it cannot be read.
     """
-    card = p.machine
+    card = p.settings.machine
     if card.measured is None:
         return p
-    C, sd = _measured(folder / card.measured, p.moved.by, str(p.seen.force))
-    return replace(p, machine=replace(card, compliance=C, sd=sd, measured=None))
+    C, sd = _measured(folder / card.measured, displacement, str(p.settings.seen.force))
+    return p.with_settings(machine=replace(card, compliance=C, sd=sd, measured=None))
 
 
 @lru_cache(maxsize=4)
@@ -58,13 +59,13 @@ def _measured(path: Path, displacement: str, force: str) -> tuple[float, float]:
 
 
 def taken_off(
-    drive: SignalObservation, p: MeasuredBody, force: SignalObservation | None
+    drive: SignalObservation, p: Tree, force: SignalObservation | None
 ) -> SignalObservation:
     """Return the drive less what the machine yields; its sd has the force's in it.
 
     Raises `UsageError` for a compliance without a recorded force.
     """
-    C = p.machine.compliance
+    C = p.settings.machine.compliance
     if not C:
         return drive
     if force is None:
@@ -76,15 +77,17 @@ def taken_off(
     return replace(drive, y=y[:, None], sd=hypot(drive.sd, C * force.sd))
 
 
-def doubt(p: MeasuredBody, recording: Recording, limit: float | None) -> str:
+def doubt(
+    p: Tree, recording: Recording, displacement: str, limit: float | None
+) -> str:  # fmt: skip
     """Return the doubt that the machine's compliance is not stated; "" where it does not matter.
 
     It matters where a usual machine shifts the largest force by more than the limit N, or by more
     than 3 % of it. To first order the shift is C F dF/du, with the slope of the recording itself.
     """
-    if p.machine.compliance is not None or not p.seen.force:
+    if p.settings.machine.compliance is not None or not p.settings.seen.force:
         return ""
-    u, F = recording.signal(p.moved.by, "m"), recording.signal(p.seen.force, "N")
+    u, F = recording.signal(displacement, "m"), recording.signal(p.settings.seen.force, "N")
     size = np.abs(np.interp(u.t, F.t, F.y[:, 0] - F.y[0, 0]))
     top, way = float(size.max()), np.abs(u.y[:, 0] - u.y[0, 0])
     slope = _slope(way, size)

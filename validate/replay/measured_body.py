@@ -1,5 +1,5 @@
 """Any body under what a recording says moved it: a mesh file, block or cylinder, held and moved
-where the user says, judged by force, markers and outlines; and the experiment that follows.
+where its scene says, judged by force, markers and outlines; and the experiment that follows.
 
 Statics at evenly spaced instants, or the motion in time (`moving_body`). In statics the body is
 unloaded at the first one: what is compared of markers and outlines counts from there. An open
@@ -10,28 +10,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
-from validate.parameters import known
 from validate.recording.types import Recording
 from validate.replay.body_mesh import (
-    AXES,
-    body_of,
     even_axes,
     grid_unknowns,
-    gridded,
+    is_round,
     mesh_of,
-    named_places,
-    slides_across,
     unknowns_of,
 )
 from validate.replay.body_modulus import identify_body, model_name
-from validate.replay.cards import beside
 from validate.replay.cost import INPUTS, MESHES, affordable, fits, linear_seconds, newton_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
@@ -45,41 +38,40 @@ from validate.replay.experiment import (
 )
 from validate.replay.fitted_moduli import modulus_in
 from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_cards import MeasuredBody, SeenOf, Solid, SolidModel
-from validate.replay.measured_contact import (
-    contact_of,
-    is_quarter,
-    require_touching,
-    symmetry,
-)
-from validate.replay.measured_drive import NOTED, drive_kind, prescribed
+from validate.replay.measured_cards import SeenOf
+from validate.replay.measured_drive import drive_kind, mover, placed_points, pressing
 from validate.replay.measured_seen import place
 from validate.replay.method import Method
 from validate.replay.moving_body import doubting, following, in_motion
-from validate.scene.coarser import size_against
-from validate.scene.material import LawName, Material
-from validate.scene.mesh import Mesh, cell_volumes, quadratic
-from validate.scene.named_place import axis_of, place_of
-from validate.scene.refine import of_element
-from validate.scene.scene import Drive, Load, Pin, Pressure, Scene, Support, Weight
+from validate.replay.solid_model import Changes, element_of, is_quadratic, law_of, model_of
+from validate.replay.tree import CellSize, Tree, beside, changed_by
+from validate.scene.geometry import Geometry, MeshFile
+from validate.scene.material import LawName
+from validate.scene.scene import Drive, Scene
 from validate.scene.similar_grids import fitting, member
+from validate.solve.contact import ContactNewton
 from validate.solve.newton import StaticNewton
 from validate.solve.quasi_static import QuasiStatic
 
 _REFINED = 600.0  # s, of the runs that --refine makes of quadratic cells
 
 
-def solid(label: str, law: LawName = "neo_hooke", order: Any = 1) -> Method:
-    """A static model of the body in a law, of linear (nodal mean dilatation) or quadratic cells."""
+def solid(label: str, law: LawName = "neo_hooke", scene: Changes | None = None) -> Method:
+    """A static model of the body in a law, with further changes of the scene by path."""
     settings = QuasiStatic() if law == "linear" else StaticNewton("none")
-    return Method(label, settings, SolidModel(law, order))
+    return Method(label, settings, {**model_of(law), **(scene or {})})
+
+
+def touching(label: str, law: LawName = "neo_hooke", scene: Changes | None = None) -> Method:
+    """As `solid`, of a body that is pressed by a rigid indenter."""
+    return Method(label, ContactNewton(), {**model_of(law), **(scene or {})})
 
 
 def measured_body(
     name: str,
     title: str,
     source: str,
-    parameters: MeasuredBody,
+    parameters: Tree,
     methods: Mapping[str, Method],
     accepted: tuple[str, ...],
     accept: tuple[Accept, ...],
@@ -90,27 +82,28 @@ def measured_body(
 
     `folder` is that of the experiment's file, from which a mesh file is found.
     """
+    settings = parameters.settings
+    levels = _HALVINGS if isinstance(parameters.scene.body, MeshFile) else _SHARES
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
         partial(static_scene, folder=folder), partial(place, folder=folder),
-        frames=parameters.seen.states + 1, kind=kind,
+        frames=settings.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
-            mesh=MeshLadder(_SHARES if parameters.body.file is None else _HALVINGS,
-                            partial(_cell, body=partial(body_of, folder=folder)),
+            mesh=MeshLadder(levels, CellSize(folder),
                             _order(parameters, methods, accepted)),
             inputs=_inputs_of(parameters),
             surrogate=list(methods)[-1],
         ),
     )  # fmt: skip
     bare = replace(bare, refine=partial(_finer_settings, methods=bare.methods))
-    if parameters.motion.how == "dynamic":
+    if settings.motion.how == "dynamic":
         made = in_motion(bare, bare.build, folder)
         return replace(made, follows=partial(_in_motion_as_set, folder=folder))
     return _as_set(bare, (), parameters, folder=folder)
 
 
 def _as_set(
-    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
+    experiment: Experiment, recordings: Sequence[Recording], p: Tree, *, folder: Path
 ) -> Experiment:
     """The experiment with the inputs that these parameters make uncertain, and charts along the
     axis of the largest motion."""
@@ -127,16 +120,16 @@ def _as_set(
 
 
 def _in_motion_as_set(
-    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody, *, folder: Path
+    experiment: Experiment, recordings: Sequence[Recording], p: Tree, *, folder: Path
 ) -> Experiment:
-    order = experiment.methods[experiment.accepted[0]].scene.order
+    order = _order_of(experiment.methods[experiment.accepted[0]], p)
     made = _with_levels(experiment, _levels(p, order, folder)[0])
     return following(made, recordings, p)
 
 
 def _identified(
     recordings: Sequence[Recording],
-    p: MeasuredBody,
+    p: Tree,
     methods: Mapping[str, Method],
     *,
     experiment: Experiment,
@@ -144,12 +137,13 @@ def _identified(
 ) -> Identified:
     """The compliance that a rigid block shows, an open modulus, and the doubt of a machine whose
     compliance nobody stated."""
-    p = yielding(p, folder)
+    moved = mover(p.scene).name
+    p = yielding(p, folder, moved)
     found = identify_body(recordings, p, methods, experiment=experiment)
-    if drive_kind(recordings[0], p) != "moves" or p.moved.by == NOTED:
+    if drive_kind(recordings[0], p) != "moves" or p.settings.noted:
         return found
     limits = [a.required for a in experiment.accept if a.quantity == "force" and a.required]
-    why = doubt(p, recordings[0], min(limits, default=None))
+    why = doubt(p, recordings[0], moved, min(limits, default=None))
     if not why:
         return found
     headline = f"{found.headline}; largest warning: " if found.headline else "largest warning: "
@@ -161,109 +155,55 @@ def _identified(
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def static_scene(
-    recording: Recording, p: MeasuredBody, model: SolidModel, folder: Path, body: Any = None
-) -> Scene:
-    """The body as it is held and loaded; a mesh file is found from the `folder`."""
-    mesh = mesh_of(p, body or partial(body_of, folder=folder))
-    E = modulus_in(p.material.by_method, model_name(model)) or p.material.E
-    scene = Scene(
-        mesh,
-        Material(known(E, "material.E"), p.material.nu, model.law, p.material.rho,
-                 coefficients=p.material.coefficients.known_to(model.law)),
-        _supports(p, mesh, recording),
-        _pins(p, mesh),
-        copies=4 if is_quarter(p) else 1,
-        **_load(p, recording, (mesh, folder)),
-    )  # fmt: skip
-    if mesh.bricks:
-        bricks = quadratic(mesh) if model.order == 2 and p.body.file is None else mesh
-        return replace(scene, body=bricks, dilatation="mixed")
-    return of_element(scene, "P2" if model.order == 2 else "MD")
+def static_scene(recording: Recording, p: Tree, model: Changes, folder: Path) -> Scene:
+    """The body as it is held and loaded, in the law and element of a method; a mesh file is found
+    from the `folder`."""
+    E = modulus_in(p.settings.by_method, model_name(model))
+    changed = changed_by(p, {**model, **({} if E is None else {"material.E": E})})
+    _require_known(recording, changed)
+    mesh = mesh_of(changed, folder)
+    at = (mesh, folder)
+    tracked = tuple(placed_points(recording, p, part, at) for part in changed.scene.tracked)
+    return replace(changed.scene, tracked=tracked).resolved(mesh)
 
 
-def _supports(p: MeasuredBody, mesh: Mesh, recording: Recording) -> tuple[Support, ...]:
-    said = [(getattr(p.held, name), axes) for name, axes in AXES.items()]
-    held = [Support(place_of(text, mesh), axes) for text, axes in said if text]
-    if p.held.slides:
-        held.append(Support(place_of(p.held.slides, mesh), (slides_across(p.held.slides, mesh),)))
-    held += symmetry(p)
-    if drive_kind(recording, p) == "moves" and p.moved.sideways and not p.indenter.there:
-        along = int(np.abs(axis_of(p.moved.along)).argmax())
-        across = tuple(c for c in range(3) if c != along)
-        held.append(Support(place_of(known_place(p), mesh), across))
-    return tuple(held)
-
-
-def _pins(p: MeasuredBody, mesh: Mesh) -> tuple[Pin, ...]:
-    if not p.held.slides:
-        return ()
-    across = slides_across(p.held.slides, mesh)
-    return Support(place_of(p.held.slides, mesh), (across,), rests=True).pins(mesh)
-
-
-def _load(p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path]) -> dict[str, Any]:
-    kind, along = drive_kind(recording, p), axis_of(p.moved.along)
-    if kind == "weighs":
-        return {"loads": (Weight("gravity", along),)}
-    if not p.motion.gravity:
-        return _without_weight(p, recording, at, kind, along)
-    weight = Weight("gravity", axis_of(p.motion.gravity))
-    found = _without_weight(p, recording, at, kind, along)
-    return found | {"loads": (*found.get("loads", ()), weight)}
-
-
-def _without_weight(
-    p: MeasuredBody, recording: Recording, at: tuple[Mesh, Path], kind: Any, along: Any
-) -> dict[str, Any]:
-    where = place_of(known_place(p), at[0])
-    if p.indenter.there:
-        require_touching(p, "m" if kind == "moves" else "N")
-        return {"contacts": (contact_of(p, at[0], where),)}
-    if kind == "follows":
-        return {"tracked": (prescribed(recording, p, where, at),)}
-    if kind in ("pulls", "releases"):
-        return {"loads": (Load("load", where, along),)}
-    if kind == "presses":
-        return {"loads": (Pressure("load", where),)}
-    if sorted(np.abs(along)) != [0.0, 0.0, 1.0]:
-        raise SceneError(f"moved.along = {p.moved.along}: expected an axis, as -z")
-    return {"drives": (Drive("moved", where, along),)}
-
-
-def known_place(p: MeasuredBody) -> str:
-    """Raises `UsageError` where the place that is moved is not said."""
-    if not p.moved.place:
+def _require_known(recording: Recording, p: Tree) -> None:
+    """Raises `UsageError` for what a quarter does not show, and for an indenter without motion;
+    `SceneError` for a drive that lies along no axis."""
+    part, seen = mover(p.scene), p.settings.seen
+    drive_kind(recording, p)
+    if getattr(p.scene.body, "copies", 1) > 1 and (seen.markers or seen.outline):
         raise UsageError(
-            "moved.place is not set; name where the load acts, as --set moved.place=zmax"
+            "the body is a quarter, of which only the force can be compared; set "
+            "seen.markers=none and seen.outline=none, or declare the whole body"
         )
-    return p.moved.place
+    if isinstance(part, Drive) and sorted(np.abs(part.direction)) != [0.0, 0.0, 1.0]:
+        raise SceneError(f"drive '{part.name}' along {part.direction}: expected an axis, as -z")
 
 
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
 def _level(share: float | None, halvings: int | None) -> Change:
-    """The similar grid with about `share` of the cells along every axis (none: its own `finer`, or
-    a coarser one where that does not fit into the memory), or a mesh file with its edges halved so
-    many times more."""
+    """The similar grid with about `share` of the cells along every axis (none: as many times finer
+    as `finer` says, or a coarser one where that does not fit into the memory), or a mesh file with
+    its edges halved so many times more."""
 
-    def change(p: MeasuredBody) -> MeasuredBody:
-        body = p.body
-        if body.file is not None:
-            return replace(p, body=replace(body, halvings=body.halvings + (halvings or 0)))
-        even = even_axes(p)
-        by = body.finer if share is None else share
-        cells = member(gridded(p).body.divisions, by, even)
-        return replace(p, body=replace(body, divisions=fitting(cells, partial(_fits, body), even)))
+    def change(p: Tree) -> Tree:
+        body, even = p.scene.body, even_axes(p.scene)
+        if isinstance(body, MeshFile):
+            finer: Geometry = replace(body, halvings=body.halvings + (halvings or 0))
+            return p.with_scene(body=finer)
+        cells = member(body.cells, p.settings.mesh.finer if share is None else share, even)
+        return p.with_scene(body=replace(body, cells=fitting(cells, partial(_fits, p), even)))
 
     return change
 
 
-def _fits(body: Solid, cells: tuple[int, ...]) -> bool:
+def _fits(p: Tree, cells: tuple[int, ...]) -> bool:
     """Whether the quadratic system of a grid fits into memory and the time of a first answer."""
-    N = grid_unknowns(cells, round_=bool(body.cylinder))
-    return fits(N, linear_seconds(N), MESHES if body.budget else None)
+    N = grid_unknowns(cells, round_=is_round(p.scene.body))
+    return fits(N, linear_seconds(N), MESHES if p.settings.mesh.budget else None)
 
 
 _SHARES = (_level(0.5, None), _level(0.75, None), _level(None, None))
@@ -271,20 +211,20 @@ _HALVINGS = (_level(None, 1), _level(None, 2))
 _COARSER = (_level(None, -1),)
 
 
-def _affordable(experiment: Experiment, p: MeasuredBody, folder: Path) -> Experiment:
+def _affordable(experiment: Experiment, p: Tree, folder: Path) -> Experiment:
     """The experiment with meshes of u_num that fit into memory and into the time of a first answer.
 
     Where they are too slow at large strain, the linear method of the same element stands in; where
     the surrogate is slow, inputs are moved one by one only.
     """
-    order = experiment.methods[experiment.accepted[0]].scene.order
+    order = _order_of(experiment.methods[experiment.accepted[0]], p)
     N, (levels, finest) = unknowns_of(p, order, folder), _levels(p, order, folder)
     experiment = _with_levels(experiment, levels)
     uncertainty = experiment.uncertainty
     assert uncertainty is not None
-    if p.body.budget and not p.indenter.there:
-        if p.seen.states * newton_seconds(finest) > MESHES:
-            uncertainty = replace(uncertainty, stand_in=_linear_of(experiment))
+    if p.settings.mesh.budget and pressing(p.scene) is None:
+        if p.settings.seen.states * newton_seconds(finest) > MESHES:
+            uncertainty = replace(uncertainty, stand_in=_linear_of(experiment, p))
         if (1 + len(uncertainty.inputs) + uncertainty.draws) * linear_seconds(N) > INPUTS:
             uncertainty = replace(uncertainty, draws=0)
     return replace(experiment, uncertainty=uncertainty)
@@ -298,86 +238,84 @@ def _with_levels(experiment: Experiment, levels: tuple[Change, ...]) -> Experime
     return replace(experiment, uncertainty=replace(declared, mesh=mesh))
 
 
-def _levels(p: MeasuredBody, order: int, folder: Path) -> tuple[tuple[Change, ...], float]:
+def _levels(p: Tree, order: int, folder: Path) -> tuple[tuple[Change, ...], float]:
     """The meshes of u_num, and the unknowns of the finest: similar grids; or meshes of the file,
     halved as far as they fit; or, where none does, a coarser one."""
-    N = unknowns_of(p, order, folder)
-    if p.body.file is None:
-        return _SHARES, N * p.body.finer**3
-    if p.body.halvings < 0:
-        finer = [replace(p, body=replace(p.body, halvings=p.body.halvings + k)) for k in (1, 2)
-                 if p.body.halvings + k <= 0]  # fmt: skip
+    N, body = unknowns_of(p, order, folder), p.scene.body
+    if not isinstance(body, MeshFile):
+        return _SHARES, N * p.settings.mesh.finer**3
+    if body.halvings < 0:
+        finer = [p.with_scene(body=replace(body, halvings=body.halvings + k)) for k in (1, 2)
+                 if body.halvings + k <= 0]  # fmt: skip
         sizes = [unknowns_of(one, order, folder) for one in finer]
     else:
         sizes = [8 * N, 64 * N]
-    found = affordable(_HALVINGS[: len(sizes)], sizes, budget=p.body.budget)
+    found = affordable(_HALVINGS[: len(sizes)], sizes, budget=p.settings.mesh.budget)
     return (found, sizes[len(found) - 1]) if found else (_COARSER, N)
 
 
 def _finer_settings(
-    p: MeasuredBody, folder: Path, *, methods: Mapping[str, Method]
-) -> Mapping[str, str]:
+    p: Tree, folder: Path, *, methods: Mapping[str, Method]
+) -> Mapping[str, str]:  # fmt: skip
     """What --refine sets: no time limit, 30 load steps, a file's own mesh, with quadratic cells
     as far as they fit into the memory."""
-    found = {"body.budget": "false"}
-    if p.body.halvings < 0:
+    found, body = {"mesh.budget": "false"}, p.scene.body
+    if p.settings.motion.how == "static":
+        found["seen.states"] = str(max(p.settings.seen.states, SeenOf().states))
+    if not isinstance(body, MeshFile):
+        return found
+    if body.halvings < 0:
         found["body.halvings"] = "0"
-        p = replace(p, body=replace(p.body, halvings=0))
-    if p.motion.how == "static":
-        found["seen.states"] = str(max(p.seen.states, SeenOf().states))
-    if p.body.file is None or body_of(p.body, folder=folder, places=named_places(p)).bricks:
+        p = p.with_scene(body=replace(body, halvings=0))
+    if mesh_of(p, folder).bricks:
         return found
     N = unknowns_of(p, 2, folder)
     if fits(N, SeenOf().states * newton_seconds(N), _REFINED):
-        found |= {f"methods.{name}.order": "2" for name, m in methods.items() if m.scene.order == 1}
+        own = [n for n, m in methods.items() if (m.scene or {}).get("body.element") == "linear"]
+        found |= {f"methods.{n}.body.element": "quadratic" for n in own}
+        found |= {"body.element": "quadratic"} if body.element == "linear" else {}
     return found
 
 
-def _linear_of(experiment: Experiment) -> dict[str, str]:
+def _linear_of(experiment: Experiment, p: Tree) -> dict[str, str]:
     """Of each accepted method at large strain, the linear one of the same element."""
-    models = {name: m.scene for name, m in experiment.methods.items()}
+    kinds = {n: (law_of(m, p), element_of(m, p)) for n, m in experiment.methods.items()}
     return {
         name: linear
-        for name in experiment.accepted if models[name].law != "linear"
-        for linear, model in models.items()
-        if (model.law, model.order) == ("linear", models[name].order)
+        for name in experiment.accepted if kinds[name][0] != "linear"
+        for linear, kind in kinds.items() if kind == ("linear", kinds[name][1])
     }  # fmt: skip
 
 
-def _order(p: MeasuredBody, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
+def _order_of(method: Method, p: Tree) -> int:
+    return 2 if is_quadratic(element_of(method, p)) else 1
+
+
+def _order(p: Tree, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
     """The formal order: of a static force or displacement that of the corners of a held place; of
     a motion in time that of its cells, since frequencies rule it, of which corners are a small
     part."""
-    if p.motion.how == "static":
+    if p.settings.motion.how == "static":
         return CORNER_ORDER
-    return max(3.0 if methods[n].scene.order == 2 else 2.0 for n in accepted if n in methods)
-
-
-def _cell(p: MeasuredBody, *, body: Any) -> float:
-    """The edge m of a cube as large as a mean cell; of a coarser filling by its nodes' distance."""
-    mesh = mesh_of(p, body)
-    if p.body.file and p.body.halvings < 0:
-        own = mesh_of(replace(p, body=replace(p.body, halvings=0)), body)
-        return size_against(own, mesh) * float(np.cbrt(cell_volumes(own).mean()))
-    return float(np.cbrt(cell_volumes(mesh).mean()))
+    return max(1.0 + _order_of(methods[n], p) for n in accepted if n in methods)
 
 
 _INPUTS = (
     vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
     vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
          "nu within its declared uncertainty"),
-    vary("moved.scale", "relative ranges.load", "load", "what moves the body, within its range"),
+    vary("scale", "relative ranges.load", "load", "what moves the body, within its range"),
 )  # fmt: skip
-_CONTACT = vary("indenter.gap", "absolute ranges.contact", "contact point",
-                "where the indenter touches")  # fmt: skip
 _MACHINE = vary(
     "machine.compliance", "absolute machine.sd, at least 0", "machine compliance",
     "compliance of the machine within its standard uncertainty", "declared",
 )  # fmt: skip
 
 
-def _inputs_of(p: MeasuredBody) -> tuple[Input, ...]:
+def _inputs_of(p: Tree) -> tuple[Input, ...]:
     """Those that this body has: an indenter its contact point, a known machine its compliance."""
-    own = (_CONTACT,) if p.indenter.there else ()
-    known_machine = p.machine.compliance is not None or p.machine.measured is not None
-    return (*_INPUTS, *own, *((_MACHINE,) if known_machine else ()))
+    machine, pressed = p.settings.machine, pressing(p.scene) is not None
+    touch = vary(f"contacts.{mover(p.scene).name}.shape.gap", "absolute ranges.contact",
+                 "contact point", "where the indenter touches")  # fmt: skip
+    known = machine.compliance is not None or machine.measured is not None
+    return (*_INPUTS, *((touch,) if pressed else ()), *((_MACHINE,) if known else ()))

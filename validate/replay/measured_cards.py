@@ -1,98 +1,17 @@
-"""What a user decides of a measured body: its shape, material, supports, what moves it, what was
-seen of it. Places and directions are words (`scene.named_place`)."""
+"""What a user decides of a measured body beside its scene: what was seen of it, its motion, the
+testing machine, and declared uncertainties."""
 
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from validate.errors import UsageError
-from validate.parameters import Ranges, part, quantity
+from validate.parameters import Ranges, quantity, take_units
 from validate.register.fitting import MarkerFit
-from validate.replay.contact_cards import Indenter as Indenter
-from validate.replay.contact_cards import Machine as Machine
-from validate.scene.laws import Coefficients
-from validate.scene.material import LawName
+from validate.replay.cards import Meshes
 
 Pose = Literal["recorded", "declared", "fitted"]
-
-
-@dataclass(frozen=True)
-class Solid:
-    """One of a mesh file, a block [0, size] or a cylinder about z from the origin."""
-
-    file: str | None = quantity(None, "1", "mesh file, from the experiment's folder")
-    unit: str | None = quantity(None, "1", "unit of lengths in a mesh file other than npz")
-    block: tuple[float, ...] = quantity((), "m", "sizes along x, y, z of a block from the origin")
-    cylinder: tuple[float, ...] = quantity((), "m", "diameter and height of a cylinder along z")
-    cells: int = quantity(6, "1", "cells along the longest edge of a block or cylinder, about")
-    divisions: tuple[int, ...] = quantity(
-        (), "1", "cells along x, y, z of a block; radius, height of a cylinder; none: by cells"
-    )
-    finer: float = quantity(1.5, "1", "how many times finer the finest mesh is, for u_num")
-    halvings: int = quantity(
-        0, "1", "of a mesh file: times its cells' edges are cut in half; -1: filled anew, coarser"
-    )
-    budget: bool = quantity(
-        True, "1", "keep a first answer to about 30 s by fewer meshes; false: as --refine"
-    )
-
-    def __post_init__(self) -> None:
-        given = [bool(self.file), bool(self.block), bool(self.cylinder)]
-        if sum(given) > 1 or len(self.block) not in (0, 3) or len(self.cylinder) not in (0, 2):
-            raise UsageError(
-                f"body: expected one of file, block (three sizes) and cylinder (diameter, "
-                f"height); {sum(given)} are given: block {self.block}, cylinder {self.cylinder}"
-            )
-        axes = len(self.block) or len(self.cylinder)
-        if self.divisions and (len(self.divisions) != axes or min(self.divisions) < 1):
-            raise UsageError(
-                f"body.divisions = {self.divisions}: {axes} positive numbers of cells are needed "
-                "(a block: along x, y, z; a cylinder: along radius and height; a mesh file: none)"
-            )
-
-
-@dataclass(frozen=True)
-class Tissue:
-    E: float | None = quantity(None, "Pa", "Young's modulus; none: identified")
-    nu: float = quantity(0.45, "1", "Poisson ratio")
-    rho: float = quantity(1000.0, "kg/m3", "density: its weight, and its inertia in motion")
-    by_method: tuple[tuple[str, float, float], ...] = quantity(
-        (), "1", "set by the run: modulus (Pa) of each model; the last number is 0"
-    )
-    coefficients: Coefficients = part(Coefficients(), "further parameters of the models' laws")
-
-
-@dataclass(frozen=True)
-class HeldAt:
-    """Places by which displacements cannot happen there; several are joined by "+"."""
-
-    all: str | None = quantity(None, "1", "held in every direction")
-    x: str | None = quantity(None, "1", "held along x only")
-    y: str | None = quantity(None, "1", "held along y only")
-    z: str | None = quantity(None, "1", "held along z only")
-    slides: str | None = quantity(
-        None,
-        "1",
-        "rests on a slippery plate: held normal to it; its middle is fixed and cannot turn",
-    )
-
-
-@dataclass(frozen=True)
-class MovedBy:
-    """What loads the body: a signal in m (moves a place), N (pulls at it) or Pa (presses on it),
-    "markers" that sit on a place, which follows them as a rigid body, "gravity", a motion of a
-    place that was "noted" by hand where nothing recorded it, or the "release" of a place that was
-    held (motion.held_force or motion.held_displacement)."""
-
-    by: str = quantity("gravity", "1", "a signal's topic, or: markers, gravity, noted, release")
-    place: str | None = quantity(None, "1", "where; gravity needs none")
-    along: str = quantity("-z", "1", "direction: +x, -z, or three numbers")
-    sideways: bool = quantity(True, "1", "whether a moved place is held across its direction")
-    markers: tuple[str, ...] = quantity((), "1", "markers on the moved place, three or more")
-    noted: tuple[float, ...] = quantity(
-        (), "m", "motion, evenly from the first instant to the last"
-    )
-    amount: float = quantity(9.80665, "m/s^2", "gravity")
-    scale: float = quantity(1.0, "1", "ratio of true to recorded load")
 
 
 @dataclass(frozen=True)
@@ -120,6 +39,7 @@ class SeenOf:
     registration: MarkerFit = MarkerFit()
 
     def __post_init__(self) -> None:
+        take_units(self)
         if not (2 <= self.states <= 500 and 0 < self.fit_to < 1 and self.still >= 0):
             raise UsageError(
                 f"seen.states {self.states} (2 to 500), fit_to {self.fit_to:g} (between 0 and 1), "
@@ -132,9 +52,9 @@ class BodyMotion:
     """Whether the body's motion in time is solved, from when to when, and its damping.
 
     Until the start the body rests; loads and displacements count from there. Damping is that of
-    the stiffness, C = beta K (Rayleigh): beta itself, or the share of critical damping at the first
-    mode, or what is identified on the ring-down in the first `fit_window`. `gravity` acts before
-    the start, too. A place is released at the start from a force, or a displacement.
+    the stiffness: `material.stiffness_damping`, the share of critical damping at the first mode, or
+    what is identified on the ring-down in the first `fit_window`. A load is released at the start
+    where the force that held its place, or the displacement, is given.
     """
 
     how: Literal["static", "dynamic"] = quantity("static", "1", "static: no inertia; or dynamic")
@@ -143,31 +63,49 @@ class BodyMotion:
     )
     length: float | None = quantity(None, "s", "solved and compared; none: to the end")
     dt: float | None = quantity(None, "s", "time step; none: 40 or more in the recorded period")
-    stiffness_damping: float | None = quantity(None, "s", "beta of C = beta K")
     damping_ratio: float | None = quantity(None, "1", "of critical damping, at the first mode")
     fit_window: float | None = quantity(
         None, "s", "from the start, in which damping is identified; only later is evidence"
     )
-    gravity: str | None = quantity(None, "1", "direction of gravity in addition, as -z")
     held_force: float | None = quantity(
-        None, "N", "force that held the released place, along moved.along"
+        None, "N", "force that held the released place, along the load"
     )
     held_displacement: float | None = quantity(
-        None, "m", "displacement at which the released place was held, along moved.along"
+        None, "m", "displacement at which the released place was held, along the load"
     )
 
     def __post_init__(self) -> None:
-        damping = (self.stiffness_damping, self.damping_ratio)
-        if any(value is not None and not value >= 0 for value in damping) or None not in damping:
-            raise UsageError(
-                f"motion.stiffness_damping = {damping[0]}, motion.damping_ratio = {damping[1]}: "
-                "set only one of them, to 0 or above"
-            )
+        take_units(self)
+        if self.damping_ratio is not None and not self.damping_ratio >= 0:
+            raise UsageError(f"motion.damping_ratio = {self.damping_ratio}: set it to 0 or above")
         times = (self.length, self.dt, self.fit_window)
         if any(value is not None and not value > 0 for value in times):
             raise UsageError(
                 f"motion.length = {times[0]}, motion.dt = {times[1]}, motion.fit_window = "
                 f"{times[2]} s: each must be above 0"
+            )
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Compliance of frame, load cell and grips: u_specimen = u_recorded - C F."""
+
+    compliance: float | None = quantity(None, "m/N", "of the machine; none: not known, taken as 0")
+    sd: float = quantity(0.0, "m/N", "standard uncertainty of a compliance that is given")
+    measured: str | None = quantity(
+        None, "1", "recording of a rigid block (same topics) that gives compliance and sd"
+    )
+
+    def __post_init__(self) -> None:
+        given = self.compliance
+        if (given is not None and not (np.isfinite(given) and given >= 0)) or not self.sd >= 0:
+            raise UsageError(
+                f"machine.compliance = {given} m/N, sd {self.sd:g} m/N: both must be 0 or above; a "
+                "rigid machine has 0"
+            )
+        if given is not None and self.measured:
+            raise UsageError(
+                "machine.compliance and machine.measured are both set: give one of them"
             )
 
 
@@ -189,23 +127,26 @@ class BodyRanges(Ranges):
 
 @dataclass(frozen=True)
 class MeasuredBody:
-    """Everything that is decided; `recording` lies beside the experiment's file."""
+    """What no scene holds of a measured body: what of the recording moves it is named as that drive
+    or load of the scene is.
 
-    recording: str = quantity("", "1", "MCAP file, from the experiment's folder")
-    body: Solid = Solid()
-    material: Tissue = Tissue()
-    held: HeldAt = HeldAt()
-    moved: MovedBy = MovedBy()
+    One part moves the body: a drive or an indenter by a signal in m of its name, a load or pressure
+    by one in N or Pa, what follows tracked markers, or weight. A motion that nothing recorded was
+    `noted` by hand.
+    """
+
     seen: SeenOf = SeenOf()
     ranges: BodyRanges = BodyRanges()
-    indenter: Indenter = Indenter()
     machine: Machine = Machine()
     motion: BodyMotion = BodyMotion()
+    noted: tuple[float, ...] = quantity(
+        (), "m", "motion, evenly from the first instant to the last; none: recorded"
+    )
+    scale: float = quantity(1.0, "1", "ratio of true to recorded load")
+    mesh: Meshes = Meshes()
+    by_method: tuple[tuple[str, float, float], ...] = quantity(
+        (), "1", "set by the run: modulus (Pa) of each model; the last number is 0"
+    )
 
-
-@dataclass(frozen=True)
-class SolidModel:
-    """What a method's scene is built with."""
-
-    law: LawName = quantity("neo_hooke", "1", "linear, or the law at large strain")
-    order: Literal[1, 2] = quantity(1, "1", "element order; 1 means nodal mean dilatation")
+    def __post_init__(self) -> None:
+        take_units(self)

@@ -16,49 +16,48 @@ from validate.register.fitting import MarkerFit
 from validate.register.from_rest import noise, rested
 from validate.register.markers import MarkerObservation, observe_markers, vector
 from validate.register.measures import FEWEST
-from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 from validate.scene.mesh import Mesh
+from validate.scene.scene import Scene
 
 AS_SEEN = "as seen"
 BodyAt = tuple[Mesh, Path]  # the body's mesh, and the experiment's folder
 
 
-def registered(recording: Recording, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
+def registered(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
     """Markers in the body's frame: their layout's, or the one they were recorded in."""
     mesh, folder = at
     topic = markers_topic(recording, p)
-    markers, _, _ = rested(recording.marker(topic), p.seen.still)
-    if p.seen.layout == AS_SEEN:
+    markers, _, _ = rested(recording.marker(topic), p.settings.seen.still)
+    if p.settings.seen.layout == AS_SEEN:
         return _declared(recording, replace(markers, sd=noise(markers)), p, mesh)
-    layout = layout_of(recording, p.seen.layout, folder)
+    layout = layout_of(recording, p.settings.seen.layout, folder)
     kept = [i for i, n in enumerate(markers.names) if n in layout]
     if not kept:
         raise RegistrationError(
-            f"seen.layout = {p.seen.layout} has {listed_names(layout)}; the recording has "
+            f"seen.layout = {p.settings.seen.layout} has {listed_names(layout)}; the recording has "
             f"{listed_names(markers.names)}: no name occurs in both; spell them as recorded"
         )
     if len(kept) < FEWEST:
         raise RegistrationError(
-            f"seen.layout = {p.seen.layout}: {len(kept)} of its markers are visible at rest; a "
-            f"registration with a residual needs {FEWEST}. Fewer are enough if they were recorded "
-            f"in the body's frame: seen.layout = '{AS_SEEN}'"
+            f"seen.layout = {p.settings.seen.layout}: {len(kept)} of its markers are visible at "
+            f"rest; a registration with a residual needs {FEWEST}. Fewer are enough if they were "
+            f"recorded in the body's frame: seen.layout = '{AS_SEEN}'"
         )
     markers = replace(
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
     )  # fmt: skip
     return observe_markers(
-        markers, layout, mesh, how=p.seen.registration, name=topic, stands=np.inf,
+        markers, layout, mesh, how=p.settings.seen.registration, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
     )  # fmt: skip
 
 
-def _declared(
-    recording: Recording, markers: Markers, p: MeasuredBody, mesh: Mesh
-) -> MarkerObservation:
+def _declared(recording: Recording, markers: Markers, p: Tree, mesh: Mesh) -> MarkerObservation:
     """Markers in the frame that they were recorded in, which is said to be the body's: one is
     enough, as nothing is fitted. Raises `UsageError` for settings of a fit."""
-    if p.seen.registration != MarkerFit():
+    if p.settings.seen.registration != MarkerFit():
         raise UsageError(
             f"seen.registration needs a fit, but seen.layout = '{AS_SEEN}' fits nothing; name a "
             f"layout, or leave seen.registration out"
@@ -70,13 +69,13 @@ def _declared(
     )  # fmt: skip
 
 
-def compared_markers(recording: Recording, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
+def compared_markers(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
     """The registered markers but those that move the body.
 
     Raises `ComparisonError` where none is left, and as `registered` does.
     """
     whole = registered(recording, p, at)
-    driving = p.moved.markers if p.moved.by == "markers" else ()
+    driving = leading(p.scene)
     kept = [i for i, name in enumerate(whole.names) if name not in driving]
     if not kept:
         raise ComparisonError("every marker moves the body: no marker is left to compare")
@@ -84,6 +83,11 @@ def compared_markers(recording: Recording, p: MeasuredBody, at: BodyAt) -> Marke
         whole, names=tuple(whole.names[i] for i in kept), x=whole.x[:, kept],
         rest=whole.rest[kept], tre=whole.tre[kept],
     )  # fmt: skip
+
+
+def leading(scene: Scene) -> tuple[str, ...]:
+    """The markers that move the body."""
+    return tuple(name for part in scene.tracked for name in part.labels)
 
 
 def listed_names(names: Iterable[str]) -> str:
@@ -116,10 +120,10 @@ def _points_in(path: Path) -> Mapping[str, Markers]:
         ) from None
 
 
-def markers_topic(recording: Recording, p: MeasuredBody) -> str:
+def markers_topic(recording: Recording, p: Tree) -> str:
     """The markers' topic, where it is not said the only one."""
-    if p.seen.markers:
-        return p.seen.markers
+    if p.settings.seen.markers:
+        return str(p.settings.seen.markers)
     if len(recording.markers) != 1:
         raise UsageError(f"seen.markers is not set; expected one of {sorted(recording.markers)}")
     return next(iter(recording.markers))

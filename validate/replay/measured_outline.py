@@ -10,7 +10,7 @@ from validate.register.observation import nearest_sample
 from validate.register.outline_geometry import enclosed
 from validate.register.outlines import OutlineObservation, observe_outlines
 from validate.register.plane import SurfaceSampler, cavity_sampler, section
-from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import pose_of
 
@@ -18,24 +18,24 @@ _PARTS = 4  # of a facet's edge
 
 
 def observed_outline(
-    recording: Recording, p: MeasuredBody, mesh: Mesh, rest: float
+    recording: Recording, p: Tree, mesh: Mesh, rest: float
 ) -> tuple[OutlineObservation, tuple[str, ...]]:
     """Outlines against the section of the deformed surface with the images' plane, and what was
     fitted of their pose. Raises `RegistrationError` for a body of bricks, `UsageError` for a pose
     that is none."""
-    topic = str(p.seen.outline)
+    topic = str(p.settings.seen.outline)
     contours = recording.contour(topic)
     if mesh.bricks:
         raise RegistrationError(
             f"outlines need triangular facets, but the body has {mesh.kind}: give a body of "
             f"tetrahedra"
         )
-    mesh.facet_nodes(p.seen.surface)
-    wall = cavity_sampler(mesh, p.seen.surface, None, _PARTS)
+    mesh.facet_nodes(p.settings.seen.surface)
+    wall = cavity_sampler(mesh, p.settings.seen.surface, None, _PARTS)
     said: tuple[str, ...] = ()
-    if p.seen.pose == "declared":
-        contours = replace(contours, pose=_pose(p, p.seen.origin))
-    if p.seen.pose == "fitted":
+    if p.settings.seen.pose == "declared":
+        contours = replace(contours, pose=_pose(p, p.settings.seen.origin))
+    if p.settings.seen.pose == "fitted":
         contours = replace(contours, pose=_fitted(p, contours, wall, rest))
         at = ", ".join(f"{1e3 * x:.2f}" for x in contours.pose[:3, 3])
         said = (
@@ -46,11 +46,11 @@ def observed_outline(
     return observe_outlines(contours, wall, rest, name=topic, sd_t=sd_t), said
 
 
-def _pose(p: MeasuredBody, origin: tuple[float, ...]) -> Floats:
-    return pose_of(origin, p.seen.image_x, p.seen.image_y)
+def _pose(p: Tree, origin: tuple[float, ...]) -> Floats:
+    return pose_of(origin, p.settings.seen.image_x, p.settings.seen.image_y)
 
 
-def _fitted(p: MeasuredBody, contours: Contours, wall: SurfaceSampler, rest: float) -> Floats:
+def _fitted(p: Tree, contours: Contours, wall: SurfaceSampler, rest: float) -> Floats:
     """The images through the body's middle, the outline's centroid at rest on the section's."""
     low, high = wall.rest.min(axis=0), wall.rest.max(axis=0)
     pose = _pose(p, tuple(((low + high) / 2).tolist()))

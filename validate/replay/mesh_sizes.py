@@ -1,15 +1,14 @@
 """Height and diameter of equal area of a specimen's mesh file, between its plates."""
 
 from math import pi, sqrt
-from pathlib import Path
 
 import numpy as np
 
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh, cell_volumes
-from validate.scene.mesh_file import read_mesh
 
 PLATES = ("lower_plate", "upper_plate")
+DIAMETER, HEIGHT = "body.diameter", "body.height"  # paths
 _FLAT = 0.02  # of the height: the largest spread of a plate's nodes along z
 
 
@@ -44,9 +43,4 @@ def sizes_of_mesh(mesh: Mesh, name: str = "mesh") -> dict[str, float]:
             "exchange the two names"
         )
     area = float(np.abs(cell_volumes(mesh)).sum()) / height
-    return {"specimen.diameter": 2 * sqrt(area / pi), "specimen.height": height}
-
-
-def sizes_of_file(path: str, unit: str | None) -> dict[str, float]:
-    """Return the `sizes_of_mesh` of a file; raises what reading it does."""
-    return sizes_of_mesh(read_mesh(Path(path), unit), Path(path).name)
+    return {DIAMETER: 2 * sqrt(area / pi), HEIGHT: height}

@@ -26,8 +26,7 @@ class Limited(Protocol):
 
 @dataclass(frozen=True)
 class Method:
-    """`settings` of a scheme or filter; `scene`: what it changes of the scene, by path (in an older
-    form, options that the experiment's `build` reads).
+    """`settings` of a scheme or filter; `scene`: what it changes of the scene, by path.
 
     The fields of both are the method's own to `--set`: `methods.NAME.tolerance=1e-3`. `markers`
     are those that a filter is given. `steps`: run only so many, as a baseline that is timed and

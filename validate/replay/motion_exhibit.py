@@ -12,7 +12,7 @@ from validate.identify.ringing import spectrum
 from validate.replay.experiment import Progress, Told
 from validate.replay.first_modes import assumed_density, first_frequencies
 from validate.replay.followed import MAIN, Cases, Followed
-from validate.replay.measured_cards import MeasuredBody
+from validate.replay.tree import Tree
 from validate.report.motion_words import rests
 from validate.report.numbers import scale, shown_unit
 from validate.scene.scene import Scene
@@ -20,7 +20,7 @@ from validate.scene.scene import Scene
 _POINTS = 1500  # of a chart
 
 
-def motion_exhibit(p: MeasuredBody, cases: Cases, tell: Progress, *, shown: RecordedMotion) -> Told:
+def motion_exhibit(p: Tree, cases: Cases, tell: Progress, *, shown: RecordedMotion) -> Told:
     """The recorded motion `shown`, and the runs of its marker where they are compared with it."""
     main = cases[MAIN]
     scene = next(iter(main.values())).scene

@@ -20,7 +20,6 @@ from validate.estimate.filters import FILTERS
 from validate.estimate.kf_fem import KfFem
 from validate.estimate.load_scale import LoadScale
 from validate.estimate.modal_kf import ModalKf
-from validate.estimate.node_ekf import NodeEKF
 from validate.estimate.reduced_ekf import ReducedEKF
 from validate.estimate.reduced_kf import ReducedKf
 from validate.estimate.roukf import Roukf
@@ -29,7 +28,7 @@ from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.experiment import Experiment, Identified, StepLadder, vary
 from validate.replay.first_modes import assumed_density, first_frequencies
-from validate.replay.measured_cards import MeasuredBody, SolidModel
+from validate.replay.measured_cards import SeenOf
 from validate.replay.method import Method
 from validate.replay.motion_exhibit import motion_exhibit
 from validate.replay.moving_seen import (
@@ -40,6 +39,8 @@ from validate.replay.moving_seen import (
     started,
     without_rest,
 )
+from validate.replay.solid_model import Changes, is_quadratic, law_of, model_of
+from validate.replay.tree import Tree
 from validate.report.motion_words import motion_words
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
@@ -62,10 +63,10 @@ MovingName = Literal[
     "load_scale",
     "filterpy",
     "ensemble_kf",
-    "node_ekf",
     "reduced_ekf",
 ]
 _MODES = 20
+EXPLICIT_FILTERS = ("reduced_ekf",)  # pointwise tetrahedra without stiffness damping only
 #: Settings and words of every method of a motion in time, by name.
 METHODS: Mapping[str, tuple[Any, str]] = {
     "implicit": (Newmark(), "dynamic, implicit (Newmark), {law}"),
@@ -82,7 +83,6 @@ METHODS: Mapping[str, tuple[Any, str]] = {
     "load_scale": (LoadScale(), "filter of one load's scale, without inertia, {law}"),
     "filterpy": (FilterpyGuest(), "filterpy's Kalman filter of the modes and the load, {law}"),
     "ensemble_kf": (EnsembleKf(), "ensemble filter of the modulus, {law}"),
-    "node_ekf": (NodeEKF(), "extended filter of the nodes at large strain, {law}"),
     "reduced_ekf": (ReducedEKF(), "extended filter of shapes at large strain, {law}"),
 }  # fmt: skip
 
@@ -90,23 +90,24 @@ METHODS: Mapping[str, tuple[Any, str]] = {
 def moving(
     name: MovingName,
     law: LawName = "linear",
-    order: Any = 2,
+    element: str = "",
     *,
     markers: tuple[str, ...] = (),
     split: int = 1,
     **settings: Any,
 ) -> Method:
     """A method of a moving body, by name: schemes with inertia, statics beside them, and filters
-    that are given `markers`. `split` steps in one of the recording's, for the explicit one;
-    `settings` are those of the scheme or filter."""
+    that are given `markers`. `element` is the body's, where it is another one than declared;
+    `split` steps in one of the recording's, for the explicit one; `settings` are those of the
+    scheme or filter."""
     scheme, words = METHODS[name]
-    cells = "quadratic cells" if order == 2 else "linear cells"
-    label = words.format(law=f"{law} law, {cells}", modes=_MODES)
+    cells = ", quadratic cells" if is_quadratic(element) else ", linear cells" if element else ""
+    label = words.format(law=f"{law} law{cells}", modes=_MODES)
     if markers:
         label += f", given {', '.join(markers)}"
-    return Method(
-        label, replace(scheme, **settings), SolidModel(law, order), markers=markers, split=split
-    )
+    pointwise = {"dilatation": "pointwise"} if name in EXPLICIT_FILTERS else {}
+    model = {**model_of(law, element), **pointwise}
+    return Method(label, replace(scheme, **settings), model, markers=markers, split=split)
 
 
 def model_law(name: str, law: LawName) -> LawName | None:
@@ -133,7 +134,9 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
     assert bare.uncertainty is not None
     cheap = "modal" if "modal" in bare.methods else bare.accepted[0]
     linear = "implicit" if "implicit" in bare.methods else cheap
-    judged = [name for name in bare.accepted if bare.methods[name].scene.law != "linear"]
+    judged = [
+        name for name in bare.accepted if law_of(bare.methods[name], bare.parameters) != "linear"
+    ]
     uncertainty = replace(
         bare.uncertainty, steps=StepLadder(2.0), surrogate=cheap, inputs=(
             *bare.uncertainty.inputs, *_INPUTS
@@ -151,39 +154,40 @@ def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
     )
 
 
-def following(
-    experiment: Experiment, recordings: Sequence[Recording], p: MeasuredBody
-) -> Experiment:
+def following(experiment: Experiment, recordings: Sequence[Recording], p: Tree) -> Experiment:
     """Charts follow the axis of the largest recorded motion, where something moved; an exhibit
     shows that motion, but where a force alone is judged in statics."""
     try:
         shown = motion_of(recordings[0], judged(p))
     except ValidateError:
         return experiment
-    if p.seen.markers:
+    if p.settings.seen.markers:
         experiment = replace(experiment, axis=shown.axis)
-    if shown.unit != "m" and p.motion.how == "static":
+    if shown.unit != "m" and p.settings.motion.how == "static":
         return experiment
     return replace(experiment, exhibits=partial(motion_exhibit, shown=shown))
 
 
-def judged(p: MeasuredBody) -> str | None:
+def judged(p: Tree) -> str | None:
     """The topic whose motion a report describes: that of what is judged."""
-    return p.seen.markers or p.seen.outline or p.seen.force
+    seen: SeenOf = p.settings.seen
+    return seen.markers or seen.outline or seen.force
 
 
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _build(
-    recording: Recording, p: MeasuredBody, model: SolidModel, *, build: Any, folder: Path
-) -> Scene:
+def _build(recording: Recording, p: Tree, model: Changes, *, build: Any, folder: Path) -> Scene:
     """The static scene with a density's damping, the weight that also acts, and the markers as
     probes."""
+    if p.settings.motion.damping_ratio is not None and p.scene.material.stiffness_damping:
+        raise UsageError(
+            "motion.damping_ratio and material.stiffness_damping are both set; give one of them"
+        )
     bare: Scene = build(recording, p, model)
     beta = _stiffness_damping(recording, p, model, build)
     scene = replace(bare, material=replace(bare.material, stiffness_damping=beta))
-    if not p.seen.markers:
+    if not p.settings.seen.markers:
         return scene
     begun = started(recording, p)
     seen = moving_markers(begun, without_rest(p), (scene.mesh, folder))
@@ -194,17 +198,16 @@ def _build(
     return replace(scene, probes=tuple(probes))
 
 
-def _stiffness_damping(
-    recording: Recording, p: MeasuredBody, model: SolidModel, build: Any
-) -> float:
+def _stiffness_damping(recording: Recording, p: Tree, model: Changes, build: Any) -> float:
     """Beta s: as given, or 2 zeta / w of the first mode (Clough & Penzien 1993, eq. 12-40)."""
-    if p.motion.damping_ratio is None:
-        return p.motion.stiffness_damping or 0.0
+    ratio: float | None = p.settings.motion.damping_ratio
+    if ratio is None:
+        return float(p.scene.material.stiffness_damping)
     first = first_frequencies(build(recording, p, model), 1)[0]
-    return p.motion.damping_ratio / (np.pi * first)
+    return ratio / (np.pi * first)
 
 
-def _sets(p: MeasuredBody, seen: Registered) -> Mapping[str, Any]:
+def _sets(p: Tree, seen: Registered) -> Mapping[str, Any]:
     """The step, how loads begin, and what the body rests under before them."""
     sudden = "equilibrium" if seen.sudden else "zero"
     found: dict[str, Any] = {"dt": float(seen.t[0]), "a0": sudden}
@@ -217,7 +220,7 @@ def _sets(p: MeasuredBody, seen: Registered) -> Mapping[str, Any]:
 
 def _identify(
     recordings: Sequence[Recording],
-    p: MeasuredBody,
+    p: Tree,
     methods: Mapping[str, Method],
     *,
     build: Any,
@@ -227,7 +230,7 @@ def _identify(
 
     Raises `UsageError` for a modulus that stands open, `ComparisonError` for what does not ring.
     """
-    if p.material.E is None:
+    if p.scene.material.E is None:
         raise UsageError(
             "material.E is not set: a motion in time needs a known modulus; set it, or identify "
             "it on a static log"
@@ -236,16 +239,23 @@ def _identify(
     first = _first_of(recordings[0], p, methods, build)
     headline = f"dynamic: {against_mode(shown, first, p)}"
     seen = f"Recorded motion: {motion_words(shown)}."
-    if p.motion.fit_window is not None:
+    if p.settings.motion.fit_window is not None:
         p, scores, note, names = _ring_down(recordings[0], p, folder, build, methods)
         return Identified(p, scores, (seen, note), headline, calibrated=names)
-    if p.motion.damping_ratio is not None:  # once: every mesh and method has the same damping
+    if p.settings.motion.damping_ratio is not None:  # every mesh and method has the same damping
         beta = _stiffness_damping(recordings[0], p, next(iter(methods.values())).scene, build)
-        p = replace(p, motion=replace(p.motion, stiffness_damping=beta, damping_ratio=None))
+        p = _damped(p, beta)
     return Identified(p, (), (seen,), headline)
 
 
-def against_mode(shown: RecordedMotion, first: float | None, p: MeasuredBody) -> str:
+def _damped(p: Tree, beta: float, **settings: Any) -> Tree:
+    """With C = beta K in place of a share of critical damping."""
+    material = replace(p.scene.material, stiffness_damping=beta)
+    motion = replace(p.settings.motion, damping_ratio=None)
+    return p.with_scene(material=material).with_settings(motion=motion, **settings)
+
+
+def against_mode(shown: RecordedMotion, first: float | None, p: Tree) -> str:
     """The recorded frequency beside the body's first natural one, in words."""
     recorded = f"recorded motion mostly at {shown.frequency:.3g} Hz"
     if not first:
@@ -255,7 +265,7 @@ def against_mode(shown: RecordedMotion, first: float | None, p: MeasuredBody) ->
 
 
 def _first_of(
-    recording: Recording, p: MeasuredBody, methods: Mapping[str, Method], build: Any
+    recording: Recording, p: Tree, methods: Mapping[str, Method], build: Any
 ) -> float | None:
     model = next(iter(methods.values())).scene
     try:
@@ -265,26 +275,24 @@ def _first_of(
 
 
 def _ring_down(
-    recording: Recording, p: MeasuredBody, folder: Path, build: Any, methods: Mapping[str, Method]
-) -> tuple[MeasuredBody, tuple[Score, ...], str, tuple[str, ...]]:
+    recording: Recording, p: Tree, folder: Path, build: Any, methods: Mapping[str, Method]
+) -> tuple[Tree, tuple[Score, ...], str, tuple[str, ...]]:
     """Parameters with beta = 2 zeta / w of the recorded ring-down in the window; every residual of
     that window served for it."""
-    window = float(p.motion.fit_window or 0.0)
-    begun = started(recording, replace(p, motion=replace(p.motion, length=window)))
+    motion = p.settings.motion
+    window = float(motion.fit_window or 0.0)
+    begun = started(recording, p.with_settings(motion=replace(motion, length=window)))
     found = motion_of(begun.recording, judged(p)).ringing
     if found is None or found.damping <= 0:
         raise ComparisonError(
             f"motion.fit_window = {window:g} s: it contains no ring-down (three or more decaying "
-            f"periods are needed); give motion.stiffness_damping or motion.damping_ratio"
+            f"periods are needed); give material.stiffness_damping or motion.damping_ratio"
         )
     w = 2 * np.pi * found.frequency
     beta, share = 2 * found.damping / w, found.damping_sd / found.damping
     mesh = build(recording, p, next(iter(methods.values())).scene).mesh
     seen = moving_markers(started(recording, p), without_rest(p), (mesh, folder))
-    used = replace(
-        p, motion=replace(p.motion, stiffness_damping=beta, damping_ratio=None),
-        ranges=replace(p.ranges, damping=max(share, 1e-3)),
-    )  # fmt: skip
+    used = _damped(p, beta, ranges=replace(p.settings.ranges, damping=max(share, 1e-3)))
     note = (
         f"Damping was identified, not predicted: ratio {found.damping:.4f} (sd "
         f"{found.damping_sd:.2g}) at {found.frequency:.4g} Hz, of the ring-down in the first "
@@ -302,7 +310,7 @@ def _ring_down(
 
 _INPUTS = (
     vary("material.rho", "relative ranges.rho", "density", "rho within its declared uncertainty"),
-    vary("motion.stiffness_damping", "relative ranges.damping, at least 0", "damping",
+    vary("material.stiffness_damping", "relative ranges.damping, at least 0", "damping",
          "damping within its declared uncertainty"),
 )  # fmt: skip
 
@@ -312,7 +320,7 @@ _INPUTS = (
 
 def doubting(
     recordings: Sequence[Recording],
-    p: MeasuredBody,
+    p: Tree,
     methods: Mapping[str, Method],
     *,
     identify: Any,
@@ -324,10 +332,12 @@ def doubting(
     """
     found: Identified = identify(recordings, p, methods)
     try:
-        shown = motion_of(recordings[0], p.seen.markers)
+        shown = motion_of(recordings[0], p.settings.seen.markers)
     except ValidateError:
         return found
-    first = _first_of(recordings[0], found.parameters, methods, build) if p.material.E else None
+    first = (
+        _first_of(recordings[0], found.parameters, methods, build) if p.scene.material.E else None
+    )
     if not shown.inertia_matters(first):
         slow = f"Quasi-static: {against_mode(shown, first, p)}; inertia is small."
         return replace(found, notes=(*found.notes, slow)) if first else found

@@ -15,25 +15,27 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.identify.recorded_motion import motion_of
+from validate.parameters import known
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.register.from_rest import since_rest
 from validate.register.markers import MarkerObservation
 from validate.register.observation import EVERYTHING, Observation, Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.measured_cards import MeasuredBody
 from validate.replay.measured_drive import (
-    RELEASE,
     Kind,
     drive_kind,
     driven,
+    mover,
     observed_force,
     released_force,
+    weight_beside,
     zeroed_force,
 )
 from validate.replay.measured_markers import BodyAt, compared_markers, markers_topic
 from validate.replay.measured_outline import observed_outline
-from validate.scene.scene import Scene
+from validate.replay.tree import Tree
+from validate.scene.scene import Load, Scene
 
 FILM = "film"  # the label of outlines
 FIRST, LATER = "first", "later"
@@ -56,7 +58,7 @@ class Started:
     noise: float
 
 
-def started(recording: Recording, p: MeasuredBody) -> Started:
+def started(recording: Recording, p: Tree) -> Started:
     """The recording from `motion.start`, or from where its motion is found to begin.
 
     Raises `UsageError` for a start outside the recording.
@@ -64,15 +66,19 @@ def started(recording: Recording, p: MeasuredBody) -> Started:
     sudden = drive_kind(recording, p) in SUDDEN
     topic = markers_topic(recording, p) if recording.markers else None
     clock = recording.marker(topic).t if topic else next(iter(recording.signals.values())).t
-    at = p.motion.start
+    at = p.settings.motion.start
     if at is None:
-        at = motion_of(recording, topic).starts if sudden else float(clock[0] + p.seen.still)
+        at = (
+            motion_of(recording, topic).starts
+            if sudden
+            else float(clock[0] + p.settings.seen.still)
+        )
     if not clock[0] - _SAME <= at < clock[-1]:
         raise UsageError(
             f"motion.start = {at:g} s: the recording goes from {clock[0]:g} to {clock[-1]:g} s"
         )
     start = float(clock[int(np.abs(clock - at).argmin())])
-    length = p.motion.length or np.inf
+    length = p.settings.motion.length or np.inf
     cut = replace(
         recording,
         markers={n: _markers_from(m, start, length) for n, m in recording.markers.items()},
@@ -81,7 +87,7 @@ def started(recording: Recording, p: MeasuredBody) -> Started:
         frames={},
     )  # fmt: skip
     interval = float(np.median(np.diff(clock)))
-    sd_t = interval / np.sqrt(12) if sudden and p.motion.start is None else 0.0
+    sd_t = interval / np.sqrt(12) if sudden and p.settings.motion.start is None else 0.0
     rest = clock <= start + _SAME
     noise = _noise(recording.marker(topic), rest) if topic else 0.0
     return Started(cut, start, int(rest.sum()), sd_t, noise)
@@ -103,9 +109,9 @@ def _noise(m: Markers, rest: Any) -> float:
     return max(m.sd, float(np.nan_to_num(scatter)))
 
 
-def without_rest(p: MeasuredBody) -> MeasuredBody:
+def without_rest(p: Tree) -> Tree:
     """Of a recording that was cut at the start: its first sample alone is at rest."""
-    return replace(p, seen=replace(p.seen, still=0.0))
+    return p.with_settings(seen=replace(p.settings.seen, still=0.0))
 
 
 def _markers_from(m: Markers, start: float, length: float) -> Markers:
@@ -146,17 +152,17 @@ def _parts(t: Floats, start: float, length: float) -> tuple[Any, Any]:
     return before, kept
 
 
-def steps_of(p: MeasuredBody, cut: Recording) -> Floats:
+def steps_of(p: Tree, cut: Recording) -> Floats:
     """Times (nt,) s of the steps, from one step after the start: every sample of the markers is
     met, with 40 steps or more in the recorded period."""
     topic = markers_topic(cut, p) if cut.markers else None
     clock = cut.marker(topic).t if topic else next(iter(cut.signals.values())).t
     interval = float(np.median(np.diff(clock)))
-    if p.motion.dt is None:
+    if p.settings.motion.dt is None:
         f = motion_of(cut, topic).frequency
         parts = max(1, int(np.ceil(interval * _PER_PERIOD * f - 1e-9)))
     else:
-        parts = max(1, int(np.ceil(interval / p.motion.dt - 1e-9)))
+        parts = max(1, int(np.ceil(interval / p.settings.motion.dt - 1e-9)))
     ends = [float(s.t[-1]) for name, s in cut.streams.items() if name in _used(p, topic)]
     count = int(np.floor(min([clock[-1], *ends]) / interval + 1e-6)) * parts
     if count > _MOST:
@@ -167,16 +173,16 @@ def steps_of(p: MeasuredBody, cut: Recording) -> Floats:
     return np.asarray(interval / parts * np.arange(1, count + 1), dtype=np.float64)
 
 
-def _used(p: MeasuredBody, topic: str | None) -> set[str]:
-    return {str(name) for name in (p.moved.by, p.seen.force, p.seen.outline, topic) if name}
+def _used(p: Tree, topic: str | None) -> set[str]:
+    seen = p.settings.seen
+    names = (mover(p.scene).name, seen.force, seen.outline, topic)
+    return {str(name) for name in names if name}
 
 
 # --- registration ---------------------------------------------------------------------------------
 
 
-def place_moving(
-    recording: Recording, p: MeasuredBody, scene: Scene, *, folder: Path
-) -> Registered:
+def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -> Registered:
     """Loads at every step, markers, force and outlines at every sample.
 
     Raises `ComparisonError` where nothing is compared, `RegistrationError` as the parts do.
@@ -185,19 +191,19 @@ def place_moving(
     t, kind = steps_of(p, begun.recording), drive_kind(recording, p)
     at = (scene.mesh, folder)
     main = _load(begun.recording, p, kind, t, scene, at)
-    drives = [main]
-    if p.motion.gravity and kind != "weighs":
+    drives, weight = [main], weight_beside(p.scene)
+    if weight and kind != "weighs":
         drives.append(
-            SignalObservation("gravity", "drives", t, np.zeros((len(t), 1)), "m/s^2", 0.0)
+            SignalObservation(weight.name, "drives", t, np.zeros((len(t), 1)), "m/s^2", 0.0)
         )
     compared: list[Observation] = []
-    if p.seen.force:
+    if p.settings.seen.force:
         compared.append(_force(begun.recording, p, kind))
-    if p.seen.markers:
+    if p.settings.seen.markers:
         compared.append(moving_markers(begun, p, at))
     said, film = tuple[str, ...](), tuple[Selection, ...]()
     others = tuple(o.name for o in compared)
-    if p.seen.outline:
+    if p.settings.seen.outline:
         outline, said = observed_outline(begun.recording, p, scene.mesh, 0.0)
         compared.append(outline)
         taken = outline.t[(outline.t > _SAME) & (outline.t <= t[-1] + _SAME)]
@@ -213,61 +219,62 @@ def place_moving(
 
 
 def _load(
-    cut: Recording, p: MeasuredBody, kind: Kind, t: Floats, scene: Scene, at: BodyAt
+    cut: Recording, p: Tree, kind: Kind, t: Floats, scene: Scene, at: BodyAt
 ) -> SignalObservation:
     """What loads the body at t (nt,) s, as it changed since the start."""
     if kind == "releases":
-        force = p.moved.scale * released_force(p, scene)
-        return SignalObservation(RELEASE, "drives", t, np.full((len(t), 1), -force), "N", 0.0)
+        force, name = p.settings.scale * released_force(p, scene), mover(p.scene).name
+        return SignalObservation(name, "drives", t, np.full((len(t), 1), -force), "N", 0.0)
     whole = driven(cut, p, kind, np.append(0.0, t), 0.0, at)
     return replace(whole, t=t, y=whole.y[1:])
 
 
-def moving_markers(begun: Started, p: MeasuredBody, at: BodyAt) -> MarkerObservation:
+def moving_markers(begun: Started, p: Tree, at: BodyAt) -> MarkerObservation:
     """Every sample of the markers after the start, in the body's frame, each a quantity of its own;
     those that move the body are left out. Raises `ComparisonError` where none is left."""
     part = compared_markers(begun.recording, p, at)
-    since = since_rest(part, at[0], begun.noise, begun.rest, p.seen.stands)
+    since = since_rest(part, at[0], begun.noise, begun.rest, p.settings.seen.stands)
     return replace(
         since, t=since.t[1:], x=since.x[1:], sd_t=float(np.hypot(since.sd_t, begun.sd_t))
     )
 
 
-def _force(cut: Recording, p: MeasuredBody, kind: Kind) -> SignalObservation:
+def _force(cut: Recording, p: Tree, kind: Kind) -> SignalObservation:
     """The force on the moved place, sample by sample."""
     force = zeroed_force(cut, p, kind, 0.0)
     return observed_force(cut, p, force, force.t, force.y)
 
 
 def _windows(
-    p: MeasuredBody, t: Floats, first: Observation, names: tuple[str, ...]
+    p: Tree, t: Floats, first: Observation, names: tuple[str, ...]
 ) -> tuple[Selection, ...]:
     """Every sample of the sensors of these names; with an identified damping those it was
     identified on, and the later ones."""
     if not names:
         return ()
-    if p.motion.fit_window is None:
+    if p.settings.motion.fit_window is None:
         return (replace(EVERYTHING, of=names),)
     samples = first.t[first.t <= t[-1] + _SAME]
-    early = samples <= p.motion.fit_window
+    window = p.settings.motion.fit_window
+    early = samples <= window
     if early.sum() < _FEWEST or (~early).sum() < _FEWEST:
         raise ComparisonError(
-            f"motion.fit_window = {p.motion.fit_window:g} s: {int(early.sum())} samples in it and "
+            f"motion.fit_window = {window:g} s: {int(early.sum())} samples in it and "
             f"{int((~early).sum())} after it; {_FEWEST} of each are needed"
         )
-    end = f"{p.motion.fit_window:g} s after the start"
+    end = f"{p.settings.motion.fit_window:g} s after the start"
     return (
         Selection(FIRST, samples[early], f"samples up to {end}", of=names),
         Selection(LATER, samples[~early], f"samples later than {end}", of=names),
     )
 
 
-def preload(p: MeasuredBody, seen: Registered) -> tuple[float, ...]:
+def preload(p: Tree, seen: Registered) -> tuple[float, ...]:
     """Inputs at which the body rests before the start: what held it, and its weight; none: all
     zero."""
     found = [0.0] * sum(d.y.shape[1] for d in seen.drives)
-    if p.moved.by == RELEASE:
+    if isinstance(mover(p.scene), Load) and seen.sudden:
         found[0] = -float(seen.drives[0].y[0, 0])
-    if p.motion.gravity and p.moved.by != "gravity":
-        found[-1] = p.moved.amount
+    if weight := weight_beside(p.scene):
+        found[-1] = known(weight.value, f"loads.{weight.name}.value")
     return tuple(found) if any(found) else ()

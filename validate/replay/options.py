@@ -10,9 +10,9 @@ from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, has_path, nearest_names, with_values
 from validate.replay.experiment import Case, Experiment
 from validate.replay.guests import added_guests
-from validate.replay.law_solver import with_declared_law, with_laws
+from validate.replay.law_solver import with_law
 from validate.replay.method import Method
-from validate.replay.tree import Tree, valued
+from validate.replay.tree import valued
 from validate.scene.abaqus_lines import files_named
 from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
 
@@ -88,8 +88,12 @@ def require_case(experiment: Experiment, name: str) -> None:
 def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
     """Every method with the user's values, whether it is run or not: what identifies follows."""
     values = _split(options.values)[1]
+    for path in values:
+        if (name := path.partition(".")[0]) not in experiment.methods:
+            near = nearest_names(name, set(experiment.methods))
+            raise UsageError(f"methods.{path}: no method '{name}'; {near}")
     ours, theirs = _of_scenes(experiment, values)
-    changed = dict(with_values(*with_laws(experiment.methods, ours)))
+    changed = dict(with_values(experiment.methods, ours))
     given: dict[str, dict[str, str]] = {}
     for path, text in theirs.items():
         name, _, inner = path.partition(".")
@@ -100,7 +104,7 @@ def all_methods(experiment: Experiment, options: Options) -> dict[str, Method]:
         scene = valued(experiment.parameters, scene, texts)
         changed[name] = replace(changed[name], scene=scene)
         if law := texts.get("material.law"):
-            changed[name] = with_declared_law(name, changed[name], law, experiment.methods)
+            changed[name] = with_law(name, changed[name], law, experiment.methods)
     return changed
 
 
@@ -114,21 +118,20 @@ def _of_scenes(
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Values of the methods' own fields, and those that are of a method's declared scene."""
     theirs = {}
-    if isinstance(experiment.parameters, Tree):
-        for path, text in values.items():
-            name, _, inner = path.partition(".")
-            method = experiment.methods.get(name)
-            of_scene = method and (inner in _changed(method) or not has_path(method, inner))
-            if of_scene and has_path(experiment.parameters, inner):
-                theirs[path] = text
+    for path, text in values.items():
+        name, _, inner = path.partition(".")
+        method = experiment.methods.get(name)
+        of_scene = method and (inner in _changed(method) or not has_path(method, inner))
+        if of_scene and has_path(experiment.parameters, inner):
+            theirs[path] = text
     return {k: v for k, v in values.items() if k not in theirs}, theirs
 
 
 def doubtful(experiment: Experiment, values: Mapping[str, str]) -> tuple[str, ...]:
     """A line for each value that looks like one whose unit was forgotten."""
     mine, theirs = _split(values)
-    methods, rest = with_laws(experiment.methods, _of_scenes(experiment, theirs)[0])
-    return (*doubts(experiment.parameters, mine), *doubts(methods, rest))
+    ours, _ = _of_scenes(experiment, theirs)
+    return (*doubts(experiment.parameters, mine), *doubts(experiment.methods, ours))
 
 
 def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from validate.errors import UsageError
 from validate.parameters import Origin, Parameter, describe, with_values
@@ -16,15 +16,6 @@ from validate.replay.experiment import Experiment
 from validate.replay.options import Options, folder_of
 
 _WRITTEN = 1e-5  # relative: a number of the recording that was written with six digits
-
-
-@runtime_checkable
-class StatedByFiles(Protocol):
-    """Parameters that name a file which holds others of them, as a mesh holds its height."""
-
-    def stated_by_files(self) -> Mapping[str, float]:
-        """Return what the files hold, in SI, by path."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -41,14 +32,12 @@ class Opened:
 
 
 def opened(experiment: Experiment, parameters: Any) -> Opened:
-    """Loads the recordings; what is not set is taken from them, then from files of the parameters.
+    """Loads the recordings; what is not set is taken from them.
 
     Raises `UsageError` for what neither they nor the user say, with the line of the file.
     """
     recordings = experiment.load(parameters, folder_of(experiment))
     stated = _common([experiment.stated(r) for r in recordings])
-    if isinstance(parameters, StatedByFiles):
-        stated = {**parameters.stated_by_files(), **stated}
     taken = tuple(p.path for p in describe(parameters) if p.default is None and p.path in stated)
     filled = with_values(parameters, {path: repr(stated[path]) for path in taken})
     missing = tuple(p for p in describe(filled) if p.missing)

@@ -8,10 +8,10 @@ The predictions then use the value identified under the moved input, so that wha
 and prediction have in common (the area of the specimen, say) cancels as far as it does.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
@@ -30,7 +30,6 @@ from validate.replay.compression_cards import Compression
 from validate.replay.experiment import Identified, Input, MeshLadder
 from validate.replay.fitted_moduli import (
     COMMON,
-    Entry,
     Moves,
     counts,
     effect,
@@ -41,7 +40,18 @@ from validate.replay.fitted_moduli import (
     sentence,
     with_move,
 )
+from validate.replay.mesh_sizes import DIAMETER, HEIGHT
 from validate.replay.method import Method
+from validate.replay.pressed_scene import (
+    BuiltPressed,
+    Ends,
+    between,
+    ends_of,
+    kind_of_test,
+    pressed_size,
+)
+from validate.replay.tree import Tree, changed_by
+from validate.scene.geometry import Cylinder
 from validate.scene.scene import Scene
 
 _UNIT = 1e3  # Pa
@@ -51,14 +61,7 @@ _ENDS = {
     "compression": {"slip": "slipping plates", "bonded": "bonded plates"},
     "tension": {"slip": "ends free to contract", "bonded": "grips"},
 }
-_OTHER = {"slip": "bonded", "bonded": "slip"}
-
-Build = Callable[[Recording, Compression, Any], Scene]
-
-
-def model_name(law: str, plates: str, order: int) -> str:
-    """What parameters call a model."""
-    return f"{law}, {plates}, order {order}"
+_OTHER: Mapping[Ends, Ends] = {"slip": "bonded", "bonded": "slip"}
 
 
 @dataclass(frozen=True)
@@ -81,10 +84,10 @@ class _Log:
 
 def identify_pressed(
     recordings: Sequence[Recording],
-    p: Compression,
+    tree: Tree,
     methods: Mapping[str, Method],
     *,
-    build: Build,
+    build: BuiltPressed,
     ladder: MeshLadder,
     accepted: Sequence[str],
     declared: Sequence[Input] = (),
@@ -96,30 +99,37 @@ def identify_pressed(
     Raises `UsageError` for an open modulus of a body with fluid inside, and children of
     `ValidateError` as the log and the laws do.
     """
-    require_used(p.material.coefficients, {m.scene.law for m in methods.values()})
-    if p.material.E is not None:
-        return Identified(p, (), ())
-    if p.specimen.fluid is not None:
+    material, settings = tree.scene.material, tree.settings
+    own = {n: changed_by(tree, m.scene or {}).scene for n, m in methods.items()}
+    require_used(material.coefficients, {scene.material.law for scene in own.values()})
+    if material.E is not None:
+        return Identified(tree, (), ())
+    if tree.scene.cavities:
         raise UsageError(
             "material.E is not set: a body with fluid inside does not deform uniformly, and the "
             "log's slope is not its modulus; give it with --set material.E=VALUE"
         )
     recording = recordings[0]
-    log = _log(recording, p)
+    log = _log(recording, tree, build.folder)
     first = next((n for n in accepted if n in methods), next(iter(methods)))
     order = (first, *(n for n in methods if n != first))
-    given = p.material.E_bonded is not None
-    wanted = [n for n in order if not (given and methods[n].scene.plates == "bonded")] or [first]
+    given = settings.E_bonded is not None
+    wanted = [n for n in order if not _has_modulus(methods[n])
+              and not (given and ends_of(own[n]) == "bonded")] or [first]  # fmt: skip
     found: dict[str, _Fitting] = {}
     for name in wanted:
-        one = _Fitting(recording, p, methods[name], name, build, log)
-        if one.model not in {f.model for f in found.values()}:
+        one = _Fitting(recording, tree, methods[name], name, build, log)
+        same = next((f for f in found.values() if f.model == one.model), None)
+        if same is None:
             found[name] = one
+        else:
+            _require_alike(one, same)
     entries = tuple((f.model, f.E, f.toe) for f in found.values())
-    material = replace(p.material, by_method=entries, E=found[wanted[0]].E)
-    bonded = next((f.E for f in found.values() if f.method.scene.plates == "bonded"), None)
-    material = replace(material, E_bonded=p.material.E_bonded or bonded)
-    fitted = replace(p, material=material)
+    bonded = next((f.E for f in found.values() if f.ends == "bonded"), None)
+    fitted = replace(
+        tree.with_scene(material=replace(material, E=found[wanted[0]].E)),
+        settings=replace(settings, by_method=entries, E_bonded=settings.E_bonded or bonded),
+    )
     judged = {n: f for n, f in found.items() if n in accepted} or {first: found[first]}
     budgets = {n: _Budget(f, ladder) for n, f in judged.items()}
     values = tuple(b.value(first=n == first) for n, b in budgets.items())
@@ -131,10 +141,24 @@ def identify_pressed(
     )  # fmt: skip
 
 
-def _log(recording: Recording, p: Compression) -> _Log:
-    size = p.specimen.size
-    fit = fit_modulus(recording, size, (p.fit_from, p.fit_to), p.test)
-    log = loading(recording, p.test)
+def _require_alike(one: "_Fitting", same: "_Fitting") -> None:
+    """Raises `UsageError` for methods of one model whose materials differ: it has one modulus."""
+    a, b = (f.changed.scene.material for f in (one, same))
+    if a != b:
+        raise UsageError(
+            f"methods.{one.name}: another material than {same.name}, of the same model "
+            f"({one.model}), whose modulus is identified; set methods.{one.name}.material.E"
+        )
+
+
+def _has_modulus(method: Method) -> bool:
+    return "material.E" in (method.scene or {})
+
+
+def _log(recording: Recording, tree: Tree, folder: Path) -> _Log:
+    p, size, test = tree.settings, pressed_size(tree, folder), kind_of_test(tree)
+    fit = fit_modulus(recording, size, (p.fit_from, p.fit_to), test)
+    log = loading(recording, test)
     d = log.d - fit.contact
     strain = d / size.height
     beyond = strain - fit.toe > p.limit
@@ -152,17 +176,21 @@ class _Fitting:
     """One method's own curve and the scale and shift that fit it to the log."""
 
     def __init__(
-        self, recording: Recording, p: Compression, method: Method, name: str, build: Build,
+        self, recording: Recording, tree: Tree, method: Method, name: str, build: BuiltPressed,
         log: _Log,
     ) -> None:  # fmt: skip
-        self.recording, self.p, self.method, self.name = recording, p, method, name
-        self.build, self.log = build, log
-        scene = method.scene
-        self.model = model_name(scene.law, scene.plates, scene.order)
-        self.linear = scene.law == "linear"
+        self.recording, self.tree, self.name = recording, tree, name
+        self.p: Compression = tree.settings
+        self.method, self.build, self.log = method, build, log
+        self.size = pressed_size(tree, build.folder)
+        self.changed = changed = changed_by(tree, method.scene or {})
+        self.model, self.law = build.model(changed), changed.scene.material.law
+        self.ends = ends_of(changed.scene)
+        self.linear = self.law == "linear"
+        self.meshed = not isinstance(tree.scene.body, Cylinder)
         start = log.fit.E_apparent
         self.curve, self.fit, self.solutions = fit_modulus_of(
-            lambda E: self.curve_of(p, E, p.limit), self.fitted, start
+            lambda E: self.curve_of(tree, E, self.p.limit), self.fitted, start
         )
 
     @property
@@ -177,22 +205,20 @@ class _Fitting:
     def fitted(self, curve: UnitCurve, force: float = 0.0) -> ScaledFit:
         """The curve fitted in the window, with `force` N added to what was measured."""
         d, F = self.log.window
-        start = self.log.fit.toe * self.p.specimen.size.height
+        start = self.log.fit.toe * self.size.height
         return fit_scaled(curve, d, F + force, sd=self.log.noise, shifted=True, start=start)
 
     def curve_of(
-        self, p: Compression, E: float, limit: float, *, plates: str = "", law: str = ""
+        self, tree: Tree, E: float, limit: float, *, ends: Ends | None = None, law: str = ""
     ) -> UnitCurve:
         """Force of modulus E to the strain `limit`, on the mesh that the parameters have."""
-        scene = replace(
-            self.method.scene,
-            plates=plates or self.method.scene.plates, law=law or self.method.scene.law,
-        )  # fmt: skip
-        material = replace(p.material, E=E, E_bonded=None, by_method=())
-        built = self.build(self.recording, replace(p, material=material), scene)
-        height = p.specimen.size.height
+        law = law or self.law
+        own = changed_by(tree, self.method.scene or {})
+        changes = {**(between(ends, own) if ends else {}), "material.law": law, "material.E": E}
+        built = self.build(self.recording, own, changes)
+        height = pressed_size(tree, self.build.folder).height
         reach = _BEYOND * limit * height + abs(self.log.fit.toe) * height
-        if scene.law == "linear":
+        if law == "linear":
             # One solution: displacement and force are in proportion.
             unit = _stiffness(built)
             return UnitCurve(np.array([0.0, reach]), np.array([0.0, unit * reach]), E)
@@ -205,7 +231,7 @@ class _Fitting:
 
     def predicted(self, curve: UnitCurve, fit: ScaledFit) -> Floats:
         """Force beyond the window under a fit, N."""
-        beyond = self.log.d > self.p.fit_to * self.p.specimen.size.height
+        beyond = self.log.d > self.p.fit_to * self.size.height
         return fit.scale * curve(self.log.d[beyond] - fit.shift)
 
 
@@ -220,8 +246,8 @@ class _Budget:
     def __init__(self, f: _Fitting, ladder: MeshLadder) -> None:
         self.f, p = f, f.p
         fit, E = f.fit, f.E
-        self._own = self._linear_stiffness(p)
-        self.meshes = on_meshes(p, self._cheapest(ladder), E, self._on_mesh)
+        self._own = self._linear_stiffness(f.tree)
+        self.meshes = on_meshes(f.tree, self._cheapest(ladder), E, self._on_mesh)
         zero = f.fitted(f.curve, f.log.offset_sd)
         coarse = f.curve.coarser
         step = abs(f.fitted(coarse).scale - E) / 3 if coarse is not None else 0.0
@@ -238,53 +264,55 @@ class _Budget:
             "repeats": repeats_share(f.recording) * E,
         }
 
-    def _on_mesh(self, p: Compression) -> float:
+    def _on_mesh(self, tree: Tree) -> float:
         f = self.f
-        return f.fitted(f.curve_of(p, f.E, p.fit_to)).scale
+        return f.fitted(f.curve_of(tree, f.E, f.p.fit_to)).scale
 
     def _curves(self) -> dict[str, UnitCurve]:
         """The method's curve under every moved input, by its name."""
-        f, p, r = self.f, self.f.p, self.f.p.ranges
+        f, tree, r = self.f, self.f.tree, self.f.p.ranges
         found = {}
+        wide, high = 1 + r.diameter, 1 + r.height
         for name, changed, plain in (
-            ("diameter", _wider(p), (1 + r.diameter) ** 2),
-            ("height", _higher(p), 1 / (1 + r.height)),
+            ("diameter", _larger(tree, DIAMETER, f.size.diameter * wide), wide**2),
+            ("height", _larger(tree, HEIGHT, f.size.height * high), 1 / high),
         ):
             gain = self._stiffer(changed) if changed is not None else plain
-            along = 1 + r.height if name == "height" else 1.0
+            along = high if name == "height" else 1.0
             found[name] = f.curve.scaled(gain * along, along)
-        other = _OTHER[f.method.scene.plates]
-        held = self._stiffer(p, other)
+        held = self._stiffer(tree, _OTHER[f.ends])
         found["friction"] = f.curve.scaled(1 + r.friction * (held - 1))
-        nu = _less_compressible(p)
-        if not (f.linear and f.method.scene.plates == "slip" and p.specimen.mesh is None):
+        nu = _less_compressible(tree)
+        if not (f.linear and self._uniform):
             found["Poisson ratio"] = (
-                f.curve.scaled(self._stiffer(nu)) if f.linear else f.curve_of(nu, f.E, p.limit)
+                f.curve.scaled(self._stiffer(nu)) if f.linear else f.curve_of(nu, f.E, f.p.limit)
             )
         return found
 
-    def _stiffer(self, p: Compression, plates: str = "") -> float:
-        """Stiffness of the linear law with other parameters or plates, over that as it is."""
-        f = self.f
-        slip = f.method.scene.plates == "slip" and p.specimen.mesh is None
-        if slip and not plates:  # uniform: modulus times area over height
-            a, b = p.specimen.size, f.p.specimen.size
-            return (a.area / a.height) / (b.area / b.height)
-        return self._linear_stiffness(p, plates) / self._own
+    @property
+    def _uniform(self) -> bool:
+        """Whether every cell is strained alike."""
+        return self.f.ends == "slip" and not self.f.meshed
 
-    def _linear_stiffness(self, p: Compression, plates: str = "") -> float:
+    def _stiffer(self, tree: Tree, ends: Ends | None = None) -> float:
+        """Stiffness of the linear law with other parameters or ends, over that as it is."""
+        if self._uniform and not ends:  # modulus times area over height
+            a, b = pressed_size(tree, self.f.build.folder), self.f.size
+            return (a.area / a.height) / (b.area / b.height)
+        return self._linear_stiffness(tree, ends) / self._own
+
+    def _linear_stiffness(self, tree: Tree, ends: Ends | None = None) -> float:
         """N/m of the linear law with a unit modulus, on the method's mesh."""
         f = self.f
-        found = f.curve_of(p, _UNIT, f.p.fit_to, law="linear", plates=plates)
+        found = f.curve_of(tree, _UNIT, f.p.fit_to, law="linear", ends=ends)
         return float(found.force[-1] / found.d[-1])
 
     def _cheapest(self, ladder: MeshLadder) -> MeshLadder:
         """Without its finest level where every mesh has the exact, uniform solution."""
         f = self.f
-        uniform = f.linear and f.method.scene.plates == "slip" and f.p.specimen.mesh is None
         fewer = replace(ladder, levels=ladder.levels[:2])
-        sizes = {ladder.size(f.p), *(ladder.size(change(f.p)) for change in fewer.levels)}
-        return fewer if uniform and len(sizes) == 3 else ladder
+        sizes = {ladder.size(f.tree), *(ladder.size(change(f.tree)) for change in fewer.levels)}
+        return fewer if f.linear and self._uniform and len(sizes) == 3 else ladder
 
     def value(self, *, first: bool) -> IdentifiedValue:
         f, p = self.f, self.f.p
@@ -299,15 +327,15 @@ class _Budget:
     def _finding(self) -> str:
         f = self.f
         d, F = f.log.d, f.log.force
-        kept = d >= f.p.fit_from * f.p.specimen.size.height
+        kept = d >= f.p.fit_from * f.size.height
         at = d[kept] - f.toe
         curve, slope = f.curve(at), f.E * f.curve.slope(at)
         followed = np.stack([curve, slope], axis=1)
         residual = F[kept] - f.E * curve
-        beyond = d[kept] > f.p.fit_to * f.p.specimen.size.height
+        beyond = d[kept] > f.p.fit_to * f.size.height
         off = misfit(residual[beyond], f.fit.noise, self._u_predicted(), f.fit.dependence)
         shape = pattern(at, residual, followed, f.log.noise, f.fit.dependence)
-        return finding(f.method.scene.law, shape, off)
+        return finding(f.law, shape, off)
 
     def _u_predicted(self) -> float:
         """Standard uncertainty of the force beyond the window, N rms, from identification."""
@@ -323,26 +351,15 @@ class _Budget:
         return hypot(alone, toe, *each)
 
 
-def _wider(p: Compression) -> Compression | None:
-    """None where the shape is a mesh file's own."""
-    if p.specimen.mesh is not None:
-        return None
-    wide = p.specimen.size.diameter * (1 + p.ranges.diameter)
-    return replace(p, specimen=replace(p.specimen, diameter=wide))
+def _larger(tree: Tree, path: str, size: float) -> Tree | None:
+    """Another size of a cylinder; None where the shape is a mesh file's own."""
+    return tree.given({path: size}) if isinstance(tree.scene.body, Cylinder) else None
 
 
-def _higher(p: Compression) -> Compression | None:
-    if p.specimen.mesh is not None:
-        return None
-    high = p.specimen.size.height * (1 + p.ranges.height)
-    return replace(p, specimen=replace(p.specimen, height=high))
-
-
-def _less_compressible(p: Compression) -> Compression:
+def _less_compressible(tree: Tree) -> Tree:
     """The Poisson ratio moved by one standard uncertainty: up, or down where that ends at .5."""
-    up = p.material.nu + p.ranges.nu
-    nu = up if up < 0.4999 else p.material.nu - p.ranges.nu
-    return replace(p, material=replace(p.material, nu=nu))
+    nu, off = tree.scene.material.nu, tree.settings.ranges.nu
+    return tree.given({"material.nu": nu + off if nu + off < 0.4999 else nu - off})
 
 
 # --- what identification leaves uncertain in predictions ------------------------------------------
@@ -393,18 +410,8 @@ def _ladder(ladder: MeshLadder, budgets: Mapping[str, _Budget]) -> MeshLadder:
 
 
 def _of_rival(name: str, f: _Fitting) -> str:
-    half, scene = 2 * f.fit.sd, f.method.scene
-    ends = _ENDS[f.p.test][scene.plates]
+    half, ends = 2 * f.fit.sd, _ENDS[kind_of_test(f.tree)][f.ends]
     return (
         f"E = {f.E:.5g} ± {half:.3g} Pa (two sd of the fit alone) was identified by {name} for "
-        f"{ends}, law '{scene.law}'; this method is not checked"
+        f"{ends}, law '{f.law}'; this method is not checked"
     )
-
-
-def by_model(scene: Scene) -> str:
-    """The name of the model that a scene was built with."""
-    held = any(s.facets == "upper_plate" for s in scene.supports)
-    return model_name(scene.material.law, "bonded" if held else "slip", scene.mesh.order)
-
-
-__all__ = ["Entry", "by_model", "identify_pressed", "model_name"]

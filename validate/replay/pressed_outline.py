@@ -7,13 +7,12 @@ the recording; without either nothing is compared. They rest with that plate.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError, UsageError
-from validate.parameters import quantity
+from validate.parameters import known, quantity, value_at
 from validate.recording.types import Contours, Recording
 from validate.register.clock import clock_sd
 from validate.register.observation import Selection, nearest_samples
@@ -23,10 +22,14 @@ from validate.register.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
 from validate.replay.experiment import Input, vary
+from validate.replay.mesh_sizes import HEIGHT
+from validate.replay.tree import Tree
+from validate.scene.geometry import Cylinder
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import pose_of
 
 WHOLE = "surface"
+MODULI = ("material.E", "E_bonded")  # that may be given
 _LIKE = 2.0  # times the area at rest within which an outline and a section are of one feature
 
 
@@ -48,7 +51,7 @@ class PressedOutline:
             raise UsageError(f"outline: holds {self.holds} (1 to 50), sd {self.sd} (0 or above)")
 
 
-def with_surface(mesh: Mesh) -> Mesh:
+def _with_surface(mesh: Mesh) -> Mesh:
     """The mesh with the facet set of all of its surface."""
     return replace(mesh, facets={WHOLE: mesh.surface, **mesh.facets})
 
@@ -63,6 +66,7 @@ def with_outline(
     `RegistrationError` where the outlines are of something else than the surface.
     """
     contours = _posed(recording.contour(str(card.topic)), card)
+    mesh = _with_surface(mesh)
     mesh.facet_nodes(card.surface)
     stage = seen.drives[0]
     at, held = _instants(contours, stage, card)
@@ -142,29 +146,34 @@ def _require_alike(found: OutlineObservation, mesh: Mesh, card: PressedOutline) 
 # --- what is uncertain ----------------------------------------------------------------------------
 
 
-def _shifted(axis: int) -> Callable[[Any, float], Any]:
-    def along(p: Any, z: float) -> Any:
-        x, y = p.outline.shift
-        by = z * (p.outline.sd or 0.0)
-        return replace(
-            p, outline=replace(p.outline, shift=(x + by, y) if axis == 0 else (x, y + by))
-        )
+def _shifted(axis: int) -> Callable[[Tree, float], Tree]:
+    def along(tree: Tree, z: float) -> Tree:
+        card = tree.settings.outline
+        x, y = card.shift
+        by = z * (card.sd or 0.0)
+        return tree.given({"outline.shift": (x + by, y) if axis == 0 else (x, y + by)})
 
     return along
 
 
-def _higher(p: Any, z: float) -> Any:
-    """Another height, of the same log: what was measured in m, and the slope, stay."""
-    by = 1 + z * p.ranges.height
-    if p.specimen.height is None:
-        return p
-    moduli = {k: getattr(p.material, k) for k in ("E", "E_bonded")}
-    stiffer: dict[str, Any] = {k: None if E is None else E * by for k, E in moduli.items()}
-    return replace(
-        p, specimen=replace(p.specimen, height=p.specimen.height * by),
-        material=replace(p.material, **stiffer),
-        **{k: getattr(p, k) / by for k in ("fit_from", "fit_to", "limit")},
-    )  # fmt: skip
+def stiffer(tree: Tree, by: float) -> Tree:
+    """The body with the given moduli times a factor; those that are identified follow by
+    themselves."""
+    moduli = {path: value_at(tree, path)[0] for path in MODULI}
+    return tree.given({path: by * E for path, E in moduli.items() if E is not None})
+
+
+def _higher(tree: Tree, z: float) -> Tree:
+    """Another height, of the same log: what was measured in m, and the slope, stay.
+
+    A mesh file has its own height: only the slope is then off.
+    """
+    by, body = 1 + z * tree.settings.ranges.height, tree.scene.body
+    if not isinstance(body, Cylinder):
+        return stiffer(tree, by)
+    strains = ("fit_from", "fit_to", "limit")
+    changed = {path: value_at(tree, path)[0] / by for path in strains}
+    return stiffer(tree, by).given({HEIGHT: known(body.height, HEIGHT) * by, **changed})
 
 
 OUTLINE_INPUTS = (

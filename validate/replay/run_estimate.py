@@ -39,8 +39,8 @@ def estimated(file: Path) -> RunEstimate | None:
 
 def _estimated(experiment: Experiment) -> RunEstimate | None:
     found = opened(experiment, experiment.parameters)
-    modulus = [p.path for p in describe(found.parameters) if p.path == "material.E"]
-    unset = [p for p in modulus if found.parameters.material.E is None]
+    described = describe(found.parameters)
+    unset = [p.path for p in described if p.path == "material.E" and p.default is None]
     parameters = with_values(found.parameters, dict.fromkeys(unset, _ASSUMED_E.replace(" ", "")))
     experiment = experiment.follows(experiment, found.recordings, parameters)
     road = Road(experiment, experiment.methods, parameters, None, quick=False)

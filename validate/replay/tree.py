@@ -11,12 +11,13 @@ from typing import Any
 
 from validate.errors import ComparisonError
 from validate.files import modified
-from validate.parameters import part, quantity, value_at
+from validate.parameters import part, quantity, value_at, with_given
 from validate.recording.types import Recording
 from validate.register.as_declared import as_declared
 from validate.register.registered import Registered
 from validate.replay.variation import change_of
-from validate.scene.geometry import Geometry, cell_size
+from validate.scene.coarser import size_against
+from validate.scene.geometry import Geometry, MeshFile, cell_size
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import Meshless
 from validate.scene.scene import Scene
@@ -36,6 +37,14 @@ class Tree:
 
     def with_scene(self, **changes: Any) -> "Tree":
         return replace(self, scene=replace(self.scene, **changes))
+
+    def with_settings(self, **changes: Any) -> "Tree":
+        return replace(self, settings=replace(self.settings, **changes))
+
+    def given(self, values: Mapping[str, Any]) -> "Tree":
+        """With other values by path; raises what `parameters.with_given` does."""
+        changed: Tree = with_given(self, values)
+        return changed
 
 
 def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
@@ -110,9 +119,21 @@ class CellSize:
     folder: Path = field(default=Path(), compare=False)
 
     def __call__(self, tree: Tree) -> float:
-        """A body whose mesh follows from a recording says its own."""
+        """A body whose mesh follows from a recording says its own.
+
+        Cells of a file that were filled anew have another shape: their nodes are counted.
+        """
         own: float | None = getattr(tree.scene.body, "cell_size", None)
-        return cell_size(mesh_of(None, tree, self.folder)) if own is None else own
+        if own is not None:
+            return own
+        if not isinstance(tree.scene.body, MeshFile):
+            return cell_size(mesh_of(None, tree, self.folder))
+        plain = replace(tree.scene.body, element="linear")
+        file = mesh_of(None, tree.with_scene(body=replace(plain, halvings=0)), self.folder)
+        if plain.halvings >= 0:
+            return float(cell_size(file) / 2**plain.halvings)
+        anew = mesh_of(None, tree.with_scene(body=plain), self.folder)
+        return cell_size(file) * size_against(file, anew)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,11 @@ class ByPath(Mapping[str, Any]):
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values = dict(values)
+        for path, value in self._values.items():
+            if isinstance(value, dict | list | set):
+                raise UsageError(
+                    f"{path}: a {type(value).__name__}; expected a number, a text or a tuple"
+                )
 
     def __getitem__(self, path: str) -> Any:
         return self._values[path]

@@ -29,8 +29,10 @@ from validate.scene.filled import filled
 from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
 from validate.scene.mesh_file import read_mesh
+from validate.scene.named_place import place_of
 from validate.scene.refine import linear, refined
 from validate.scene.scene import Scene, Support
+from validate.scene.select import facets_of
 from validate.scene.similar_grids import member
 
 _AXES = "xyz"
@@ -208,7 +210,17 @@ class MeshFile:
     )
 
     def resolved(self, folder: Path) -> Mesh:
+        return self.placed(folder, ())
+
+    def placed(self, folder: Path, places: tuple[str, ...]) -> Mesh:
+        """With `places` in words as facet sets, chosen on the mesh as it is in the file, whose set
+        "surface" is then all of it."""
         mesh = read_mesh(folder / self.file, self.unit)
+        if places:
+            mesh = linear(mesh)
+            mesh = replace(mesh, facets={**mesh.facets, "surface": mesh.surface})
+            chosen = {text: facets_of(mesh, place_of(text, mesh)) for text in places}
+            mesh = replace(mesh, facets={**mesh.facets, **chosen})
         if self.halvings < 0:
             mesh = coarser(mesh, -self.halvings)
         for _ in range(self.halvings):

@@ -49,9 +49,7 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
     """
     suffix = path.suffix.lower()
     if suffix in FOREIGN and unit is None:
-        raise SceneError(
-            f"{path.name}: no unit of length; give it: specimen.mesh_unit or body.unit=mm"
-        )
+        raise SceneError(f"{path.name}: no unit of length; give it: body.unit=mm")
     if suffix in FOREIGN:
         return read_foreign(path, unit or "").mesh
     if suffix in SURFACES:

@@ -15,6 +15,7 @@ from validate.arrays import Floats, checked
 from validate.errors import SceneError
 from validate.parameters import known, quantity, take_units
 from validate.scene.contact import RigidContact, require_clear
+from validate.scene.indenter import standing
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.named_place import axis_of, box_of, place_of
@@ -24,7 +25,7 @@ from validate.scene.tool import Needle, require_usable
 from validate.scene.tracked import Prescribed
 from validate.units import SYMBOLIC
 
-Dilatation = Literal["pointwise", "nodal_mean", "mixed"]
+Dilatation = Literal["pointwise", "nodal_mean", "mixed", "by_element"]
 PlaneState = Literal["strain", "stress"]
 Contact = Literal["slip", "partial", "bonded"]
 
@@ -281,7 +282,8 @@ class Scene:
     `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
     of a drive is that on the whole body. `dilatation`: the volume change is that of every point, in
     the mean of the cells around each node (tet4), or "mixed", projected in every cell
-    (`fem.mean_dilatation`); the latter two do not lock near nu = .5. `plane` and `thickness` m are
+    (`fem.mean_dilatation`); the latter two do not lock near nu = .5. Declared, "by_element" is the
+    one of them that the mesh's cells may have. `plane` and `thickness` m are
     those of a 2-D mesh; at 1 m all forces are per metre. `force_unit`: N, or that of a recording
     whose unit nobody stated; moduli are then in it per m^2, and no force is in N.
     """
@@ -343,9 +345,13 @@ class Scene:
             foundations=placed(tuple(f for f in sides if f.contact == "partial")),
             membranes=placed(tuple(m for m in self.membranes if m.thickness)),
             loads=placed(self.loads),
+            tracked=placed(self.tracked),
             masses=placed(tuple(mass for mass in self.masses if mass.mass)),
             cavities=tuple(one for c in self.cavities for one in _each(c, mesh)),
-            contacts=placed(self.contacts),
+            contacts=tuple(
+                standing(c, mesh, getattr(self.body, "middle", ())) for c in placed(self.contacts)
+            ),
+            dilatation=_unlocked(mesh) if self.dilatation == "by_element" else self.dilatation,
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
             copies=self.copies * getattr(self.body, "copies", 1),
         )
@@ -397,6 +403,15 @@ class Scene:
                 raise SceneError(
                     f"foundation '{ground.name or ground.facets}': contact '{ground.contact}' is "
                     "of a declared scene; on a mesh use a support, or no foundation"
+                )
+        holding: tuple[Support | Pin | Foundation, ...] = (
+            *self.supports, *self.pins, *self.foundations
+        )  # fmt: skip
+        for part in holding:
+            if not part.components or set(part.components) - set(range(self.mesh.dimension)):
+                raise SceneError(
+                    f"{type(part).__name__.lower()} with components {part.components}: expected "
+                    f"some of {', '.join(map(str, range(self.mesh.dimension)))} (along x, y, z)"
                 )
         for pin in self.pins:
             if pin.middle_of:
@@ -504,6 +519,13 @@ def _placed(part: P, mesh: Mesh, places: Mapping[str, Place]) -> P:
     return replace(part, facets=place)  # type: ignore[type-var]
 
 
+def _unlocked(mesh: Mesh) -> Dilatation:
+    """What does not lock in cells of this kind near nu = .5."""
+    if mesh.bricks:
+        return "mixed"
+    return "nodal_mean" if mesh.order == 1 else "pointwise"
+
+
 def _each(cavity: Cavity, mesh: Mesh) -> tuple[Cavity, ...]:
     """The cavities of a declared one, by facet set."""
     if not cavity.facets.endswith("*"):
@@ -537,6 +559,8 @@ def _take_direction(part: Any) -> None:
 
 def _drives(part: Prescribed) -> tuple[Drive, ...]:
     """One drive for every component of every tracked point."""
+    if not part.points:
+        raise SceneError(f"'{part.name}': the recording says where {', '.join(part.labels)} are")
     d = part.places.shape[1]
     axes = np.eye(d).tolist()
     return tuple(

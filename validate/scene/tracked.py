@@ -1,12 +1,13 @@
 """Displacements of a set of nodes that follows tracked points as a rigid body."""
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from functools import cached_property
 
 import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
+from validate.parameters import quantity
 from validate.scene.select import Place
 
 _AXES = "xyz"
@@ -17,15 +18,19 @@ _NOTHING = 1e-9  # singular value, of the largest, that points do not determine
 class Prescribed:
     """A set of nodes that follows `points` (label and place m), whose displacements are inputs.
 
-    It moves by the small rigid motion nearest to what was tracked (3 points, 2 in 2-D). Raises
-    `SceneError` for points that do not determine the motion.
+    It moves by the small rigid motion nearest to what was tracked (3 points, 2 in 2-D). Declared,
+    points may be `labels` alone: where they are, the recording says. Raises `SceneError` for points
+    that do not determine the motion.
     """
 
     name: str
-    facets: Place
-    points: tuple[tuple[str, tuple[float, ...]], ...]
+    facets: Place = quantity(MISSING, "1", "what follows the points")
+    points: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    labels: tuple[str, ...] = quantity((), "1", "names of the points, where the recording has them")
 
     def __post_init__(self) -> None:
+        if self.labels and not self.points:
+            return
         labels = [label for label, _ in self.points]
         if not labels or len(set(labels)) < len(labels):
             raise SceneError(

@@ -15,7 +15,6 @@ from validate.parameters import Ranges, known, quantity
 from validate.recording.exports.instron import read_instron
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.compression_cards import stated_sizes
 from validate.replay.method import Method
 from validate.replay.pressed import pressed_log
 from validate.replay.tree import Built, Tree
@@ -78,12 +77,6 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     if not files:
         raise RecordingError(f"no logs '{p.logs}' in {where}; pass --set logs=PATTERN")
     return tuple(read_instron(f) for f in files)
-
-
-def stated(recording: Recording) -> dict[str, float]:
-    """Sizes m of the cylinder that the recording's record `specimen` has, by path."""
-    sizes = stated_sizes(recording)
-    return {path.replace("specimen.", "body."): value for path, value in sizes.items()}
 
 
 def size(tree: Tree) -> CylinderSize:
