@@ -50,6 +50,8 @@ def _lines(part: Any, f: Any, depth: int) -> list[str]:
     line = said + (f"  # {units}" if units else "")
     if len(_INDENT * depth + line) <= _WIDTH:
         return [line]
+    if units and len(_INDENT * depth + said) <= _WIDTH:
+        return [f"# {units}", said]
     if is_dataclass(value):
         return [f"{f.name}={rendered(value, depth + 1)},"]
     if _of_parts(value):
@@ -57,7 +59,7 @@ def _lines(part: Any, f: Any, depth: int) -> list[str]:
                 for v in value]  # fmt: skip
         inner = "".join(f"{_INDENT * depth}{line}\n" for line in each)
         return [f"{f.name}=(\n{inner}{_INDENT * depth}),"]
-    return [said, *([f"# {units}"] if units else [])]
+    return [*([f"# {units}"] if units else []), said]
 
 
 def _of_parts(value: Any) -> bool:
