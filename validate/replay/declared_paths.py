@@ -20,10 +20,6 @@ def require_paths(experiment: Experiment, file: Path) -> None:
             change(parameters)
         except ValidateError as error:
             raise UsageError(f"{file}{_line(file, what)}: {error}") from error
-    for name in experiment.accepted:
-        if name not in experiment.methods:
-            near = nearest_names(name, set(experiment.methods))
-            raise UsageError(f"{file}{_line(file, (name,))}: accepted: no method '{name}'; {near}")
     for name, method in experiment.methods.items():
         for path in _unknown(method, parameters):
             known = {p.path for p in describe(parameters)}
@@ -31,6 +27,10 @@ def require_paths(experiment: Experiment, file: Path) -> None:
                 f"{file}{_line(file, (path,))}: method '{name}' changes the unknown parameter "
                 f"'{path}'; {nearest_names(path, known)}"
             )
+    for name in experiment.accepted:
+        if name not in experiment.methods:
+            near = nearest_names(name, set(experiment.methods))
+            raise UsageError(f"{file}{_line(file, (name,))}: accepted: no method '{name}'; {near}")
 
 
 def _changes(experiment: Experiment) -> Iterator[tuple[tuple[str, ...], Any]]:
