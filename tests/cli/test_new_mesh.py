@@ -162,3 +162,19 @@ def test_a_large_mesh_file_between_plates_is_filled_anew_coarser_and_refine_take
              for level in shown.uncertainty.mesh.levels]  # fmt: skip
     assert min(sizes) == pytest.approx(shown.uncertainty.mesh.size(
         mine.parameters.given({"body.halvings": 0})))  # fmt: skip
+
+
+def test_a_halved_mesh_of_nodal_mean_dilatation_is_as_dear_as_it_is(folder: Path) -> None:
+    """Its rows reach two cells far: 82 000 unknowns of an inclusion took minutes of a first answer,
+    of which 12 s were estimated. A coarser mesh bounds u_num instead."""
+    write_mesh(block(14), folder / "fine.npz")
+    answers(folder, **{"body.file": "fine.npz"})
+    assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
+    mine = load_file(folder / "experiments" / "mine.py")
+    p = mine.parameters
+    assert (p.scene.dilatation, p.scene.body.halvings) == ("nodal_mean", 0)
+    shown = mine.follows(mine, mine.load(p, folder / "experiments"), p)
+    assert [level(p).scene.body.halvings for level in shown.uncertainty.mesh.levels] == [-1]
+    whole = p.given({"mesh.budget": False})
+    shown = mine.follows(mine, mine.load(p, folder / "experiments"), whole)
+    assert next(level(p).scene.body.halvings for level in shown.uncertainty.mesh.levels) == 1

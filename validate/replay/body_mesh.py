@@ -9,6 +9,7 @@ from typing import Any
 
 from validate.errors import SceneError, UsageError
 from validate.files import modified
+from validate.replay.cost import NODAL_MEAN
 from validate.replay.tree import Tree
 from validate.scene.geometry import Box, Cylinder, Geometry, MeshFile
 from validate.scene.indented import IndentedBlock, IndentedCylinder
@@ -79,6 +80,13 @@ def unknowns_of(p: Tree, order: int, folder: Path) -> float:
         return grid_unknowns(body.cells, round_=is_round(body))
     mesh = mesh_of(p.with_scene(body=replace(body, element="linear")), folder)
     return float((quadratic(mesh) if order == 2 and not mesh.bricks else mesh).nodes.size)
+
+
+def costs_of(p: Tree, order: int, folder: Path) -> float:
+    """The unknowns that a solution costs: those of nodal mean dilatation count more."""
+    N = unknowns_of(p, order, folder)
+    filed = isinstance(p.scene.body, MeshFile)
+    return N * NODAL_MEAN if filed and order == 1 and not mesh_of(p, folder).bricks else N
 
 
 def is_round(body: Geometry) -> bool:

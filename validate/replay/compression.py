@@ -20,7 +20,7 @@ from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.replay.compression_cards import stated_sizes
-from validate.replay.cost import INPUTS, affordable, linear_seconds
+from validate.replay.cost import INPUTS, NODAL_MEAN, affordable, linear_seconds
 from validate.replay.experiment import (
     CORNER_ORDER,
     Change,
@@ -116,10 +116,11 @@ def _affordable(
     N = mesh_of(None, first, folder).nodes.size
     coarser = -tree.scene.body.halvings  # its own mesh is then the finest
     finer = declared.mesh.levels[: coarser if coarser > 0 else None]
-    levels = affordable(finer, [8 * N, 64 * N][: len(finer)], budget=budget)
+    costs = N * NODAL_MEAN if first.scene.dilatation == "nodal_mean" else N
+    levels = affordable(finer, [8 * costs, 64 * costs][: len(finer)], budget=budget)
     ladder = replace(declared.mesh, levels=levels or (_halved(-1),))
     runs = 1 + len(declared.inputs) + declared.draws
-    dear = budget and runs * linear_seconds(N) > INPUTS
+    dear = budget and runs * linear_seconds(costs) > INPUTS
     return replace(
         experiment,
         uncertainty=replace(declared, mesh=ladder, draws=0 if dear else declared.draws),

@@ -18,6 +18,7 @@ from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.recording.types import Recording
 from validate.replay.body_mesh import (
+    costs_of,
     even_axes,
     grid_unknowns,
     is_round,
@@ -218,7 +219,7 @@ def _affordable(experiment: Experiment, p: Tree, folder: Path) -> Experiment:
     the surrogate is slow, inputs are moved one by one only.
     """
     order = _order_of(experiment.methods[experiment.accepted[0]], p)
-    N, (levels, finest) = unknowns_of(p, order, folder), _levels(p, order, folder)
+    N, (levels, finest) = costs_of(p, order, folder), _levels(p, order, folder)
     experiment = _with_levels(experiment, levels)
     uncertainty = experiment.uncertainty
     assert uncertainty is not None
@@ -241,13 +242,13 @@ def _with_levels(experiment: Experiment, levels: tuple[Change, ...]) -> Experime
 def _levels(p: Tree, order: int, folder: Path) -> tuple[tuple[Change, ...], float]:
     """The meshes of u_num, and the unknowns of the finest: similar grids; or meshes of the file,
     halved as far as they fit; or, where none does, a coarser one."""
-    N, body = unknowns_of(p, order, folder), p.scene.body
+    N, body = costs_of(p, order, folder), p.scene.body
     if not isinstance(body, MeshFile):
         return _SHARES, N * p.settings.mesh.finer**3
     if body.halvings < 0:
         finer = [p.with_scene(body=replace(body, halvings=body.halvings + k)) for k in (1, 2)
                  if body.halvings + k <= 0]  # fmt: skip
-        sizes = [unknowns_of(one, order, folder) for one in finer]
+        sizes = [costs_of(one, order, folder) for one in finer]
     else:
         sizes = [8 * N, 64 * N]
     found = affordable(_HALVINGS[: len(sizes)], sizes, budget=p.settings.mesh.budget)

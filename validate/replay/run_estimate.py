@@ -7,7 +7,7 @@ from validate.errors import ValidateError
 from validate.fem.fill import solvable_bytes
 from validate.parameters import describe, with_values
 from validate.replay.checks import variants_of
-from validate.replay.cost import linear_seconds, newton_seconds
+from validate.replay.cost import NODAL_MEAN, linear_seconds, newton_seconds
 from validate.replay.experiment import Experiment
 from validate.replay.find import load_file
 from validate.replay.origins import opened
@@ -56,9 +56,10 @@ def _estimated(experiment: Experiment) -> RunEstimate | None:
     for variant in variants:
         scene, steps = scenes[variant.method], len(seen.t) * variant.split
         N = scene.mesh.nodes.size * road.finer(variant) ** scene.mesh.dimension
+        costs = N * NODAL_MEAN if scene.dilatation == "nodal_mean" else N
         linear = scene.material.law == "linear" and not scene.contacts
-        alone = linear_seconds(N) + steps * _SOLVE * N ** (4 / 3)
-        seconds += alone if linear else steps * newton_seconds(N)
+        alone = linear_seconds(costs) + steps * _SOLVE * costs ** (4 / 3)
+        seconds += alone if linear else steps * newton_seconds(costs)
         largest = max(largest, N)
         memory = max(memory, solvable_bytes(N, scene.mesh.dimension) * (1 if linear else 3))
     return RunEstimate(seconds, _PROGRAM + memory, largest)
