@@ -13,7 +13,7 @@ from validate.replay.find import load_file
 
 pytest.importorskip("felupe")
 FILE = Path(__file__).parents[2] / "benchmarks" / "indentation_log.py"
-SMALL = {"body.cells": "8", "seen.states": "10"}
+SMALL = {"body.cells": "8,2", "seen.states": "10"}
 
 
 def benchmark() -> ModuleType:

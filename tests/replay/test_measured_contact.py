@@ -249,6 +249,7 @@ def refused(shape: Indenter) -> None:
         (lambda: Machine(-1.0), "both must be 0 or above"),
         (lambda: Machine(1e-6, measured="x.mcap"), "both set"),
         (lambda: IndentedBlock(SIZE, (1, 1), SIZE), "three numbers each"),
+        (lambda: IndentedCylinder(0.02, 0.01, (8,)), "two numbers each"),
         (lambda: refused(Indenter("cylinder", 1e-3, axis="+z")), "must lie across its direction"),
         (lambda: refused(Indenter("sphere", 1e-3, tip=(1.0, 1.0, 1.0))), "no node of its place"),
     ],

@@ -86,6 +86,11 @@ class IndentedCylinder:
 
     def __post_init__(self) -> None:
         take_units(self)
+        if {len(self.cells), len(self.shares)} != {2}:
+            raise SceneError(
+                f"an indented cylinder of cells {self.cells}, shares {self.shares}: two numbers "
+                "each are needed, along the radius and the height"
+            )
 
     def resolved(self, folder: Path) -> Mesh:
         (radial, axial), R = self.cells, self.diameter / 2
