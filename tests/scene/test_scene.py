@@ -124,3 +124,14 @@ def test_what_holds_a_body_has_components_of_its_dimension(part: Any) -> None:
     """The component 3 of a node was the first one of its neighbour."""
     with pytest.raises(SceneError, match=r"components .*: expected some of 0, 1, 2 "):
         Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), **part)
+
+
+@pytest.mark.parametrize(("element", "dilatation"), [
+    ("tet4", "nodal_mean"), ("tet10", "pointwise"), ("hex8", "mixed"), ("hex27", "mixed"),
+])  # fmt: skip
+def test_a_dilatation_by_element_is_the_one_that_does_not_lock(
+    element: Any, dilatation: str
+) -> None:
+    declared = Scene(Box((1.0, 1.0, 1.0), (1, 1, 1), element), Material(1.0, 0.3),
+                     dilatation="by_element")  # fmt: skip
+    assert declared.resolved(declared.body.resolved(Path())).dilatation == dilatation
