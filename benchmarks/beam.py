@@ -27,13 +27,13 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.convergence import convergence
 from validate.fem.system import System, build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Dilatation, Scene, Support, Weight
-from validate.solve.central import CentralDifference
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.newton import StaticNewton
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Stepper
 
 G, SIZE = 9.80709, (0.1, 0.03, 0.03)

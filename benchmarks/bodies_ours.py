@@ -8,19 +8,19 @@ import numpy as np
 from bodies_drawn import Drawn, E
 
 from validate.arrays import rms
-from validate.cli.new_scene import geometry_of
+from validate.commands.questions.scene import geometry_of
 from validate.compare.convergence import GridConvergence
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
+from validate.pipeline.bodies.measured import measured_body, solid
+from validate.pipeline.checks.refined import Refined
+from validate.pipeline.experiment.experiment import Experiment, Variant
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.runs import Road
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.declared import as_declared
-from validate.register.markers import Together, observe_markers
+from validate.register.markers.declared import as_declared
+from validate.register.markers.markers import Together, observe_markers
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.experiment import Experiment, Variant
-from validate.replay.measured_body import measured_body, solid
-from validate.replay.measured_cards import MeasuredBody, SeenOf
-from validate.replay.refined import Refined
-from validate.replay.runs import Road
-from validate.replay.tree import Tree
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support
 
@@ -110,7 +110,7 @@ def judged(body: Drawn, truth: list[float]) -> Judged:
     road = Road(made, made.methods, made.parameters, None, quick=True)
     road.recordings = (recording(body),)
     assert made.uncertainty is not None
-    (residual,) = road.main(Variant("solid")).residuals.values()
+    (residual,) = road.varied(Variant("solid")).residuals.values()
     found = Refined(road, made.uncertainty, "solid").of(residual, np.inf)["mesh"]
     assert found is not None
     answer = np.reshape(truth, (-1, residual.values.shape[1]))

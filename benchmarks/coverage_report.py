@@ -41,7 +41,9 @@ LEAST = 0.95
 _SETTINGS = """\
 [run]
 branch = true
-source = {root}/validate
+source =
+    {root}/validate
+    {root}/experiments
 data_file = {folder}/traces
 parallel = true
 patch = subprocess

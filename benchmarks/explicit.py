@@ -20,13 +20,13 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from validate.arrays import Floats
-from validate.fem.explicit import ExplicitBody, Precision
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.explicit import ExplicitBody, Precision
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.central import CentralDifference, CentralStepper
+from validate.solve.explicit.central import CentralDifference, CentralStepper
 
 FLOP = 228  # of one tet of St. Venant-Kirchhoff
 GRIDS = ((5, 5, 25), (12, 12, 10), (32, 32, 16))  # 3750, 8640, 98304 tets

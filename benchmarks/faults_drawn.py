@@ -193,12 +193,18 @@ def _end(node: ast.expr) -> Place:
 
 
 Lines = dict[tuple[str, int], list[Fault]]
+PARTS = ("validate", "experiments")
+
+
+def source_files(root: Path) -> list[Path]:
+    """The files of the package and of the shipped experiments."""
+    return sorted(path for part in PARTS for path in (root / part).rglob("*.py"))
 
 
 def candidates(root: Path, only: str, quiet: frozenset[str] = _QUIET) -> Lines:
     """The lines that hold something to break, with their faults."""
     by_line: Lines = {}
-    for path in sorted((root / "validate").rglob("*.py")):
+    for path in source_files(root):
         if only in str(path.relative_to(root)):
             for fault in faults_of(root, path, quiet):
                 by_line.setdefault((fault.path, fault.line), []).append(fault)

@@ -27,7 +27,7 @@ from time import perf_counter
 from typing import Any
 
 import click
-from faults_drawn import ROOT, Fault, Source, broken
+from faults_drawn import PARTS, ROOT, Fault, Source, broken, source_files
 
 _HEAVY = ("numpy", "scipy.optimize", "scipy.sparse.linalg", "scipy.stats", "skfem", "numba",
           "matplotlib.pyplot", "pyvista", "PIL.Image", "rich.console", "jinja2", "pint",
@@ -115,7 +115,7 @@ class Bench:
 
     @cached_property
     def _sources(self) -> dict[str, Source]:
-        files = sorted((self.copy / "validate").rglob("*.py"))
+        files = source_files(self.copy)
         return {str(p.relative_to(self.copy)): Source(p.read_text(encoding="utf-8")) for p in files}
 
     @cached_property
@@ -247,7 +247,8 @@ def _trace(name: str, copy: Path, kept: Path) -> int:
     import coverage
     import pytest
 
-    traced = coverage.Coverage(data_file=None, source=[str(copy / "validate")], config_file=False)
+    source = [str(copy / part) for part in PARTS]
+    traced = coverage.Coverage(data_file=None, source=source, config_file=False)
     seconds: dict[str, float] = {}
 
     class Contexts:

@@ -13,10 +13,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from validate.replay.find import find
-from validate.study.agreement import TruthPick
-from validate.study.filters import study
-from validate.study.job import Where
+from validate.engine.cell import Where
+from validate.pipeline.experiment.find import find
+from validate.study.filters.ranking import TruthPick
+from validate.study.filters.study import study
 from validate.study.sweep import named
 
 SEEDS = (301, 302)

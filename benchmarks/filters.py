@@ -16,17 +16,17 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats
+from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.filters import Filter
 from validate.estimate.measurements import Measurements
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.reduced_ekf import ReducedEKF
+from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.haptic import RealTime
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.haptic.rates import RealTime
 from validate.solve.types import State, Stepper
 
 CELLS = (8, 8, 10)  # 3840 tetrahedra

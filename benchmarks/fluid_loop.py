@@ -23,10 +23,10 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.fem.cavity import CavitySurface, volume_form
-from validate.fem.compiled import compiled
-from validate.fem.condense import condense
+from validate.fem.kernels.compiled import compiled
+from validate.fem.linear_solvers.condense import condense
 from validate.fem.system import build
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Pin, Scene, Support
 

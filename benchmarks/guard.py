@@ -74,9 +74,12 @@ _STABILITY = {
     "papers": Columns(("setting", "source", "h / ms", "scheme")),
     "refused": Columns(_VARIANT),
 }  # fmt: skip
-_RANKING = Columns(("method", "settings"), ("step / ms", "Pareto"))
+_RANKING = Columns(("method", "settings"), ("step p50 / ms", "step p99 / ms", "Pareto"))
 # Filters' cells are named by the method and by every swept path, which the table itself knows.
-_FILTERS = {"cells": Columns(("method", "methods.*"), ("step_s",)), "ranking_*": _RANKING}
+_FILTERS = {
+    "cells": Columns(("method", "methods.*"), ("step_p50_s", "step_p99_s")),
+    "ranking_*": _RANKING,
+}
 _STUDIES = {
     "tradeoff": _TRADE, "choose": _TRADE, "stability": _STABILITY, "filters": _FILTERS,
 }  # fmt: skip
@@ -116,7 +119,8 @@ def _run(path: Path) -> Iterator[Named]:
     yield from _figures("", document["published"])
     for i in document["identified"]:
         yield f"identified {i['name']}", i["value"], i["name"], i["unit"]
-    yield from _effects(path.parent / "tables" / "effects.csv")
+    for effect in document.get("effects", ()):
+        yield from _effect(effect)
 
 
 def _method(method: Mapping[str, Any]) -> Iterator[Named]:
@@ -139,12 +143,11 @@ def _figures(of: str, figures: Iterable[Mapping[str, Any]]) -> Iterator[Named]:
                 yield f"{of}published {p['name']} {part}", p[part], p["name"], p["unit"]
 
 
-def _effects(path: Path) -> Iterator[Named]:
-    for row in _rows(path) if path.is_file() else ():
-        name = f"effect {row['effect']} {row['quantity']}"
-        quantity = _quantity(row["quantity"])
-        for part, unit in (("rms", row["unit"]), ("max", row["unit"]), ("separation", "sd")):
-            yield f"{name} {part}", _value(row[part]), quantity, unit
+def _effect(effect: Mapping[str, Any]) -> Iterator[Named]:
+    for c in effect["changes"]:
+        name = f"effect {effect['name']} {c['name']}"
+        for part, unit in (("rms", c["unit"]), ("max", c["unit"]), ("separation", "sd")):
+            yield f"{name} {part}", c[part], _quantity(c["name"]), unit
 
 
 def _study(folder: Path, tables: Mapping[str, Columns]) -> Iterator[Named]:

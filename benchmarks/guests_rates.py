@@ -25,15 +25,15 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.convergence import richardson
 from validate.fem.system import build
-from validate.replay import load
-from validate.report.numbers import significant
-from validate.scene.box import box, grid
+from validate.pipeline import load
+from validate.report.views.numbers import significant
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene, Support, Weight
-from validate.solve.guests.guest import Guest
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.newton import StaticNewton
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.external.scheme import Guest
+from validate.solve.static.newton import StaticNewton
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- rates: begin -->", "<!-- rates: end -->"

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from validate.compare.exhibit import Entry, TableCell, plain
 from validate.compare.result import Result
-from validate.datasets.home import found
-from validate.replay import compare, load
-from validate.report.numbers import significant, with_unit
+from validate.datasets.home import data_path
+from validate.pipeline import load, run_in_memory
+from validate.report.views.numbers import significant, with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- guests: begin -->", "<!-- guests: end -->"
@@ -38,7 +38,7 @@ class Judged:
 
 
 def judged() -> tuple[Judged, ...]:
-    loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
+    loaded = data_path("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
     under = {"recording": str(loaded), "masses.load.mass": "52g"}
     beams = ("mixed", "still", "felupe", "calculix", "mujoco", "mujoco_45")
     cylinders = ("slip", "neo_slip", "svk_slip", "felupe", "calculix", "mujoco")
@@ -59,7 +59,7 @@ def judged() -> tuple[Judged, ...]:
 
 def run(one: Judged) -> Result:
     experiment = load(one.name)
-    return compare(experiment, one.values, one.methods)
+    return run_in_memory(experiment, one.values, one.methods)
 
 
 def rows_of(one: Judged, result: Result) -> list[list[str]]:

@@ -14,19 +14,19 @@ import numpy as np
 from validate.compare.verdict import Accept
 from validate.fem.system import build as build_system
 from validate.parameters import quantity, with_given
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, Twin
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
-from validate.register.markers import placed_markers
+from validate.register.markers.markers import placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, validating
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Twin
-from validate.replay.method import Method
-from validate.replay.tree import Built, Tree
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.march import march, output_frames
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 
 SIDE, CELLS = 0.03, 11

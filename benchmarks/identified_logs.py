@@ -32,22 +32,22 @@ from validate.arrays import Floats, rms
 from validate.compare.verdict import Accept
 from validate.identify.budget import IdentifiedValue
 from validate.identify.scaled_curve import UnitCurve, fit_scaled
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.choices import BONDED_PLATES, Compression, CompressionRanges
+from validate.pipeline.plates.compression import compression
+from validate.pipeline.run.road import set_out
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.replay import compare
-from validate.replay.compression import compression
-from validate.replay.compression_cards import BONDED_PLATES, Compression, CompressionRanges
-from validate.replay.experiment import Experiment
-from validate.replay.method import Method
-from validate.replay.options import Options
-from validate.replay.road import set_out
-from validate.replay.tree import Tree
-from validate.scene.geometry import Cylinder
+from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid import NoFluid
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
 Case = Literal["linear slip", "neo_hooke slip", "linear bonded"]
 CASES: tuple[Case, ...] = ("linear slip", "neo_hooke slip", "linear bonded")
@@ -301,7 +301,7 @@ def misfit(stiffening: float) -> float:
 def u_val() -> float:
     """Of the force beyond the fit, N, of the right law."""
     with tempfile.TemporaryDirectory() as folder:
-        result = compare(wrong(Path(folder), 0, 0.0))
+        result = run_in_memory(wrong(Path(folder), 0, 0.0))
     return next(c.u_val for c in result.checks if c.name.endswith("@beyond"))
 
 

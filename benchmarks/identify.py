@@ -14,10 +14,10 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from validate.replay.find import load_file
-from validate.report.numbers import significant
-from validate.study.identify import IdentifyStudy, identification
-from validate.study.job import Where
+from validate.engine.cell import Where
+from validate.pipeline.experiment.find import load_file
+from validate.report.views.numbers import significant
+from validate.study.identify.study import IdentifyStudy, identification
 
 BLOCK = Path(__file__).with_name("identified_block.py")
 WANTED_S = 180.0

@@ -30,13 +30,13 @@ from validate.compare.verdict import Accept
 from validate.parameters import quantity
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import Role
-from validate.replay.compression_cards import Compression
-from validate.replay.experiment import Experiment
-from validate.replay.method import Method
-from validate.scene.geometry import Cylinder
+from validate.pipeline.plates.choices import Compression
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.method import Method
+from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 
 EXPERIMENT = Experiment(
     name="small", title="A small cylinder", source="benchmarks/killed.py",
@@ -125,7 +125,7 @@ SHIPPED = {
 
 def command(*arguments: str) -> int:
     """Runs a command in this process, unheard."""
-    from validate.cli.main import run
+    from validate.commands.main import run
 
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
         return run(list(arguments))
@@ -173,7 +173,7 @@ def counting(root: Path, end: int) -> Iterator[list[int]]:
 
         return call
 
-    from validate.report import folder
+    from validate.report.stored import folder
 
     exchange = folder.exchange
 

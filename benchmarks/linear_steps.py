@@ -15,12 +15,12 @@ from time import perf_counter
 import numpy as np
 
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Scheme
 
 LOAD = np.array([3000 * 16e-6])  # N: 3 kPa on the block's top

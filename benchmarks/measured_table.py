@@ -11,9 +11,9 @@ from pathlib import Path
 
 from validate.compare.result import Result
 from validate.compare.verdict import Check
-from validate.datasets.home import found
-from validate.replay import compare, load
-from validate.report.numbers import with_unit
+from validate.datasets.home import data_path
+from validate.pipeline import load, run_in_memory
+from validate.report.views.numbers import with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
@@ -38,7 +38,7 @@ class Measured:
 def rows_of(one: Measured) -> list[list[str]]:
     """A row a check that is evidence or undecided, furthest off first."""
     experiment = load(one.name)
-    result = compare(experiment, one.values)
+    result = run_in_memory(experiment, one.values)
     return [
         [_called(one) if i == 0 else "", one.fitted if i == 0 else "", *_cells(c)]
         for i, c in enumerate(_told(result, one.method))
@@ -66,7 +66,7 @@ def _cells(c: Check) -> tuple[str, ...]:
 
 def measured() -> tuple[Measured, ...]:
     """The experiments on recordings made by others, as they ship and the beam's loaded case."""
-    loaded = found("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
+    loaded = data_path("markers/silicone-beam", "beam_load52_V2_a.c3d", ROOT / "experiments")
     under = {"recording": str(loaded), "masses.load.mass": "52g"}
     return (
         Measured("stylus_phantom", "the other landmarks"),

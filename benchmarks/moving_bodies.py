@@ -24,9 +24,9 @@ from skfem.helpers import ddot, dot, eye, sym_grad, trace
 from validate.arrays import Floats
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_file import write_mesh
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 NAMES = ("swinging", "pushed", "filmed", "chamber")
 NOISE = 2e-5  # m

@@ -20,17 +20,17 @@ from time import perf_counter
 
 import numpy as np
 
+from experiments.needle_pocket.hand import Hand
 from validate.arrays import Floats
 from validate.fem.system import build
-from validate.papers.needle_pocket.hand import Hand
-from validate.replay import load
-from validate.replay.live import Lived, RecordedPath, live, prepared, realtime
-from validate.replay.live.clock import quiet
-from validate.replay.options import Options
-from validate.replay.tree import Built
+from validate.pipeline import load
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Built
+from validate.pipeline.live import Lived, RecordedPath, live, prepared, realtime
+from validate.pipeline.live.clock import quiet
 from validate.scene.tool import Needle
-from validate.solve.haptic import DEVICE_HZ, QUANTILES, TickTimes
-from validate.solve.needle import NeedleLoop, NeedleStepper
+from validate.solve.haptic.needle import NeedleLoop, NeedleStepper
+from validate.solve.haptic.rates import DEVICE_HZ, QUANTILES, TickTimes
 
 METHODS = ("p2_exact", "paper")
 CELLS = 18  # along an edge of the cube: its upper side has 361 nodes

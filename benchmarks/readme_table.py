@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from validate.compare.result import MethodResult, Result
-from validate.replay import compare, load
+from validate.pipeline import load, run_in_memory
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
@@ -109,7 +109,7 @@ def markdown(head: tuple[str, ...], table: list[list[str]]) -> str:
 
 
 def _result(name: str) -> Result:
-    return compare(load(name))
+    return run_in_memory(load(name))
 
 
 def main() -> None:

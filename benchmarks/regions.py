@@ -12,9 +12,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from validate.replay import load
-from validate.replay.find import module_name
-from validate.solve.regions import AsyncRegions
+from experiments.async_block import sizes
+from validate.pipeline import load
+from validate.solve.regions.scheme import AsyncRegions
 
 CUBES = ((3, 6), (3, 8), (3, 12))  # 343, 729 and 2197 nodes
 HZ = 2.5  # of the push
@@ -24,8 +24,6 @@ def main(ticks: int) -> None:
     t = 1e-3 * np.arange(1, ticks + 1, dtype=np.float64)
     depth = 5e-3 * np.sin(2 * np.pi * HZ * t)
     block = load("async_block")
-    assert block.path is not None
-    sizes = sys.modules[f"{module_name(block.path)}.sizes"]
     near = AsyncRegions(layers=(4,), rates=(50.0,), overlap=2)
     print(" | ".join(sizes.HEADS))
     for row in sizes.size_rows(block.parameters, CUBES, near, depth, 4, lambda _: None):

@@ -19,11 +19,11 @@ from time import perf_counter
 import numpy as np
 from scipy.sparse.linalg import splu
 
+from experiments.bending_rod.body import GRAVITY, bending_rod
 from validate.errors import SceneError
 from validate.fem.system import System, build
-from validate.papers.accuracy.rod import GRAVITY, bending_rod
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.types import Scheme
 
 DT = 1 / 30  # s, as printed

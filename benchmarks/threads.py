@@ -17,9 +17,9 @@ from time import perf_counter
 import numpy as np
 from explicit import SUBSTEPS, system
 
+from validate.fem.kernels.threads import cores
 from validate.fem.system import System
-from validate.fem.threads import cores
-from validate.solve.central import CentralDifference, CentralStepper
+from validate.solve.explicit.central import CentralDifference, CentralStepper
 
 CELLS = (12, 12, 10)  # 8640 tetrahedra
 

@@ -1,20 +1,36 @@
-"""The page of public names: exactly what `__all__` of every package lists, with its docstrings."""
+"""The page of the public API: exactly what validate/library/public_names.toml lists.
+
+`python docs/reference_page.py --write` stores the signatures after a change of the API.
+"""
 
 import inspect
 import re
-from collections.abc import Iterator
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from importlib import import_module
-from pkgutil import iter_modules
-from types import ModuleType
+from pathlib import Path
 from typing import Any, get_args
 
-import validate
+from validate.plugins import Registry
 
+ROOT = Path(__file__).resolve().parents[1]
+NAMES = ROOT / "validate" / "library" / "public_names.toml"
+SIGNATURES = ROOT / "tests" / "docs" / "public_signatures.txt"
 INTRO = """# Reference
 
-The public names of every package, from the code itself: `from validate.PACKAGE import NAME`.
-Other modules may change without a word.
+The public API, version {version}: {count} names, from the code itself. Each is imported from the
+module above it, as `from validate.scene.geometries.specification import Box`.
+`validate/library/public_names.toml` lists them.
+
+A version is a promise. Within one version a listed name stays at its place, a call that worked
+works, and its result has the same meaning, units and shapes. New names, new optional parameters
+and new members may come at any time. What breaks a call raises the version, and `CHANGELOG.md`
+says what to write instead. Numbers may change when a method is corrected: `CHANGELOG.md` lists
+these changes. Nothing else is promised: modules and names that do not stand on this page may
+change without notice.
 """
 
 
@@ -26,63 +42,148 @@ def on_files(files: Any, config: Any) -> Any:
     return files
 
 
+@cache
+def _listed() -> Mapping[str, Any]:
+    return tomllib.loads(NAMES.read_text("utf-8"))
+
+
+def version() -> int:
+    """The version of the public API."""
+    return int(_listed()["version"])
+
+
+def sections() -> dict[str, dict[str, list[str]]]:
+    """Names by section and module."""
+    return {title: part for title, part in _listed().items() if isinstance(part, dict)}
+
+
+def public() -> Iterator[tuple[str, str]]:
+    """Module and name of every public thing."""
+    for part in sections().values():
+        for module, names in part.items():
+            yield from ((module, name) for name in names)
+
+
+def thing(module: str, name: str) -> Any:
+    """What a listed name stands for; of a package that is also a function, the function."""
+    if module == "validate":
+        return getattr(import_module("validate.library"), name)
+    return getattr(import_module(module), name)
+
+
 def page() -> str:
     """The whole page as Markdown."""
-    return INTRO + "".join(_package(package) for package in packages())
+    names = list(public())
+    text = INTRO.format(version=version(), count=len(names))
+    for title, part in sections().items():
+        text += f"\n## {title}\n"
+        for module, names_ in part.items():
+            text += f"\n### {module}\n"
+            text += "".join(_entry(name, thing(module, name)) for name in names_)
+    return text
 
 
-def packages() -> list[ModuleType]:
-    """Every package of the floors, by name."""
-    found = [m.name for m in iter_modules(validate.__path__) if m.ispkg]
-    return [import_module(f"validate.{name}") for name in sorted(found)]
+def _entry(name: str, what: Any) -> str:
+    members = "".join(f"\n- `.{member}`: {_first(doc)}" for member, _, doc in _members(what) if doc)
+    return (
+        f"\n#### {name}\n{_block(_signature(name, what), 'python')}{_block(_doc(what))}"
+        f"{members}{chr(10) if members else ''}"
+    )
 
 
-def public(package: ModuleType) -> Iterator[tuple[str, Any]]:
-    """The names of `__all__` with what they stand for; names of modules stand for those."""
-    for name in package.__all__:
-        is_module = not hasattr(package, name) or inspect.ismodule(getattr(package, name))
-        path = f"{package.__name__}.{name}"
-        yield name, import_module(path) if is_module else getattr(package, name)
-
-
-def _package(package: ModuleType) -> str:
-    entries = "".join(_entry(name, thing) for name, thing in public(package))
-    return f"\n## {package.__name__}\n{_block(package.__doc__)}{entries}"
-
-
-def _entry(name: str, thing: Any) -> str:
-    return f"\n### {name}\n{_block(_signature(name, thing), 'python')}{_block(_doc(thing))}"
-
-
-def _signature(name: str, thing: Any) -> str:
-    if is_dataclass(thing):
-        lines = [f"    {f.name}: {_type(f.type)}" for f in fields(thing)]
+def _signature(name: str, what: Any) -> str:
+    if is_dataclass(what) and inspect.isclass(what):
+        lines = [f"    {f.name}: {_type(f.type)}" for f in fields(what)]
         return "\n".join([f"class {name}:", *lines])
-    if inspect.isclass(thing):
+    if inspect.isclass(what):
         return f"class {name}"
-    if inspect.isfunction(thing):
-        return f"def {name}{_plain(str(inspect.signature(thing)))}"
-    return f"{name}  # {type(thing).__name__}"
+    if inspect.isfunction(what):
+        return f"def {name}{_plain(str(inspect.signature(what)))}"
+    return f"{name}  # {type(what).__name__}"
+
+
+def _members(what: Any) -> Iterator[tuple[str, Any, str]]:
+    """Public methods and properties that a class itself defines, with their docstrings."""
+    for name, member in sorted(vars(what).items()) if inspect.isclass(what) else ():
+        if not name.startswith("_") and isinstance(member, property | classmethod | staticmethod):
+            inner = member.fget if isinstance(member, property) else member.__func__
+            yield name, member, inspect.getdoc(inner) or ""
+        elif not name.startswith("_") and inspect.isfunction(member):
+            yield name, member, inspect.getdoc(member) or ""
+
+
+# --- signatures -----------------------------------------------------------------------------------
+
+
+def signatures() -> str:
+    """One line a name, then one a public member: what a caller may rely on."""
+    lines = [f"version {version()}"]
+    for module, name in sorted(public()):
+        what = thing(module, name)
+        lines.append(f"{module}.{name}{_call(what)}")
+        for member, value, _ in _members(what):
+            lines.append(f"{module}.{name}.{member}{_call(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _call(what: Any) -> str:
+    """Names, types and order of what is given; a value that may be left out has " = ..."."""
+    if isinstance(what, property):
+        return f": {_returned(what.fget)}"
+    function = what.__func__ if isinstance(what, classmethod | staticmethod) else what
+    if inspect.isclass(what) and not is_dataclass(what):
+        return ": class"
+    if not (inspect.isclass(what) or inspect.isroutine(function)):
+        return f": {type(what).__name__}"
+    marks = {"KEYWORD_ONLY": "", "VAR_POSITIONAL": "*", "VAR_KEYWORD": "**"}
+    parts, starred = [], False
+    for p in inspect.signature(function).parameters.values():
+        if p.kind.name == "KEYWORD_ONLY" and not starred:
+            parts.append("*")
+        starred |= p.kind.name in ("KEYWORD_ONLY", "VAR_POSITIONAL")
+        given = "" if p.annotation is p.empty else f": {_type(p.annotation)}"
+        default = "" if p.default is p.empty else " = ..."
+        parts.append(f"{marks.get(p.kind.name, '')}{p.name}{given}{default}")
+    ends = "" if inspect.isclass(what) else f" -> {_returned(function)}"
+    return f"({', '.join(parts)}){ends}"
+
+
+def _returned(function: Any) -> str:
+    found = inspect.signature(function).return_annotation
+    return "None" if found is None else _type(found)
 
 
 def _type(annotation: Any) -> str:
     plain_class = inspect.isclass(annotation) and not get_args(annotation)
-    return annotation.__name__ if plain_class else _plain(str(annotation))
+    return annotation.__name__ if plain_class else _plain(str(annotation)).replace("'", "")
 
 
 def _plain(text: str) -> str:
     """Types as the code writes them: Floats for an array of float64, no paths of modules."""
     for name, dtype in (("Floats", "float64"), ("Ints", "int64")):
         text = re.sub(rf"numpy\.ndarray\[[^\]]*\], numpy\.dtype\[numpy\.{dtype}\]\]", name, text)
+    text = re.sub(r" at 0x[0-9a-f]+", "", text)
     return re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z_])", "", text)
 
 
-def _doc(thing: Any) -> str:
-    """Its own docstring; tuples list what they hold."""
-    if isinstance(thing, tuple):
-        return ", ".join(getattr(t, "__name__", None) or t.name for t in thing)
-    return inspect.getdoc(thing) or ""
+# --- docstrings -----------------------------------------------------------------------------------
+
+
+def _doc(what: Any) -> str:
+    """Its own docstring; tuples and registries list what they hold."""
+    if isinstance(what, tuple | Registry):
+        return ", ".join(getattr(t, "__name__", None) or t.name for t in what)
+    return inspect.getdoc(what) or ""
+
+
+def _first(doc: str) -> str:
+    """The first sentence."""
+    return " ".join(doc.split("\n\n")[0].split()).replace("|", "\\|")
 
 
 def _block(text: str | None, language: str = "text") -> str:
     return f"\n```{language}\n{text.strip()}\n```\n" if text else ""
+
+
+if __name__ == "__main__" and sys.argv[1:] == ["--write"]:
+    SIGNATURES.write_text(signatures(), "utf-8")

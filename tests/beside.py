@@ -7,8 +7,8 @@ from types import ModuleType
 from typing import Any
 
 from validate.catalogue import experiment_files, shipped
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file, module_name
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file, module_name
 
 
 @cache

@@ -8,7 +8,7 @@ from unittest import mock
 
 from click.testing import CliRunner
 
-from validate.cli import main as cli
+from validate.commands import main as cli
 
 
 def here(*arguments: str, cwd: Path | None = None, **environment: str) -> tuple[int, str, str]:

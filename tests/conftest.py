@@ -11,6 +11,8 @@ import os
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+os.environ.setdefault("VALIDATE_WORKERS", "1")  # of `run`: the tests themselves run side by side
+
 from collections.abc import Callable, Generator
 from functools import cache
 from pathlib import Path
@@ -22,10 +24,10 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 import pytest
 
 from validate.compare.result import Result
-from validate.replay.experiment import Experiment
-from validate.replay.find import find
-from validate.replay.options import Options
-from validate.replay.road import compare
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import find
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
 
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests

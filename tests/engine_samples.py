@@ -5,8 +5,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from validate.engine.cell import Plan
 from validate.errors import SceneError
-from validate.study.job import Job, Plan
+from validate.pipeline.run.job import Job
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
-from validate.compare.pair import FieldPair
-from validate.fem.cells import rule, volumes_at
+from validate.compare.shapes.pair import FieldPair
+from validate.fem.assembly.cells import rule, volumes_at
 from validate.fem.system import System
 from validate.scene.mesh import Mesh
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
+from validate.pipeline.bodies.measured import measured_body
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.choices import Compression
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.replay.compression_cards import Compression
-from validate.replay.experiment import Experiment
-from validate.replay.measured_body import measured_body
-from validate.replay.method import Method
-from validate.replay.tree import Tree
-from validate.scene.geometry import Cylinder
+from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.mesh import Kind
 from validate.scene.scene import Drive, Scene, Support

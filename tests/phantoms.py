@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import Responses, build, responses
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, boundary_facets, kuhn_cells, quadratic
 from validate.scene.scene import Cavity, Dilatation, Drive, Pin, Scene, Support

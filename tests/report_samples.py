@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.compare.effects import Change, Effect
+from validate.compare.exhibit import Exhibit
 from validate.compare.inputs import Declared, Joint
 from validate.compare.published import Published
 from validate.compare.residual import Residual
@@ -16,6 +17,10 @@ from validate.recording.types import Clock, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
+from validate.report.long_table import LongTable
+from validate.report.sections.sections import Begun, exhibits, parts
+from validate.report.stored.store import document
+from validate.report.write import table_of
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells
 from validate.scene.scene import Drive, Scene, Support
@@ -160,3 +165,23 @@ def bare_result() -> Result:
         result, methods=(failed,), recordings=(), effects=(), published=(),
         identified=(), notes=(), inputs=(), parameters=(), sentence="Nothing was decided.",
     )  # fmt: skip
+
+
+def table(result: Result) -> LongTable:
+    """The long table of a result."""
+    return table_of(result, document(result, "2026-11-21T04:00:00Z"), result.name)
+
+
+def parts_of(result: Result) -> tuple[Begun | Exhibit, ...]:
+    """The parts of its report."""
+    return parts(result, table(result))
+
+
+def sections_of(result: Result) -> list[Exhibit]:
+    """What the report of a result shows, not drawn."""
+    return list(exhibits(result, table(result)))
+
+
+def section(result: Result, anchor: str) -> Exhibit:
+    """One section of it."""
+    return next(e for e in sections_of(result) if e.anchor == anchor)

@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.verdict import Accept
-from validate.estimate.kf_fem import KfFem
+from validate.estimate.kalman.kf_fem import KfFem
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.register.follow import follow_signal
-from validate.replay.experiment import Experiment, Twin
-from validate.replay.followed import Truth
-from validate.replay.method import Method
-from validate.replay.remade import stamped
-from validate.replay.tree import Built
-from validate.scene.geometry import Box
+from validate.register.as_declared import follow_signal
+from validate.pipeline.experiment.experiment import Experiment, Twin
+from validate.pipeline.run.followed import Truth
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.run.remade import stamped
+from validate.pipeline.experiment.tree import Built
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
-from validate.solve.newmark import Newmark
+from validate.solve.dynamic.newmark import Newmark
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 
 STEPS, DT = 40, 0.01

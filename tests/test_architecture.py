@@ -74,7 +74,7 @@ def test_every_scheme_is_in_the_tuple(project_root: Path) -> None:
 
     written = {
         node.name
-        for path in (project_root / "validate" / "solve").glob("*.py")
+        for path in (project_root / "validate" / "solve").rglob("*.py")
         for node in defined(path)
         if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
         and "Protocol" not in [ast.unparse(b) for b in node.bases]
@@ -88,7 +88,7 @@ def test_every_filter_is_in_the_tuple(project_root: Path) -> None:
 
     written = {
         node.name
-        for path in (project_root / "validate" / "estimate").glob("*.py")
+        for path in (project_root / "validate" / "estimate").rglob("*.py")
         for node in defined(path)
         if any(isinstance(f, ast.FunctionDef) and f.name == "prepare" for f in node.body)
         and "Protocol" not in [ast.unparse(b) for b in node.bases]
@@ -146,8 +146,8 @@ def test_files_of_others_are_opened_in_one_guarded_way(project_root: Path) -> No
     reads = re.compile(r"\.(read_bytes|read_text)\(|\bpath\.open\(|\bfile\.open\(|\bopen\(path")
     found = [
         f"{path.name}: {line.strip()}"
-        for folder in ("recording", "scene", "papers", "register")
-        for path in sorted((project_root / "validate" / folder).rglob("*.py"))
+        for folder in ("validate/recording", "validate/scene", "validate/register", "experiments")
+        for path in sorted((project_root / folder).rglob("*.py"))
         for line in path.read_text("utf-8").splitlines()
         if reads.search(line) and path.name != "apart.py"
     ]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from validate.catalogue import Card, card, experiment_files, shipped
+from validate.catalogue import Card, card, experiment_files, root_of, shipped
 from validate.datasets.registry import data_sets
 from validate.errors import UsageError
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file, root_of
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
 
 
 def test_a_card_says_what_the_experiment_itself_says(project_root: Path) -> None:

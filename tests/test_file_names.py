@@ -5,7 +5,7 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from validate.file_names import safe_name
+from validate.files import safe_name
 
 
 def test_plain_names_stay_and_others_differ() -> None:

@@ -12,8 +12,8 @@ from commands import here
 from script_modules import module_of
 
 from validate.compare.result import Result
-from validate.replay import load
-from validate.report.numbers import significant
+from validate.pipeline import load
+from validate.report.views.numbers import significant
 
 
 def script(root: Path, name: str) -> ModuleType:

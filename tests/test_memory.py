@@ -9,25 +9,26 @@ from scipy import sparse
 
 from validate import memory
 from validate.errors import SceneError
-from validate.fem import fill
-from validate.fem.factor import elimination_order, factorise
-from validate.fem.fill import (
+from validate.fem.linear_solvers import factor as fill
+from validate.fem.linear_solvers.factor import (
+    elimination_order,
     factor_bytes,
+    factorise,
     next_to_nothing,
     require_solvable,
     solvable_bytes,
 )
-from validate.fem.frontal import Fronts
+from validate.fem.linear_solvers.frontal import Fronts
 from validate.fem.system import build
 from validate.memory import MemoryShortError, free_memory, require_memory
-from validate.replay import runs
-from validate.replay.experiment import Experiment
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.replay.room import coarser
-from validate.scene.box import box, grid
-from validate.scene.cylinder import quarter_cylinder
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run import runs
+from validate.pipeline.run.memory import coarser
+from validate.pipeline.run.road import compare
+from validate.scene.geometries.box import box, grid
+from validate.scene.geometries.cylinder import quarter_cylinder
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
 

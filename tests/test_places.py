@@ -27,7 +27,7 @@ from validate.recording.mcap.channels import (
     write_channels,
 )
 from validate.recording.mcap.schemas import to_bytes
-from validate.report.folder import MARK, replace_folder, try_results
+from validate.report.stored.folder import MARK, replace_folder, try_results
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from script_modules import module_of
 
 from validate.catalogue import experiment_files
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.compare.result import Result
 
 

@@ -2,16 +2,16 @@
 
 from beside import beside, experiment
 
-from validate.papers.async_regions.bodies import pad_of as pad_of_bar
+from experiments.async_line.probe import pad_of as pad_of_bar
 from validate.parameters import with_given
-from validate.replay.tree import Built, Tree
+from validate.pipeline.experiment.tree import Built, Tree
 from validate.scene.scene import Scene
 
 LENGTH, AREA, DENSITY, DAMPING = 0.1, 40e-4, 1000.0, 6.5
 
 
 def bar(E: float, cells: int) -> Scene:
-    scene: Scene = beside("async_line", "line").with_cells(_of("async_line", E), cells)
+    scene: Scene = beside("async_line", "twin").with_cells(_of("async_line", E), cells)
     return scene
 
 

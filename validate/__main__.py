@@ -40,6 +40,6 @@ def _require_plain_folder() -> None:
 
 if __name__ == "__main__":
     _require_plain_folder()
-    from validate.cli.main import main
+    from validate.commands.main import main
 
     main()

@@ -1,6 +1,10 @@
 """The door through which arrays enter, checked once for shape and finiteness; and their rms."""
 
+import copyreg
 from collections.abc import Sequence
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,6 +63,21 @@ def _check_shape(
     if not fits:
         pattern = ", ".join("any" if w is None else str(w) for w in want)
         raise error(f"{name}: shape {got}, expected ({pattern})")
+
+
+def _read_only(content: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(content)
+
+
+#: Frozen types hold read-only mappings, which Python by itself does not pickle.
+copyreg.pickle(MappingProxyType, lambda proxy: (_read_only, (dict(proxy),)))
+
+
+def rebuilt(instance: Any) -> tuple[type, tuple[Any, ...]]:
+    """`__reduce__` of a dataclass that checks itself: a copy is made and checked anew, so that its
+    arrays are read-only again."""
+    given = (getattr(instance, f.name) for f in fields(instance) if f.init)
+    return type(instance), tuple(given)
 
 
 def rms(values: ArrayLike, weights: Floats | None = None) -> float:

@@ -7,9 +7,11 @@ appear at once and must not fail with one that is being edited.
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 from validate.errors import UsageError
+from validate.plugins import PlugIn, left_out, plug_ins
 
 _PACKAGE = Path(__file__).resolve().parent
 FILE = "experiment.py"  # of an experiment in a folder of its own
@@ -32,8 +34,8 @@ class Card:
 
 
 def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]:
-    """Experiment name -> file: the shipped ones and those of the project around `start`, of the
-    `experiments/` in `start` itself and of the `named` folders.
+    """Experiment name -> file: those of plug-ins, the shipped ones and those of the project around
+    `start`, of the `experiments/` in `start` itself and of the `named` folders.
 
     Of two with one name the later of these is meant. No other folder is looked at. Raises
     `UsageError` for a named folder without a file that could be an experiment.
@@ -42,6 +44,7 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
         if not _files(folder.resolve()):
             raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
     found = {name_of(f): f for folder in searched_folders(start, named) for f in _files(folder)}
+    _tell_hidden(found)
     if not found:
         raise UsageError(
             "no experiments/ folder here or in this project; give one with --experiments DIR"
@@ -52,7 +55,49 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
 def searched_folders(start: Path, named: Sequence[Path] = ()) -> tuple[Path, ...]:
     """The folders that experiments are looked for in; of two with one name the later is meant."""
     own = (folder / "experiments" for folder in (_project(start), start))
-    return tuple(dict.fromkeys((shipped(), *own, *(folder.resolve() for folder in named))))
+    further = (folder.resolve() for folder in named)
+    return tuple(dict.fromkeys((*_of_plug_ins(), shipped(), *own, *further)))
+
+
+def _of_plug_ins() -> list[Path]:
+    """The folders of experiments of plug-ins; `PACKAGE.experiments` is the name of one."""
+    found = {plug_in: folder_of_experiments(plug_in) for plug_in in plug_ins("experiments")}
+    for plug_in, folder in found.items():
+        if folder is None:
+            left_out(plug_in, f"there is no folder {plug_in.value}")
+    return [folder for folder in found.values() if folder is not None]
+
+
+def _tell_hidden(found: dict[str, Path]) -> None:
+    """Warn of experiments of plug-ins whose names others have."""
+    for plug_in in plug_ins("experiments"):
+        folder = folder_of_experiments(plug_in)
+        for file in _files(folder) if folder else ():
+            if found[name_of(file)] != file:
+                left_out(plug_in, f"another experiment is called '{name_of(file)}'")
+
+
+def folder_of_experiments(plug_in: PlugIn) -> Path | None:
+    """The folder of a plug-in's `PACKAGE.FOLDER`, found without running any of it; None where there
+    is none."""
+    top, *inner = plug_in.value.split(".")
+    spec = PathFinder.find_spec(top)
+    places = (spec.submodule_search_locations if spec else None) or ()
+    folders = (Path(place, *inner) for place in places)
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def reports_of(path: Path | None, out: Path | None) -> Path:
+    """The folder of all reports, for the experiment of that file: `out` where it is given."""
+    return out or root_of(path, Path.cwd()) / "reports"
+
+
+def root_of(path: Path | None, start: Path) -> Path:
+    """The project an experiment's file belongs to where `start` lies in it, else `start`: nothing
+    is written where nobody looks."""
+    tops = path.parents[:3] if path else ()
+    folder = next((top for top in tops if top.name == "experiments"), None)
+    return folder.parent if folder and start.is_relative_to(folder.parent) else start
 
 
 def shipped() -> Path:

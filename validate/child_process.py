@@ -32,20 +32,21 @@ def clean_environment(folder: Path | None = None) -> dict[str, str]:
 
 
 @contextmanager
-def isolating_environment() -> Iterator[dict[str, str]]:
-    """Make this process's own environment a clean one, for a library that starts interpreters.
-
-    Yields the variables that such a child sets once it has started, so that programs that *it*
-    starts for the user see the user's own.
-    """
+def isolating_environment() -> Iterator[None]:
+    """Make this process's own environment a clean one, for a library that starts interpreters."""
     before = dict(os.environ)
-    theirs = {name: value for name, value in before.items() if name.startswith(_PREFIX)}
-    clean = clean_environment()
     try:
-        _replace(clean)
-        yield {_SAFE: "", **theirs}  # Python takes an empty value for none
+        _replace(clean_environment())
+        yield
     finally:
         _replace(before)
+
+
+def users_variables() -> dict[str, str]:
+    """Return what such a child sets once it has started, so that programs that *it* starts for the
+    user see the user's own variables."""
+    theirs = {name: value for name, value in os.environ.items() if name.startswith(_PREFIX)}
+    return {_SAFE: "", **theirs}  # Python takes an empty value for none
 
 
 def _replace(variables: Mapping[str, str]) -> None:

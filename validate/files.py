@@ -4,8 +4,10 @@ A pipe would wait for ever, a device never end, and a name inside a file may lea
 machine. Whatever reads a file that a user names, or that such a file names, opens it here.
 """
 
+import hashlib
 import json
 import os
+import re
 import zipfile
 import zlib
 from io import BufferedReader, BytesIO
@@ -17,6 +19,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+
+# --- Names of files and folders made of any text: of a probe, a marker, a channel, a specimen.
+
+_ODD = re.compile(r"[^A-Za-z0-9._+ -]")
+_LONGEST = 100  # characters: an ending and a folder's parts come on top
+
+
+def safe_name(text: str) -> str:
+    """Return a name that every file system takes, the text itself where it is one.
+
+    Other signs become `_`, and six digits of a hash keep different texts apart.
+    """
+    plain = _ODD.sub("_", text)[:_LONGEST].strip(" .")
+    if text and plain == text:
+        return text
+    mark = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:6]
+    return f"{plain}-{mark}" if plain else mark
+
+
+# -------------------------------------------------------------------------------------------------
 
 LARGEST = 2**29  # bytes of a file that is read as a whole
 ANY_SIZE = 2**63  # bytes: of a file that is read by parts

@@ -4,7 +4,9 @@ A process that takes too much is killed without a word, minutes later; with an e
 one line at once.
 """
 
+import gc
 import resource
+from functools import cache
 from pathlib import Path
 
 from validate.errors import SceneError
@@ -32,6 +34,13 @@ def require_memory(needed: float, what: str) -> None:
             f"free; take a coarser mesh",
             _MOST * free / needed,
         )
+
+
+@cache
+def imports_stay() -> None:
+    """Spares the garbage collector what is imported now, some 700 000 objects: it would walk
+    through them several times a run, and once more at the end. Once a process."""
+    gc.freeze()
 
 
 def free_memory() -> int | None:

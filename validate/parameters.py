@@ -9,7 +9,7 @@ an error naming the nearest ones.
 import difflib
 import math
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -27,14 +27,21 @@ Origin = Literal["recorded", "entered", "default", "identified"]
 
 
 def quantity(
-    default: Any, unit: str, doc: str, *, asked: bool = False, opened: bool = False
+    default: Any,
+    unit: str,
+    doc: str,
+    *,
+    asked: bool = False,
+    opened: bool = False,
+    more: Callable[[], Sequence[str]] | None = None,
 ) -> Any:
     """A dataclass field with default, SI unit ("1" for none) and what it is.
 
     `asked`: nothing may run while it is None; the recording says it, or the user does. `opened`:
-    a declaration, or the user by "none", may leave it open (None), whatever its type.
+    a declaration, or the user by "none", may leave it open (None), whatever its type. `more`
+    returns the choices that plug-ins add to those of its type.
     """
-    known = {"unit": unit, "doc": doc, "asked": asked, "opened": opened}
+    known = {"unit": unit, "doc": doc, "asked": asked, "opened": opened, "more": more}
     return field(default=default, metadata=known)
 
 
@@ -266,17 +273,17 @@ def _resolved(settings: Any, names: list[str], whole: bool = False) -> list[str]
     there is none."""
     if not _branches(settings):
         return None
-    members = {name: (value, meta) for name, value, _, meta in _members(settings)}
-    absent = {name for name, value, hint, _ in _members(settings) if _has_no_parts(value, hint)}
+    members = _members(settings)
     head, rest = names[0], names[1:]
-    if head in members:
-        value = members[head][0]
-        if not rest and (whole or not (_branches(value) or head in absent)):
+    for name, value, hint, _ in members:
+        if name != head:
+            continue
+        if not rest and (whole or not (_branches(value) or _has_no_parts(value, hint))):
             return [head]
         inner = _resolved(value, rest, whole) if rest else None
         if inner:
             return [head, *inner]
-    for name, (value, meta) in members.items():
+    for name, value, _, meta in members:
         inner = _resolved(value, names, whole) if meta.get("part") else None
         if inner:
             return [name, *inner]
@@ -292,7 +299,7 @@ def take_units(settings: Any) -> None:
         value = getattr(settings, f.name)
         texts = value if isinstance(value, tuple) else (value,)
         if "unit" in f.metadata and any(isinstance(text, str) for text in texts):
-            hint = _hints(settings.__class__)[f.name]
+            hint = _with_more(_hints(settings.__class__)[f.name], f.metadata, value)
             object.__setattr__(settings, f.name, _in_si(hint, f.name, value, f.metadata["unit"]))
 
 
@@ -364,7 +371,14 @@ def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]
     unit, _ = _leaf(settings, [head])
     if text.lower() in _OPEN and _may_open(settings, head):
         return None
-    return parsed(_hints(settings.__class__)[head], path, text, unit)
+    hint, meta = next((hint, meta) for n, _, hint, meta in _members(settings) if n == head)
+    return parsed(_with_more(hint, meta, text), path, text, unit)
+
+
+def _with_more(hint: Any, meta: Mapping[str, Any], text: Any) -> Any:
+    """The type of a field with the choices of plug-ins, where the text is none of its own."""
+    more = meta.get("more")
+    return hint if more is None or text in get_args(hint) else Literal[(*get_args(hint), *more())]
 
 
 def _may_open(settings: Any, name: str) -> bool:

@@ -12,18 +12,18 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
-from validate.papers.async_regions.bodies import HapticProbe, HapticTest, LoadCell, chirp
-from validate.papers.async_regions.methods import BLOCK
-from validate.papers.async_regions.runs import pushed
-from validate.papers.async_regions.tables import ENERGY, energy_table, force_table
-from validate.papers.async_regions.touched import probed
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.run.followed import Cases
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases
-from validate.replay.tree import Built, Tree
-from validate.solve.regions import AsyncRegions
+from validate.solve.regions.scheme import AsyncRegions
+from validate.twin.sensors import LoadCell
 
+from ..async_line.probe import HapticProbe, HapticTest, chirp, probed
+from ..async_line.runs import pushed
+from ..async_line.tables import ENERGY, energy_table, force_table
+from .methods import BLOCK
 from .published import ring_nodes
 from .sizes import size_rows, size_table
 from .sliding import sliding_exhibit

@@ -6,15 +6,15 @@ cost in force and phase, and from which size they pay, is told beside a Krylov m
 """
 
 from validate.compare.verdict import Accept
-from validate.papers.async_regions.methods import BLOCK
-from validate.papers.async_regions.touched import place
-from validate.replay.experiment import Experiment, Twin
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.experiment import Experiment, Twin
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support
 from validate.scene.tool import Needle
 
+from ..async_line.probe import place
 from .block import PUSHED, record, sets, tell
+from .methods import BLOCK
 from .published import BLOCK_FIGURES
 
 MIDDLE = ("100 mm", "50 mm", "50 mm")

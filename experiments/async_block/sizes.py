@@ -1,5 +1,5 @@
 """At which size do regions pay? Ticks of the whole prefactored solve, of regions and of a reduced
-model (`solve.touched_krylov`) of one block, by its number of nodes, in one run.
+model (`solve.regions.krylov`) of one block, by its number of nodes, in one run.
 """
 
 from collections.abc import Callable
@@ -10,12 +10,13 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, NumberTable
 from validate.errors import SceneError
-from validate.papers.async_regions.runs import off, pushed
-from validate.replay.tree import Built, Tree
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.scene.geometries.specification import Box
 from validate.scene.scene import Support
-from validate.solve.regions import AsyncRegions
-from validate.solve.touched_krylov import TouchedKrylov
+from validate.solve.regions.krylov import TouchedKrylov
+from validate.solve.regions.scheme import AsyncRegions
+
+from ..async_line.runs import off, pushed
 
 UNTIMED = 20  # ticks: regions are made and caches settle
 HEADS = ("dimensions", "nodes", "solver", "median tick / ms", "mean tick / ms",

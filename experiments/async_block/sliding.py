@@ -8,11 +8,12 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.papers.async_regions.runs import off, pushed
-from validate.papers.async_regions.tables import ENERGY, energy_table
 from validate.scene.scene import Scene
-from validate.solve.regions import AsyncRegions
-from validate.solve.touched_krylov import TouchedKrylov
+from validate.solve.regions.krylov import TouchedKrylov
+from validate.solve.regions.scheme import AsyncRegions
+
+from ..async_line.runs import off, pushed
+from ..async_line.tables import ENERGY, energy_table
 
 _DEEP, _FAR = 5e-3, 0.03  # m, into the face and along it
 _PUSHED, _DRAWN = 0.2, 0.6  # s

@@ -6,16 +6,21 @@ bar in the frequency domain, so that the whole solve is judged, too.
 """
 
 from validate.compare.verdict import Accept
-from validate.papers.async_regions.bodies import HapticTest
-from validate.papers.async_regions.methods import LINE
-from validate.papers.async_regions.touched import place
-from validate.replay.experiment import Experiment, MeshLadder, StepLadder, Twin, Uncertainty
-from validate.replay.tree import CellSize
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    MeshLadder,
+    StepLadder,
+    Twin,
+    Uncertainty,
+)
+from validate.pipeline.experiment.tree import CellSize
 
 from .exhibits import tell
-from .line import record, sets
+from .methods import LINE
+from .probe import HapticTest, place
 from .published import FIGURES
 from .scene import SCENE
+from .twin import record, sets
 
 # Rows of square cells, all of one body: of 40 cm2.
 COARSER = (

@@ -1,6 +1,6 @@
 """The bar of paper 004: at nu = 0 one row of cells is a row of its 1-D elements."""
 
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support
 from validate.scene.tool import Needle

@@ -6,7 +6,12 @@ beside it stand truths on a finer mesh and with smaller steps.
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.papers.accuracy.benchmark import (
+from validate.pipeline.experiment.experiment import Case, Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import TimeSteps
+from validate.solve.dynamic.modal import Modal
+
+from ..needle_block.benchmark import (
     FIVE,
     FRAMES,
     SWITCHES,
@@ -14,15 +19,11 @@ from validate.papers.accuracy.benchmark import (
     SolverTest,
     solvers,
 )
-from validate.papers.accuracy.figures import ROD_FIGURES
-from validate.papers.accuracy.ladders import ROD_LADDER
-from validate.papers.accuracy.needle import STEP
-from validate.papers.accuracy.rod import ROD, SIZE, gravity_inputs
-from validate.papers.accuracy.rod_exhibits import tell
-from validate.replay.cards import TimeSteps
-from validate.replay.experiment import Case, Experiment
-from validate.replay.method import Method
-from validate.solve.modal import Modal
+from ..needle_block.body import STEP
+from .body import ROD, SIZE, gravity_inputs
+from .exhibits import tell
+from .ladder import ROD_LADDER
+from .published import ROD_FIGURES
 
 
 def gravity(t: Floats) -> Floats:

@@ -8,30 +8,29 @@ the material's, bonded ones divide it by the stiffening that the same mesh shows
 
 from collections.abc import Mapping
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.papers.ecoflex.cylinder import (
+from validate.parameters import describe
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.plates.choices import stated_sizes
+from validate.scene.geometries.specification import Cylinder
+from validate.scene.material import Material
+from validate.scene.scene import Drive, Scene, Support
+from validate.solve.external.scheme import Guest
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
+
+from .cylinder import (
     LoggedCylinder,
     SiliconeModuli,
     load,
     place,
 )
-from validate.papers.ecoflex.logged import follows
-from validate.papers.ecoflex.modulus import identified
-from validate.papers.ecoflex.specimens import specimen_of
-from validate.parameters import describe
-from validate.replay.compression_cards import stated_sizes
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.method import Method
-from validate.scene.geometry import Cylinder
-from validate.scene.material import Material
-from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid import NoFluid
-from validate.solve.guests.guest import Guest
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
-
-from .published import PUBLISHED
+from .modulus import identified
+from .published import PUBLISHED, follows
+from .specimens import specimen_of
 
 FELUPE = "python benchmarks/guests/felupe_guest.py"
 CALCULIX = "python benchmarks/guests/calculix_guest.py"

@@ -6,18 +6,19 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
-from validate.papers.ekf_nfem.tables import (
+from validate.pipeline.exhibits.standard import error_at
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import Cases, Followed
+from validate.register.markers.markers import MarkerObservation
+from validate.register.signals import SignalObservation
+
+from ..ekf_cube.tables import (
     fields_apart,
     locking_table,
     readings_table,
     steps_table,
 )
-from validate.register.markers import MarkerObservation
-from validate.register.signals import SignalObservation
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases, Followed
-from validate.replay.standard_exhibits import error_at
-from validate.replay.tree import Tree
 
 _MM = 1e3
 _PRINTED_FORCE, _PRINTED_STEP = 0.15, 1e-4  # N, s

@@ -6,19 +6,19 @@ paper's, pushed by the measured force, with and without filters that see the pla
 """
 
 from validate.compare.verdict import Accept
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.reduced_ekf import ReducedEKF
-from validate.papers.ekf_nfem.figures import CONE_FIGURES
-from validate.replay.experiment import Case, Experiment, Twin, Uncertainty, vary
-from validate.replay.method import WALK_UNRECORDED, Method
-from validate.scene.geometry import Cone
+from validate.estimate.extended.node_ekf import NodeEKF
+from validate.estimate.reduced.reduced_ekf import ReducedEKF
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin, Uncertainty, vary
+from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.scene.geometries.specification import Cone
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
 from .exhibits import tell_cone
+from .published import CONE_FIGURES
 from .registration import FILE, PressedCone, place, record, sets, truth
 
 PROBES = (

@@ -19,15 +19,15 @@ from scipy.interpolate import CubicSpline
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.locate import barycentric_rows
+from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Record, Recording
-from validate.scene.geometry import Cone
+from validate.scene.geometries.specification import Cone
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Stepper
 from validate.twin.tracked import Camera, Origin, Points, Reading, record_tracked
 

@@ -6,21 +6,21 @@ one on any such mesh: it is shown refused and run; every other method takes a so
 """
 
 from validate.compare.verdict import Accept
-from validate.estimate.ensemble_kf import EnsembleKf
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.reduced_ekf import ReducedEKF
-from validate.estimate.roukf import Roukf
-from validate.papers.ekf_nfem.cube_exhibits import tell_cube
-from validate.papers.ekf_nfem.figures import CUBE_FIGURES
-from validate.papers.ekf_nfem.ladder import CUBE_LADDER
-from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.method import WALK_UNRECORDED, Method
-from validate.scene.geometry import MeshFile
+from validate.estimate.ensemble.ensemble_kf import EnsembleKf
+from validate.estimate.ensemble.roukf import Roukf
+from validate.estimate.extended.node_ekf import NodeEKF
+from validate.estimate.reduced.reduced_ekf import ReducedEKF
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin
+from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.scene.geometries.specification import MeshFile
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference
 
+from .exhibits import tell_cube
+from .ladder import CUBE_LADDER
+from .published import CUBE_FIGURES
 from .twin import PushedCube, place, record, sets, truth
 
 A = ("node_A",)

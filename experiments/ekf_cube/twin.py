@@ -6,16 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from validate.parameters import quantity
+from validate.pipeline.experiment.experiment import Progress
+from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
+from validate.pipeline.run.followed import Truth, truth_of
 from validate.recording.types import Recording
-from validate.register.fitting import MarkerFit
-from validate.register.follow import follow_signal
+from validate.register.as_declared import follow_signal
+from validate.register.markers.fitting import MarkerFit
 from validate.register.registered import Registered
-from validate.replay.cards import TimeSteps, TrackedTwin
-from validate.replay.experiment import Progress
-from validate.replay.followed import Truth, truth_of
-from validate.replay.tree import Built, Tree
 from validate.scene.scene import Scene
-from validate.solve.central import CentralDifference
+from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import output_frames
 from validate.twin.stepped import SteppedTwin
 from validate.twin.tracked import Origin, Reading

@@ -5,21 +5,21 @@ import numpy as np
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build as build_system
-from validate.papers.ekf_nfem.figures import PRINTED_LIVER_STEP
-from validate.papers.ekf_nfem.liver_body import watched
-from validate.papers.ekf_nfem.tables import (
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import Cases, Followed
+from validate.report.scenes.node_sets import node_sets_picture
+from validate.scene.mesh import cell_volumes
+from validate.scene.scene import Scene
+
+from ..ekf_cube.published import PRINTED_LIVER_STEP
+from ..ekf_cube.tables import (
     fields_apart,
     locking_table,
     readings_table,
     steps_table,
 )
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases, Followed
-from validate.replay.tree import Tree
-from validate.report.node_sets import node_sets_picture
-from validate.scene.mesh import cell_volumes
-from validate.scene.scene import Scene
-
+from .body import watched
 from .twin import FOLDER
 
 NU = (0.45, 0.49, 0.499)  # what locking is shown at

@@ -6,20 +6,20 @@ body is the data folder's liver where that is here, else one made by formulas
 (`--set body.body=generated`), and neither is a reproduction.
 """
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.reduced_ekf import ReducedEKF
-from validate.papers.ekf_nfem.ladder import LIVER_LADDER
-from validate.papers.ekf_nfem.liver_body import LiverBody
-from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.method import Method
+from validate.estimate.extended.node_ekf import NodeEKF
+from validate.estimate.reduced.reduced_ekf import ReducedEKF
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference
 
+from .body import LiverBody
 from .exhibits import tell_liver
+from .ladder import LIVER_LADDER
 from .published import LIVER_FIGURES
 from .twin import PulledLiver, build, follows, load, place, record, sets, truth
 

@@ -13,16 +13,16 @@ import numpy as np
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build as build_system
 from validate.parameters import Ranges, quantity, with_given
+from validate.pipeline.experiment.experiment import Progress
+from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording, Source
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
-from validate.replay.experiment import Progress
-from validate.replay.tree import Built, Tree
 from validate.scene.scene import Drive, Pin, Scene, Support
-from validate.solve.fluid import ElasticPressure, ExactPressure
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
+from validate.solve.fluid.pulse import MMHG, PulsePressure
 from validate.solve.march import march
-from validate.solve.pulse import MMHG, PulsePressure
 from validate.twin.sensors import signal, streams
 
 ToolName = Literal["needle", "patch", "plate"]

@@ -13,13 +13,13 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
 from validate.errors import SceneError
 from validate.fem.cavity import pressure_load, volume_of
-from validate.fem.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import Condensed, condense
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.replay.tree import Tree
+from validate.pipeline.experiment.tree import Tree
 from validate.scene.mesh import Mesh
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.pressure_curve import RATIOS, pressure_at_volume, tuned_gain
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.pressure_curve import RATIOS, pressure_at_volume, tuned_gain
 
 from .block import slab
 

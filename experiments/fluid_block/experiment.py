@@ -6,14 +6,15 @@ Other set-ups: `--set body.cavities.count=2 --set plane=stress --set tool=needle
 """
 
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Experiment, Twin, Uncertainty, vary
-from validate.replay.method import Method
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.pressure_loop import PressureLoop
+from validate.pipeline.experiment.experiment import Experiment, Twin, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.pressure_loop import PressureLoop
 
 from .block import PressedBlock, build, place, record
+from .exhibits import tell
+from .published import FIGURES
 from .scene import SCENE
-from .told import FIGURES, tell
 
 P2 = {"body.element": "tri6"}
 FINE = PressureLoop(tolerance=1e-3)

@@ -10,10 +10,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import Responses
-from validate.replay.tree import Tree
-from validate.solve.fluid import ElasticPressure, ExactPressure
-from validate.solve.pressure_curve import slopes, still
-from validate.solve.pulse import LINEAR_TO, MMHG, PulsePressure
+from validate.pipeline.experiment.tree import Tree
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
+from validate.solve.fluid.pressure_curve import slopes, still
+from validate.solve.fluid.pulse import LINEAR_TO, MMHG, PulsePressure
 from validate.solve.types import State
 
 from .block import FluidLaws

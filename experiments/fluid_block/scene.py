@@ -1,7 +1,7 @@
 """The block of paper 000, section 3.3: 5 x 5 cm, E 34 kPa, nu .35, held below; what presses it is
 `settings.tool`."""
 
-from validate.scene.hollow_block import HollowBlock
+from validate.scene.geometries.hollow_block import HollowBlock
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Scene, Support
 

@@ -15,12 +15,17 @@ from validate.errors import SceneError
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
 from validate.fem.system import responses as responses_of
-from validate.replay.experiment import Progress
-from validate.replay.tree import Tree
-from validate.scene.hollow_block import HollowBlock
-from validate.solve.fluid import ExactPressure
-from validate.solve.pressure_curve import tuned_gain
-from validate.solve.pressure_loop import PressureLoop, UpdateName, gain_matrix, spectral_radius
+from validate.pipeline.experiment.experiment import Progress
+from validate.pipeline.experiment.tree import Tree
+from validate.scene.geometries.hollow_block import HollowBlock
+from validate.solve.fluid.cavities import ExactPressure
+from validate.solve.fluid.pressure_curve import tuned_gain
+from validate.solve.fluid.pressure_loop import (
+    PressureLoop,
+    UpdateName,
+    gain_matrix,
+    spectral_radius,
+)
 from validate.solve.types import Scheme, State
 
 from .block import ToolName, slab

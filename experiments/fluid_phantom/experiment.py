@@ -10,22 +10,28 @@ from collections.abc import Mapping, Sequence
 
 from validate.compare.effects import Sensor
 from validate.compare.verdict import Accept
-from validate.papers.fluid_inclusion.effects import EFFECTS, INPUTS
-from validate.papers.fluid_inclusion.figures import FIGURES
-from validate.papers.fluid_inclusion.friction import friction_from_rise
-from validate.papers.fluid_inclusion.ladder import LADDER
-from validate.papers.fluid_inclusion.phantom import Phantom, load, place, read, record
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    Identified,
+    IdentifiedByRuns,
+    SolvesVariants,
+    Twin,
+    Uncertainty,
+)
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.inclusion import MESHES
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty
-from validate.replay.inclusion import MESHES
-from validate.replay.method import Method
-from validate.replay.tree import Tree
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.guests.guest import Guest
-from validate.solve.pressure_loop import PressureLoop
+from validate.solve.external.scheme import Guest
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.pressure_loop import PressureLoop
 
+from .effects import EFFECTS, INPUTS
+from .friction import friction_from_rise
+from .ladder import LADDER
+from .phantom import Phantom, load, place, read, record
+from .published import FIGURES, STATED
 from .scene import SCENE
-from .stated import STATED
 
 BONDED = {"foundations.plates.contact": "bonded"}
 MEAN_DILATATION = {"dilatation": "nodal_mean"}
@@ -42,10 +48,13 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-def identify(
-    recordings: Sequence[Recording], parameters: Tree, methods: Mapping[str, Method]
+def friction(
+    recordings: Sequence[Recording],
+    parameters: Tree,
+    methods: Mapping[str, Method],
+    solves: SolvesVariants,
 ) -> Identified:
-    return friction_from_rise(EXPERIMENT, methods["md_fluid"], recordings, parameters)
+    return friction_from_rise(parameters, "md_fluid", solves)
 
 
 ADDED_SENSORS = (
@@ -83,7 +92,7 @@ EXPERIMENT = Experiment(
     effects=EFFECTS,
     sensors=ADDED_SENSORS,
     published=(*FIGURES, *STATED),
-    identify=identify,
+    identify=IdentifiedByRuns(friction),
     ladder=LADDER,
     quick={"positions": (0.003,)},
     twin=Twin(

@@ -5,18 +5,17 @@ elements; linear and large-strain models are judged against it side by side.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.replay.experiment import EffectSpec, Variant
-from validate.replay.find import load_file
-from validate.replay.method import Method
+from validate.pipeline.experiment.experiment import EffectSpec, Variant
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import LawName
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
-LINEAR = load_file(Path(__file__).parents[1] / "fluid_phantom" / "experiment.py")
+from ..fluid_phantom.experiment import EXPERIMENT as LINEAR
+
 _own, _twin = LINEAR.parameters.settings, LINEAR.twin
 assert _twin is not None
 assert LINEAR.uncertainty is not None

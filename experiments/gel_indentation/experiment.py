@@ -9,20 +9,21 @@ import math
 from functools import partial
 from pathlib import Path
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.papers.gel.between import OTHER_BOXES, smoothed
-from validate.papers.gel.box import GelBoxes, GelIndentation, build, load, place, stated
-from validate.papers.gel.exhibits import tell
-from validate.papers.gel.lower import fitted_box
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Input, Uncertainty, vary
-from validate.replay.method import Method
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, Input, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene
-from validate.solve.harmonic import Harmonic
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.without_mechanics import Harmonic
+
+from .box import GelBoxes, GelIndentation, build, load, place, stated
+from .displacement_errors import fitted_box
+from .exhibits import tell
+from .poisson_ratio import OTHER_BOXES, smoothed
 
 STATIC = StaticNewton("none", tolerance=1e-6)
 LINEAR = {"material.law": "linear"}

@@ -6,18 +6,18 @@ judged by `validate run hanging_bar --guest "python my_guest.py"`.
 """
 
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.ladder import Ladder
-from validate.replay.method import Method
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.ladder.ladder import Ladder
+from validate.scene.geometries.specification import Box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support, Weight
-from validate.solve.guests.guest import Guest
-from validate.solve.newton import StaticNewton
+from validate.solve.external.scheme import Guest
+from validate.solve.static.newton import StaticNewton
 
 from .published import PUBLISHED, tell
-from .recorded import SolvedByOthers, load, place, tetrahedra
+from .reference_solutions import SolvedByOthers, load, place, tetrahedra
 from .study import trial
 
 SIZE = ("0.6 m", "0.6 m", "1.6 m")  # held at its top

@@ -8,15 +8,15 @@ from validate.compare.convergence import Richardson, richardson
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.published import Claim, Figure
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import MAIN, Cases
-from validate.replay.tree import Built, Tree
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.run.followed import MAIN, Cases
+from validate.scene.geometries.specification import Box
 from validate.scene.scene import Scene
 from validate.solve.march import march
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 
-from .recorded import SOURCE, sunk
+from .reference_solutions import SOURCE, sunk
 
 BUILT = Built()
 _MESHES, _GRADINGS = (6, 4, 3), (3.0, 2.0)

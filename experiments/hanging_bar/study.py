@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 
 from validate.arrays import Floats
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.ladder.ladder import Rival, Trial
+from validate.pipeline.ladder.references import ORDERS, still_best, still_pair
 from validate.recording.types import Recording
-from validate.replay.ladder import Rival, Trial
-from validate.replay.ladder_solvers import ORDERS, still_best, still_pair
-from validate.replay.tree import Built, Tree
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import LawName
 from validate.scene.mesh import Kind
 from validate.scene.scene import Scene
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
 
 _WHOLE = 1.0  # s: in one step from rest to the whole weight
 _REFERENCE = "H27"

@@ -8,19 +8,17 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.compare.held_force import HeldForce
-from validate.compare.published import Figure
+from validate.compare.force_error import HeldForce
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import Cases, Followed
-from validate.replay.live import Lived, RecordedPath, live
-from validate.replay.tree import Tree
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.live import Lived, RecordedPath, live
+from validate.pipeline.run.followed import Cases, Followed
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.extrapolate import NAMES, between_answers
-from validate.solve.haptic import QUANTILES, RealTime, TickTimes
-from validate.solve.haptic_loop import HapticLoop, HapticStepper
+from validate.solve.haptic.loop import NAMES, HapticLoop, HapticStepper, between_answers
+from validate.solve.haptic.rates import QUANTILES, RealTime, TickTimes
 
 from .twin import AXES, EACH_TICK, TOOL, sets
 
@@ -321,27 +319,3 @@ def _pace(scene: Scene, reference: Followed, dt: float) -> str:
         "median tick of a slower simulation is only an extrapolation. The paper's rates are "
         "steps a second without their step."
     )
-
-
-FIGURES = (
-    Figure(
-        "peak error of the extrapolated force over the largest", f"told:peak.{JUDGED}", None, None,
-        "1", "not comparable",
-        "printed in words ('reliable haptic feedback'), and without the rule: ours is linear, of a "
-        "simulation at 100 Hz", "section 3.5",
-    ),
-    Figure(
-        "least energy taken by the extrapolated force", f"told:least.{JUDGED}", None, None, "J",
-        "not comparable", "the paper counts no energy; below 0 is not passive", "section 3.5",
-    ),
-    Figure(
-        "reaction force (eq 32)", None, None, None, "N", "not comparable",
-        "no force is printed; ours is the spring's between tool and body, which balances eq "
-        "32's force on the touched nodes, except for their inertia", "section 3.5",
-    ),
-    Figure(
-        "Fig. 6: the liver before and under the tool", None, None, None, "1", "not comparable",
-        "figures without numbers: ours is drawn under 'Force between answers'",
-        "section 3.5, Fig. 6",
-    ),
-)  # fmt: skip

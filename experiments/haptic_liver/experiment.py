@@ -7,14 +7,15 @@ it live. A path of your own: `--set recording=FILE`.
 """
 
 from validate.compare.verdict import Accept
-from validate.papers.ekf_nfem.liver_body import LiverBody
-from validate.replay.experiment import Experiment, Twin
-from validate.replay.method import Method
+from validate.pipeline.experiment.experiment import Experiment, Twin
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
-from validate.solve.haptic_loop import HapticLoop
+from validate.solve.haptic.loop import HapticLoop
 
-from .exhibits import FIGURES, tell
+from ..ekf_liver.body import LiverBody
+from .exhibits import tell
+from .published import FIGURES
 from .twin import EACH_TICK, TouchedLiver, build, follows, load, place, record, sets
 
 METHODS = {

@@ -17,25 +17,25 @@ from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.errors import RecordingError, SceneError
 from validate.fem.system import build as build_system
-from validate.papers.async_regions.bodies import LoadCell
-from validate.papers.ekf_nfem.liver_body import of_its_body, watched
-from validate.papers.needle_pocket.hand import moved, tremor
 from validate.parameters import quantity
+from validate.pipeline.experiment.experiment import Experiment, Progress
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.live import LIVE, as_given, recorded_tip
+from validate.pipeline.run.remade import made_here
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating
-from validate.replay.experiment import Experiment, Progress
-from validate.replay.live import LIVE, as_given, recorded_tip
-from validate.replay.remade import made_here
-from validate.replay.tree import Built, Tree
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
 from validate.scene.tool import Needle
-from validate.solve.haptic import HAPTIC_HZ
-from validate.solve.haptic_loop import HapticLoop
+from validate.solve.haptic.loop import HapticLoop
+from validate.solve.haptic.rates import HAPTIC_HZ
 from validate.solve.march import march
-from validate.twin.sensors import signal, streams
+from validate.twin.sensors import LoadCell, signal, streams
 from validate.twin.tracked import START_NS
+
+from ..ekf_liver.body import of_its_body, watched
+from ..needle_pocket.hand import moved, tremor
 
 TOOL, AXES = "tool", "xyz"
 FOLDER = Path(__file__).parent

@@ -8,24 +8,24 @@ the models do not know, nodes that nobody measured, other filters, other solvers
 from typing import Any
 
 from validate.compare.verdict import Accept
-from validate.estimate.ensemble_kf import EnsembleKf
-from validate.estimate.filterpy_guest import FilterpyGuest
-from validate.estimate.kf_fem import KfFem
-from validate.estimate.load_scale import LoadScale
-from validate.estimate.modal_kf import ModalKf
-from validate.estimate.reduced_kf import ReducedKf
-from validate.estimate.roukf import Roukf
-from validate.papers.kf_fem.block import PulledBlock, place, record, sets, truth
-from validate.papers.kf_fem.ladders import PRINTED_LADDER
-from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.method import WALK_UNRECORDED, Method
+from validate.estimate.ensemble.ensemble_kf import EnsembleKf
+from validate.estimate.ensemble.roukf import Roukf
+from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.kalman.kf_fem import KfFem
+from validate.estimate.kalman.modal_kf import ModalKf
+from validate.estimate.reduced.load_scale import LoadScale
+from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin
+from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
 from validate.scene.material import Region
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
 
+from .block import PulledBlock, place, record, sets, truth
+from .ladder import PRINTED_LADDER
 from .published import FIGURES
 from .scene import SCENE
-from .seeds import tell
+from .seeds import VIEWS, tell
 
 MM2 = 1e-6
 PRINTED = 1e-3 * MM2  # the paper's .001, read as mm2
@@ -120,6 +120,7 @@ EXPERIMENT = Experiment(
     ladder=PRINTED_LADDER,
     cases=CASES,
     exhibits=tell,
+    views=VIEWS,
     published=FIGURES,
     captions={
         "displacement_node_A": "As Figs. 3 and 4 of paper 001: measurement, FEM and KF-FEM.",

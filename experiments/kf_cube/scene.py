@@ -1,6 +1,6 @@
 """The block of paper 001, section 3, Table 1."""
 
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 

@@ -6,10 +6,19 @@ its axis at 12 Hz, and the twin takes ten steps in one of the models'.
 """
 
 from validate.compare.verdict import Accept
-from validate.estimate.kf_fem import KfFem
-from validate.estimate.reduced_kf import ReducedKf
-from validate.estimate.roukf import Roukf
-from validate.papers.kf_fem.block import (
+from validate.estimate.ensemble.roukf import Roukf
+from validate.estimate.kalman.kf_fem import KfFem
+from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin, vary
+from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.scene.geometries.specification import Box
+from validate.scene.material import Material
+from validate.scene.scene import Load, Probe, Scene, Support
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.static.quasi_static import QuasiStatic
+
+from ..kf_cube.block import (
     LayeredTwin,
     PulledBlock,
     Traction,
@@ -19,15 +28,7 @@ from validate.papers.kf_fem.block import (
     sets,
     truth,
 )
-from validate.papers.kf_fem.ladders import SWINGING_LADDER
-from validate.replay.experiment import Case, Experiment, Twin, vary
-from validate.replay.method import WALK_UNRECORDED, Method
-from validate.scene.geometry import Box
-from validate.scene.material import Material
-from validate.scene.scene import Load, Probe, Scene, Support
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
-from validate.solve.quasi_static import QuasiStatic
+from .ladder import SWINGING_LADDER
 
 A = ("node_A",)
 PRINTED = 1e-9  # m2

@@ -18,7 +18,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, require_positive_cells
-from validate.scene.mesh_file import write_mesh
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 SIDE = 100.0  # mm
 BOTTOM, TOP, HEIGHT = 68.0, 58.0, 28.0  # mm, diameters and height of the cone

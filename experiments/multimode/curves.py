@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.datasets.home import found
+from validate.datasets.home import data_path
 from validate.errors import RecordingError, UsageError
 from validate.parameters import Ranges, quantity
-from validate.recording.exports.stretch import Curve, read_stretch_stress, signals_of
+from validate.pipeline.experiment.tree import Tree
+from validate.recording.tables.stretch import Curve, read_stretch_stress, signals_of
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.signals import driving
 from validate.register.stresses import StressObservation
-from validate.replay.tree import Tree
-from validate.scene.material_point import MaterialPoint, StretchMode
+from validate.scene.meshless import MaterialPoint, StretchMode
 
 from .laws import (
     LawCard,
@@ -71,7 +71,7 @@ class Multimode:
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """A recording for every mode of the material, the one that calibrates first."""
     p: Multimode = tree.settings
-    where = found(FOLDER, None, folder, p.data)
+    where = data_path(FOLDER, None, folder, p.data)
     files = _files(where)
     name = _material(p, files, where)
     recordings = [r for path in files[name] for r in _by_mode(path, name, p.unit)]

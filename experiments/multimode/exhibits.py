@@ -6,13 +6,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.fem.stretch_response import response
+from validate.fem.laws.stretch_response import response
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import MAIN, Cases, Followed
 from validate.register.registered import Registered
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import MAIN, Cases, Followed
-from validate.replay.tree import Tree
 
-from .calibrating import words_of
+from .calibration import words_of
 from .curves import Multimode, point
 from .laws import as_card
 from .ranking import (

@@ -6,12 +6,12 @@ two stretches (Macromolecules 14 (1981) 154) by `--set material=kawabata1981`, i
 diagonal. Others of the same kind: `--set data=FOLDER --set material=NAME` of files NAME_MODE.csv.
 """
 
-from validate.compare.expected import Expected
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.method import Method
-from validate.solve.stretch_test import StretchTest
+from validate.compare.overall import Expected
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.solve.static.stretch_test import StretchTest
 
-from .calibrating import accepted, calibrations, follows
+from .calibration import accepted, calibrations, follows
 from .curves import Multimode, build, load, material_of, place
 from .exhibits import exhibits
 

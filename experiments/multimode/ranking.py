@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.arrays import Floats, rms
+from validate.pipeline.run.followed import Followed
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.stresses import StressObservation
-from validate.replay.followed import Followed
-from validate.scene.laws import law_kind
-from validate.scene.material_point import StretchMode
-from validate.scene.stability import Lost, lost_stability
-from validate.solve.stretch_test import StretchTest
+from validate.scene.laws import Lost, law_kind, lost_stability
+from validate.scene.meshless import StretchMode
+from validate.solve.static.stretch_test import StretchTest
 
 from .curves import Multimode, as_mode, point, principal
 from .laws import LawCard

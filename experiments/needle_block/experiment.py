@@ -7,7 +7,12 @@ know: the prostate's material, a finer mesh, smaller steps, plane stress.
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.papers.accuracy.benchmark import (
+from validate.pipeline.experiment.experiment import Case, Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import TimeSteps
+from validate.solve.dynamic.modal import Modal
+
+from .benchmark import (
     FIVE,
     FRAMES,
     SWITCHES,
@@ -15,14 +20,10 @@ from validate.papers.accuracy.benchmark import (
     SolverTest,
     solvers,
 )
-from validate.papers.accuracy.figures import NEEDLE_FIGURES
-from validate.papers.accuracy.ladders import NEEDLE_LADDER
-from validate.papers.accuracy.needle import BLOCK, MP2, STEP, needle_depth
-from validate.papers.accuracy.needle_exhibits import tell
-from validate.replay.cards import TimeSteps
-from validate.replay.experiment import Case, Experiment
-from validate.replay.method import Method
-from validate.solve.modal import Modal
+from .body import BLOCK, MP2, STEP, needle_depth
+from .exhibits import tell
+from .ladder import NEEDLE_LADDER
+from .published import NEEDLE_FIGURES
 
 
 def depth(t: Floats) -> Floats:

@@ -5,17 +5,17 @@ slides, pulls and lets go. The recording is a twin of quadratic elements on a fi
 synthetic path. A path of your own: `--set recording=FILE`; in 3-D: `--set body.space=solid`.
 """
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Experiment, Twin, Uncertainty, vary
-from validate.replay.method import Method
-from validate.solve.needle import NeedleLoop
+from validate.pipeline.experiment.experiment import Experiment, Twin, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.solve.haptic.needle import NeedleLoop
 
-from .judged import follows
+from .exhibits import tell
 from .pocket import NeedlePocket, build, load, place, sets
+from .published import FIGURES, STATED
+from .recording import follows
 from .scene import SCENE
-from .stated import STATED
-from .told import FIGURES, tell
 from .twin import record
 
 PAPER = NeedleLoop(update="proportional", at="node", force="reaction")

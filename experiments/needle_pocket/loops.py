@@ -8,15 +8,15 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
-from validate.papers.needle_pocket.hand import closed
-from validate.replay.followed import Followed
-from validate.replay.tree import Tree
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import Followed
 from validate.scene.scene import Scene
-from validate.solve.haptic import DEVICE_HZ
+from validate.solve.haptic.needle import NeedleLoop
+from validate.solve.haptic.rates import DEVICE_HZ
 from validate.solve.march import march
-from validate.solve.needle import NeedleLoop
 from validate.solve.types import Run
 
+from .hand import closed
 from .pocket import AXES, TOOL
 
 _TURNS = 2

@@ -9,15 +9,15 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.parameters import Ranges, quantity
+from validate.pipeline.experiment.tree import Built, Tree, beside
 from validate.recording.types import Recording
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, validating
-from validate.replay.tree import Built, Tree, beside
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 
-from .recorded import walkable
+from .recording import walkable
 from .scene import POCKET
 
 TOOL, AXES = "needle", "xyz"

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Literal
 
 from validate.parameters import quantity
-from validate.scene.hollow_block import Cavities, HollowBlock
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.hollow_block import Cavities, HollowBlock
+from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Cavity, Scene, Support

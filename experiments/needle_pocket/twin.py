@@ -4,15 +4,15 @@ import numpy as np
 
 from validate.errors import SceneError
 from validate.fem.system import build as build_system
-from validate.papers.needle_pocket.hand import Hand
 from validate.parameters import with_given
+from validate.pipeline.experiment.experiment import Progress
+from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording, Source
-from validate.replay.experiment import Progress
-from validate.replay.tree import Built, Tree
+from validate.solve.haptic.needle import NeedleLoop
 from validate.solve.march import march
-from validate.solve.needle import NeedleLoop
 from validate.twin.sensors import signal, streams
 
+from .hand import Hand
 from .pocket import AXES, TOOL, grip_of, under
 from .scene import POCKET
 

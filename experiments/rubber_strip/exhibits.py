@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
-from validate.recording.formats.npz_points import read_points
+from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import MAIN, Cases
+from validate.recording.tables.npz_points import read_points
 from validate.register.signals import SignalObservation
-from validate.replay.experiment import Progress, Told
-from validate.replay.followed import MAIN, Cases
-from validate.replay.tree import Tree
 
 from .stretches import stretches
 from .strip import FIRST, LAST, Strip, recorded

@@ -6,14 +6,14 @@ the last one; no force and no thickness were recorded. The tracker is held again
 Another one: `--set recording=POINTS_mm.npz`.
 """
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Uncertainty
-from validate.replay.method import Method
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
-from validate.solve.stretch_test import StretchTest
+from validate.scene.meshless import MaterialPoint
+from validate.solve.static.stretch_test import StretchTest
 
 from .exhibits import exhibits
 from .strip import FIRST, LAST, Strip, load, place

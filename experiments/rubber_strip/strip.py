@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.datasets.home import found
+from validate.datasets.home import data_path
 from validate.errors import RecordingError
 from validate.parameters import quantity
-from validate.recording.formats.npz_points import read_points
+from validate.pipeline.experiment.tree import Tree
+from validate.recording.tables.npz_points import read_points
 from validate.recording.types import Recording, Signal
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving
-from validate.replay.tree import Tree
-from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import MaterialPoint
 
 from .stretches import Seen, Stretches, stretches
 
@@ -57,7 +57,7 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 
 def recorded(tree: Tree, folder: Path) -> Path:
     """The file of the tracked points; where none is named that of VALIDATE_SHARED_DATA."""
-    return found(FOLDER, POINTS, folder, tree.recording or None)
+    return data_path(FOLDER, POINTS, folder, tree.recording or None)
 
 
 def _reduced(points: Recording, seen: Stretches, p: Strip) -> Recording:

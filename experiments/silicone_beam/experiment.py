@@ -8,29 +8,29 @@ silicone relaxes is identified on the ring-down under gravity alone, and with
 `--set recording=NEW.c3d --set masses.load.mass=52g`.
 """
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.estimate.reduced_kf import ReducedKf
-from validate.estimate.roukf import Roukf
-from validate.papers.released_beam.beam import build, heeded, place, sets
-from validate.papers.released_beam.cards import FEET, LAYOUT, TIPS, ReleasedBeam
-from validate.papers.released_beam.exhibits import tell
-from validate.papers.released_beam.figures import follows
-from validate.papers.released_beam.recorded import load
-from validate.papers.released_beam.swing import DAMPING, FREQUENCY, LABEL, quantity_of
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Input, MeshLadder, Uncertainty, vary
-from validate.replay.method import Method
-from validate.scene.geometry import Box
+from validate.estimate.ensemble.roukf import Roukf
+from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, Input, MeshLadder, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
-from validate.solve.guests.guest import Guest
-from validate.solve.guests.let_go import GuestLetGo
-from validate.solve.let_go import LetGo
-from validate.solve.newton import StaticNewton
-from validate.solve.viscous_modes import ViscousModes
+from validate.solve.dynamic.let_go import LetGo
+from validate.solve.dynamic.viscous_modes import ViscousModes
+from validate.solve.external.let_go import GuestLetGo
+from validate.solve.external.scheme import Guest
+from validate.solve.static.newton import StaticNewton
 
-from .changes import edge, finer, gravity_alone, heavier, higher, sooner
+from .beam import build, heeded, place, sets
+from .exhibits import tell
+from .published import follows
+from .recording import load
+from .settings import FEET, LAYOUT, TIPS, ReleasedBeam
+from .swing import DAMPING, FREQUENCY, LABEL, quantity_of
+from .variations import edge, finer, gravity_alone, heavier, higher, sooner
 
 FELUPE, CALCULIX, MUJOCO = (
     f"python benchmarks/guests/{name}_guest.py" for name in ("felupe", "calculix", "mujoco")

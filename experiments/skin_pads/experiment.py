@@ -7,21 +7,21 @@ Other recordings of the kind: `--set data=FOLDER`. Where the marks of the pads a
 images, the pads can follow the edges of the field: `--set pads.follow=edges --set pads.window=8mm`.
 """
 
-from validate.compare.expected import Expected
+from validate.compare.overall import Expected
 from validate.compare.verdict import Accept
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, MeshLadder, Uncertainty, vary
-from validate.replay.method import Method
-from validate.replay.tree import CellSize
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, MeshLadder, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import CellSize
+from validate.scene.geometries.sheet import Sheet
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.scene.sheet import Sheet
-from validate.solve.newton import StaticNewton
-from validate.solve.proportional import Proportional
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.proportional import Proportional
 
 from .files import FORCE
 from .laws import exhibits, follows
-from .placed import place
+from .registration import place
 from .skin import PulledSkin, build, load, stated
 
 # Pads are driven apart and let nothing turn.

@@ -9,14 +9,14 @@ from scipy.stats import t as student
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Exhibit, NumberTable
+from validate.pipeline.experiment.experiment import Experiment, Told
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import MAIN, Cases, Followed
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
-from validate.replay.experiment import Experiment, Told
-from validate.replay.followed import MAIN, Cases, Followed
-from validate.replay.tree import Tree
 
 from .files import FORCE
-from .placed import binned
+from .registration import binned
 
 _HEADINGS = (
     "law", f"E x thickness / {FORCE}/m", "95 % ±", f"fitted: rms / {FORCE}",

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from validate.datasets.home import found
+from validate.datasets.home import data_path
 from validate.errors import UsageError
 from validate.parameters import Ranges, quantity
+from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
-from validate.replay.tree import Built, Tree
 from validate.scene.laws import Coefficients
 from validate.scene.scene import Scene
 
@@ -95,7 +95,7 @@ class PulledSkin:
 
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     own: PulledSkin = tree.settings
-    where = found(FOLDER, None, folder, own.data)
+    where = data_path(FOLDER, None, folder, own.data)
     signs = own.signs.displacement, own.signs.force
     return (read_folder(where, signs, own.pads.follow, own.pads.window),)
 

@@ -9,12 +9,12 @@ from typing import Any
 
 from validate.compare.published import Figure
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.method import Method
-from validate.solve.rigid_motion import RigidMotion
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.solve.static.without_mechanics import RigidMotion
 
+from .exhibits import exhibits, follows, identified
 from .phantom import StylusPhantom, build, load, place, stated
-from .shown import exhibits, follows, identified
 
 
 def _tip(axis: str) -> Any:

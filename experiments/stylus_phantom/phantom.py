@@ -12,20 +12,19 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.datasets.home import found, sought
+from validate.datasets.home import data_path, sought
 from validate.errors import RecordingError
 from validate.parameters import quantity
+from validate.pipeline.experiment.tree import Tree
 from validate.recording.formats.device_set import DeviceSet, read_device_set
-from validate.recording.formats.poses import ROTATION, TRANSLATION
+from validate.recording.motion_capture.poses import ROTATION, TRANSLATION
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
-from validate.register.digitised import Digitised, TouchedLandmarks
-from validate.register.dwell import dwells, sd_of_mean, tip_path
-from validate.register.landmarks import match_landmarks
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.tree import Tree
-from validate.scene.rigid_body import RigidBody
+from validate.register.tools.digitised import Digitised, TouchedLandmarks, match_landmarks
+from validate.register.tools.dwell import dwells, sd_of_mean, tip_path
+from validate.scene.meshless import RigidBody
 
 FOLDER = "markers/stylus"
 SEQUENCE = "EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
@@ -98,8 +97,8 @@ class StylusPhantom:
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The sequence, with the landmarks and the tip's offset of the device set as its records."""
     p: StylusPhantom = tree.settings
-    path = found(FOLDER, SEQUENCE, folder, tree.recording or None)
-    devices = read_device_set(found(FOLDER, DEVICES, folder, p.landmarks, "landmarks"))
+    path = data_path(FOLDER, SEQUENCE, folder, tree.recording or None)
+    devices = read_device_set(data_path(FOLDER, DEVICES, folder, p.landmarks, "landmarks"))
     recording = recognised(path).read(path, _options(path))
     records = {**recording.metadata, LANDMARKS: _landmarks(devices), TIP: _tip(devices, p.tools)}
     if results := _results(tree, folder):
@@ -112,7 +111,7 @@ def _results(tree: Tree, folder: Path) -> Path | None:
     they are here: no command brings them."""
     own: StylusPhantom = tree.settings
     if own.published:
-        return found(FOLDER, RESULTS, folder, own.published, "published")
+        return data_path(FOLDER, RESULTS, folder, own.published, "published")
     return None if tree.recording or own.landmarks else sought(FOLDER, RESULTS, folder)
 
 

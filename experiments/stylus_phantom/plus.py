@@ -13,7 +13,7 @@ from scipy.spatial.distance import pdist
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError
-from validate.register.transform import Similarity, fit_rigid
+from validate.register.markers.transform import Similarity, fit_rigid
 
 _WINDOW, _STANDS = 0.2, 1.0  # s
 _TIP, _SHAFT = 1.5e-3, 30e-3  # m: diagonals of the boxes around tip and shaft

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.datasets.home import found
+from validate.datasets.home import data_path
 from validate.errors import RecordingError, UsageError
 from validate.parameters import Ranges, quantity
-from validate.recording.images.outline import Outline, extract_outline
+from validate.pipeline.experiment.tree import Tree
+from validate.recording.outlines.outline import Outline, extract_outline
 from validate.recording.readers import recognised
 from validate.recording.types import Contours, Frames, Recording
+from validate.register.outlines.round_outlines import ENDS, RoundOutlines
 from validate.register.registered import Registered
-from validate.register.round_outlines import ENDS, RoundOutlines
 from validate.register.signals import SignalObservation
-from validate.replay.tree import Tree
-from validate.scene.rigid_body import RigidBody
+from validate.scene.meshless import RigidBody
 
 FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
 OUTLINES, FOUND = "disk", "outlines"
@@ -75,7 +75,7 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     Raises `RecordingError` where fewer than half of the images show a disk.
     """
     p: ImagedDisk = tree.settings
-    path = found(FOLDER, FILE, folder, tree.recording or None)
+    path = data_path(FOLDER, FILE, folder, tree.recording or None)
     recording = _read(path, p.image)
     topic = _topic(recording, p.image.topic)
     frames = recording.frame(topic)

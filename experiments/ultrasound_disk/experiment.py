@@ -5,12 +5,12 @@ place. Other images of the kind: `--set recording=FILE --set disk.diameter=15mm`
 """
 
 from validate.compare.verdict import Accept
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.method import Method
-from validate.solve.rigid_motion import RigidMotion
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.solve.static.without_mechanics import RigidMotion
 
 from .disk import ImagedDisk, build, load, place
-from .shown import exhibits, follows, identified
+from .exhibits import exhibits, follows, identified
 
 UNCERTAINTY = Uncertainty(
     inputs=(

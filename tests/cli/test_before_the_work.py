@@ -6,7 +6,8 @@ import pytest
 from commands import refused
 from study_samples import experiment_file
 
-from validate.cli import making, running, studying
+from validate.commands import record as making
+from validate.library import run_report, studies
 
 
 @pytest.fixture
@@ -22,8 +23,8 @@ def nothing_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("the place was to be tried first")
 
     for module, names in (
-        (running, ("compare",)),
-        (studying, ("study", "stability", "trade")),
+        (run_report, ("compare",)),
+        (studies, ("study", "stability", "trade")),
         (making, ("stamped",)),
     ):
         for name in names:

@@ -11,14 +11,15 @@ import pytest
 from commands import here
 from study_samples import experiment_file
 
+from validate.engine import identity
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.reused import rests_on
+from validate.pipeline.run.road import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.replay.find import load_file
-from validate.replay.options import Options
-from validate.replay.reused import rests_on
-from validate.replay.road import compare
-from validate.report import made
-from validate.report.store import document, write_json
+from validate.report.stored.plain import write_json
+from validate.report.stored.store import document
 from validate.seals import sealed
 
 _LOADS = re.compile(r"load=lambda p, folder: .*,\n")
@@ -125,12 +126,12 @@ def test_one_byte_of_the_code_makes_it_anew(
         (tmp_path / name / "module.py").write_text(f"x = {byte}\n", "utf-8")
     hashes = []
     for name in ("one", "two"):
-        monkeypatch.setattr(made, "PACKAGE", tmp_path / name)
-        made.code_sha256.cache_clear()
-        hashes.append(made.code_sha256())
+        monkeypatch.setattr(identity, "PACKAGE", tmp_path / name)
+        identity.code_sha256.cache_clear()
+        hashes.append(identity.code_sha256())
     assert hashes[0] != hashes[1]
     taken, said = checked(stored)
-    made.code_sha256.cache_clear()
+    identity.code_sha256.cache_clear()
     assert not taken
     assert "other code or libraries" in said
 

@@ -18,25 +18,42 @@ from commands import here, refused
 from study_samples import experiment_file
 
 from validate.catalogue import experiment_files
-from validate.cli import (
-    bodies,
-    calibrating,
-    checking,
-    guesting,
-    known_places,
-    making,
-    new_body,
-    new_body_questions,
-    outlining,
-    studying,
+from validate.commands import (
+    body as bodies,
+)
+from validate.commands import (
+    calibrate as calibrating,
+)
+from validate.commands import (
+    check as checking,
+)
+from validate.commands import (
+    digitise as known_places,
+)
+from validate.commands import (
+    external_check as guesting,
+)
+from validate.commands import main as cli
+from validate.commands import (
+    outline as outlining,
+)
+from validate.commands import (
+    record as making,
+)
+from validate.commands import (
+    study as studying,
+)
+from validate.commands import (
     tool_poses,
 )
-from validate.cli import main as cli
-from validate.cli.asking import read_answers
+from validate.commands.questions import body as new_body
+from validate.commands.questions import kinds as new_body_questions
+from validate.commands.questions.asking import read_answers
 from validate.compare.result import Result
 from validate.errors import RecordingError, SceneError, UsageError, ValidateError
-from validate.scene.box import box
-from validate.scene.foreign_mesh import ForeignBody
+from validate.library import studies
+from validate.scene.geometries.box import box
+from validate.scene.mesh_files.foreign_mesh import ForeignBody
 
 COARSE = [
     "--set", "body.cells=6,7,10",
@@ -66,7 +83,7 @@ FILES = {"numpy", "mcap", "cv2", "pint"}
 def loaded(*arguments: str) -> tuple[str, set[str]]:
     """What a command prints, and the libraries it has loaded at its end."""
     script = (
-        "import sys; from validate.cli.main import run; code = run(sys.argv[1:]);"
+        "import sys; from validate.commands.main import run; code = run(sys.argv[1:]);"
         "print('LOADED', *sys.modules); sys.exit(code)"
     )
     done = subprocess.run(
@@ -77,11 +94,17 @@ def loaded(*arguments: str) -> tuple[str, set[str]]:
     return shown, {name.split(".")[0] for name in modules.split()}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["import", "--help"], []])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["inspect", "--help"], []])
 def test_help_loads_none_of_the_heavy_libraries(arguments: list[str]) -> None:
     shown, modules = loaded(*arguments)
     assert "Usage" in shown
     assert not modules & (HEAVY | FILES | {"rich"})
+
+
+def test_the_help_of_import_asks_the_readers_and_loads_nothing_else() -> None:
+    shown, modules = loaded("import", "--help")
+    assert "c3d  " in shown
+    assert not modules & (HEAVY | {"rich"})
 
 
 def test_the_list_of_experiments_loads_none_of_the_heavy_libraries() -> None:
@@ -97,6 +120,16 @@ def test_inspecting_a_recording_loads_only_what_reads_and_measures_it(project_ro
         shown.split()
     )
     assert not modules & (HEAVY - {"scipy", "shapely"})  # which measure the motion
+
+
+def test_what_a_run_imports_is_what_it_solves_with() -> None:
+    """Every run pays for it twice, here and for its workers: 2 s of Python's start for all."""
+    script = "import sys, validate.commands.run; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    unused = {"scipy.stats", "scipy.signal", "filterpy", "pint", "distributed", "matplotlib"}
+    assert not unused & set(done.stdout.split())
 
 
 def test_usage_errors_are_one_line_with_the_nearest_name() -> None:
@@ -259,7 +292,7 @@ def test_exit_codes_of_known_errors_interrupts_and_bugs(
 def test_check_shows_every_figure_and_fails_when_one_moves(
     monkeypatch: pytest.MonkeyPatch, phantom_result: Result
 ) -> None:
-    monkeypatch.setattr(checking, "compare", lambda *_: phantom_result)
+    monkeypatch.setattr(checking, "compare", lambda *_, **__: phantom_result)
     code, out, _ = here("check", "--fresh", "fluid_phantom", "--json")
     found = json.loads(out)[0]
     assert (code, found["holds"], len(found["published"])) == (0, True, 48)
@@ -271,9 +304,9 @@ def test_check_shows_every_figure_and_fails_when_one_moves(
     assert all(p["name"] in " ".join(whole.split()) for p in found["published"])
     moved = replace(phantom_result.published[0], expected=1.0)
     spoiled = replace(phantom_result, published=(moved,))
-    monkeypatch.setattr(checking, "compare", lambda *_: spoiled)
+    monkeypatch.setattr(checking, "compare", lambda *_, **__: spoiled)
     assert here("check", "--fresh", "fluid_phantom")[0] == 1
-    monkeypatch.setattr(checking, "compare", lambda *_: replace(phantom_result, published=()))
+    monkeypatch.setattr(checking, "compare", lambda *_, **__: replace(phantom_result, published=()))
     assert here("check", "--fresh", "fluid_phantom")[0] == 1  # nothing compared
 
 
@@ -400,14 +433,15 @@ def test_a_study_that_is_interrupted_says_how_many_cells_are_kept(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     experiment = SimpleNamespace(name="x", path=tmp_path / "x.py")
-    common = SimpleNamespace(out=tmp_path)
-    cells = studying.study_folder(experiment, "tradeoff", tmp_path) / studying.CELLS
+    settings = studies.StudySettings(tmp_path)
+    cells = studies.study_folder(experiment, "tradeoff", tmp_path) / studies.CELLS  # type: ignore[arg-type]
     cells.mkdir(parents=True)
     for i in range(3):
         (cells / f"{i}.json").write_text("{}")
     with (
         pytest.raises(KeyboardInterrupt),
-        studying.running(experiment, "choose", "choose", common),  # type: ignore[arg-type]
+        studying.noted(),
+        studies._running(experiment, "choose", "choose", settings),  # type: ignore[arg-type]
     ):
         raise KeyboardInterrupt
     assert "3 finished cells are kept; the same command resumes" in capsys.readouterr().err

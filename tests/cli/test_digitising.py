@@ -10,9 +10,9 @@ from commands import here, refused
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats
-from validate.recording.formats.poses import pose_signals
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.types import Recording, Source
 
 TIP = np.array([0.11, -0.008, 0.003])

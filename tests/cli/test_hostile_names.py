@@ -9,7 +9,7 @@ import pytest
 from commands import here as command
 from test_new_body import PRESSED, log, markers, recording
 
-from validate.cli.main import run
+from validate.commands.main import run
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 

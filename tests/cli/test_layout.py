@@ -12,11 +12,11 @@ import termios
 import pytest
 from commands import here
 
-from validate.cli.arguments import complain
-from validate.cli.check_bars import check_passages
-from validate.cli.layout import laid, width, wrapped
+from validate.commands.arguments import complain
+from validate.commands.screen import check_passages
 from validate.compare.verdict import Check
-from validate.report.store import check_members
+from validate.report.stored.store import check_members
+from validate.report.views.layout import laid, width, wrapped
 
 HEAD = ("name", "value", "why it is so")
 ROWS = (

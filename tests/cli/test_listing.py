@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from validate.cli import listing
+from validate.commands import list as listing
 
 
 def test_a_number_that_is_none_is_never_printed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from validate.cli.main import cli, run
-from validate.cli.new import fitting
-from validate.cli.new import written as filled
-from validate.cli.new_inclusion import INCLUSION
+from validate.commands.main import cli, run
+from validate.commands.questions.inclusion import INCLUSION
+from validate.commands.questions.new import fitting
+from validate.commands.questions.new import written as filled
 from validate.compare.score import bias
 from validate.errors import RecordingError
 from validate.identify.modulus import fit_modulus
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.plates.choices import stated_sizes
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Recording, Signal, Source
-from validate.replay import compare
-from validate.replay.compression_cards import stated_sizes
-from validate.replay.find import load_file
-from validate.scene.box import box
-from validate.scene.mesh_file import write_mesh
+from validate.scene.geometries.box import box
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 ROWS = np.arange(200)
 DIAMETER, HEIGHT, E = 0.03, 0.02, 20e3
@@ -70,7 +70,7 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     paths = {p["path"]: p["default"] for p in json.loads(listed)["parameters"]}
     assert (paths["body.diameter"], paths["body.height"]) == (DIAMETER, HEIGHT)
     own = load_file(tmp_path / "experiments" / "my_gel.py")
-    result = compare(own)
+    result = run_in_memory(own)
     assert [(c.name, c.verdict) for c in result.checks] == [
         ("force.max@fit", "fitted"), ("force.max@beyond", "good enough"),
     ]  # fmt: skip
@@ -101,7 +101,7 @@ def test_the_notes_of_a_pulled_body_speak_of_grips(tmp_path: Path) -> None:
     pulled = {n: replace(s, y=-s.y) for n, s in pressed.signals.items()}
     write_recording(replace(pressed, signals=pulled), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "b", "--from", "gel.mcap")
-    result = compare(load_file(tmp_path / "experiments" / "b.py"))
+    result = run_in_memory(load_file(tmp_path / "experiments" / "b.py"))
     assert any("by bonded for grips" in note for note in result.notes)
 
 
@@ -128,7 +128,7 @@ def test_a_part_of_the_sizes_is_enough_where_the_recording_says_the_rest(tmp_pat
     write_recording(log(height_m=repr(HEIGHT)), tmp_path / "gel.mcap")
     in_folder(tmp_path, "new", "half", "--from", "gel.mcap")
     mine = load_file(tmp_path / "experiments" / "half.py")
-    result = compare(mine, {"body.diameter": repr(DIAMETER), "body.height": "none"})
+    result = run_in_memory(mine, {"body.diameter": repr(DIAMETER), "body.height": "none"})
     found = {p.path: (p.default, p.origin) for p in result.parameters}
     assert found["body.diameter"] == (DIAMETER, "entered")
     assert found["body.height"] == (HEIGHT, "recorded")
@@ -169,12 +169,12 @@ def test_each_rival_is_fitted_as_what_it_is(tmp_path: Path) -> None:
     write_recording(log(**SIZES), tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "my_gel", "--from", "gel.mcap")[0] == 0
     mine = load_file(tmp_path / "experiments" / "my_gel.py")
-    fitted = compare(mine)
+    fitted = run_in_memory(mine)
     off = {m.name: bias(m.residuals["force@fit"].values) for m in fitted.methods}
     assert off["bonded"] == pytest.approx(off["slip"], abs=0.02)
     moduli = {m.name: m.scene.material.E for m in fitted.methods}
     assert moduli["bonded"] < 0.95 * moduli["slip"]
-    given = compare(mine, {"material.E": "20000"})
+    given = run_in_memory(mine, {"material.E": "20000"})
     assert {m.scene.material.E for m in given.methods} == {20000.0}
 
 
@@ -274,7 +274,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     assert 'drives=(Drive("stage", "upper_plate", "+z"),),  # tension, recorded' in text
     assert 'Method("linear, gripped ends", NoFluid(), BONDED_PLATES)' in text
     mine = load_file(tmp_path / "experiments" / "strip.py")
-    result = compare(mine)
+    result = run_in_memory(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.02)
@@ -282,7 +282,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     tops = slip.scene.mesh.facet_nodes("upper_plate")
     assert slip.runs[0].u[-1][tops, 2].mean() > 0
     with pytest.raises(RecordingError, match=r"one in compression: its drive is along '\+z'"):
-        compare(mine, {"drives.stage.direction": "0,0,-1"})
+        run_in_memory(mine, {"drives.stage.direction": "0,0,-1"})
 
 
 def test_what_presses_is_asked_where_nothing_says_it(tmp_path: Path) -> None:
@@ -379,7 +379,7 @@ def test_outlines_stage_and_markers_become_an_experiment(
     coarse = BLOCK | {"body.cells": "6,7,10"}
     mine = load_file(tmp_path / "experiments" / "mine.py")
     assert mine.declared_kind == "twin"  # as the recording says of itself
-    result = compare(mine, coarse, methods=("p1_fluid", "p1_dry"))
+    result = run_in_memory(mine, coarse, methods=("p1_fluid", "p1_dry"))
     rms = {m.name: {s.name: s.value for s in m.scores} for m in result.methods}
     assert rms["p1_fluid"]["contour.rms@9mm"] < rms["p1_dry"]["contour.rms@9mm"] < 0.6e-3
 
@@ -406,7 +406,7 @@ def test_a_mesh_file_is_a_body_too(tmp_path: Path) -> None:
     asked = ("new", "my_gel", "--from", "gel.mcap", "--answers", "a.toml")
     assert in_folder(tmp_path, *asked)[0] == 0
     mine = load_file(tmp_path / "experiments" / "my_gel.py")
-    result = compare(mine)
+    result = run_in_memory(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
     assert result.methods[0].scene.copies == 1
 

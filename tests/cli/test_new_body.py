@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from commands import called
 
-from validate.cli.asking import Question, answered, listed, read_answers
+from validate.commands.questions.asking import Question, answered, listed, read_answers
 from validate.errors import RegistrationError, UsageError
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.job import Job, job_of
+from validate.pipeline.run.named_run import run_name
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
-from validate.replay import compare
-from validate.replay.find import load_file
-from validate.replay.named_run import run_name
-from validate.replay.options import Options
-from validate.scene.box import box, grid
-from validate.scene.mesh_file import write_mesh
-from validate.study.job import Job, job_of
+from validate.scene.geometries.box import box, grid
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
 T = np.linspace(0.0, 4.0, 81)
@@ -78,7 +78,7 @@ def test_a_body_of_hexahedra_is_solved_as_its_methods_say(here: Path) -> None:
     text = (here / "experiments" / "hexa.py").read_text("utf-8")
     assert '"linear": solid("linear law, mixed hexahedra", "linear")' in text
     assert '"quick"' not in text
-    found = compare(load_file(here / "experiments" / "hexa.py"), quick=True)
+    found = run_in_memory(load_file(here / "experiments" / "hexa.py"), quick=True)
     method = found.methods[0]
     assert {s.name: s.value for s in method.scores}["force.rms@high"] < 0.03  # of 0.48 N: exact
 
@@ -116,7 +116,7 @@ def test_answers_make_an_experiment_that_runs(here: Path) -> None:
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert len(text.splitlines()) <= 60
     assert "material=Material(E=20000, nu=0.3, rho=1000),  # E: Pa, rho: kg/m^3" in text
-    result = compare(load_file(here / "experiments" / "mine.py"))
+    result = run_in_memory(load_file(here / "experiments" / "mine.py"))
     assert {c.name: c.verdict for c in result.checks} == dict.fromkeys(
         ("force.max@low", "force.max@high", "marker.max@low", "marker.max@high"), "good enough"
     )
@@ -129,10 +129,10 @@ def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
     mine = load_file(file)
     coarse = {"methods.linear.body.cells": "2,2,2"}
     assert run_name(mine, Options(coarse)) != run_name(mine, Options({}))
-    found = compare(mine, coarse, quick=True)
+    found = run_in_memory(mine, coarse, quick=True)
     assert [(c.path, c.value) for c in found.changed] == [("methods.linear.body.cells", [2, 2, 2])]
     with pytest.raises(UsageError, match=r"methods\.X\.material\.law: no method 'X'; "):
-        compare(mine, {"methods.X.material.law": "svk"})
+        run_in_memory(mine, {"methods.X.material.law": "svk"})
     text = file.read_text("utf-8")
     for old, new, why in (
         ('accepted=("linear",)', 'accepted=("slap",)', "accepted: no method 'slap'"),
@@ -144,12 +144,12 @@ def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
         with pytest.raises(UsageError, match=why):
             load_file(file)
     file.write_text(text.replace('"linear"),', '"linear", {"body.cells": (2, 2, 2)}),'), "utf-8")
-    assert compare(load_file(file), quick=True).methods[0].scene.mesh.nodes.size < 2000
+    assert run_in_memory(load_file(file), quick=True).methods[0].scene.mesh.nodes.size < 2000
 
 
 def _worked(job: Job) -> dict[str, float]:
     """On a worker: the scores of the job's experiment."""
-    (method,) = compare(job.experiment(), methods=("linear",), quick=True).methods
+    (method,) = run_in_memory(job.experiment(), methods=("linear",), quick=True).methods
     return {s.name: s.value for s in method.scores if s.unit in ("N", "m")}
 
 
@@ -276,7 +276,7 @@ def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
     assert code == 0, said
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert "body=MeshFile(file='../body.npz', element='quadratic')," in text
-    result = compare(load_file(here / "experiments" / "mine.py"))
+    result = run_in_memory(load_file(here / "experiments" / "mine.py"))
     assert [c.name for c in result.checks] == ["marker.max@low", "marker.max@high"]
     (here / "answers").mkdir()
     for name in ("../body.npz", str(here / "body.npz"), "link.npz"):
@@ -355,9 +355,9 @@ def test_markers_that_the_layout_calls_otherwise_are_named(here: Path) -> None:
     with pytest.raises(
         RegistrationError, match="has 'a', 'b', 'c', 'd', 'e'; the recording has 'A', "
     ):
-        compare(experiment)
+        run_in_memory(experiment)
     laid("ABCDX")
-    assert "markers not in the layout are left out: 'E'" in compare(experiment).notes
+    assert "markers not in the layout are left out: 'E'" in run_in_memory(experiment).notes
 
 
 @pytest.mark.parametrize(("shape", "record", "answer"), [

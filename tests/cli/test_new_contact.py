@@ -12,11 +12,11 @@ from scipy.sparse.linalg import spsolve
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.arrays import Floats
-from validate.cli.new_contact import _first_touch
+from validate.commands.questions.contact import _first_touch
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.find import load_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.replay import compare
-from validate.replay.find import load_file
 
 GAP, DEPTH, RADIUS, K = 2e-4, 1e-3, 5e-3, 4e3
 T = np.linspace(0.0, 8.0, 241)
@@ -74,7 +74,7 @@ def test_answers_make_an_indentation_that_runs(
     reach = np.sqrt(RADIUS * DEPTH)  # four cells along it
     assert scene.body.shares == pytest.approx((14 * reach / 4 / 10e-3,) * 3, rel=0.02)
     small = {"body.cells": "4,4,4", "seen.states": "8"}
-    result = compare(experiment, small, quick=True)
+    result = run_in_memory(experiment, small, quick=True)
     run = result.methods[0].runs[0]
     assert run.outcome.state == "finished"
     assert run.traces["displacement.slipping"].y.max() == 0  # bonded
@@ -150,7 +150,7 @@ def test_a_cylinder_presses_with_the_force_of_another_code(
     (tmp_path / "a.toml").write_text(PRESSED, "utf-8")
     code, said = called("new", "bar", "--from", "log.mcap", "--answers", "a.toml")
     assert code == 0, said
-    result = compare(load_file(tmp_path / "experiments" / "bar.py"))
+    result = run_in_memory(load_file(tmp_path / "experiments" / "bar.py"))
     assert {c.name for c in result.checks} == {"force.max@low", "force.max@high"}
     for check in result.checks:
         assert check.validation == "not distinguishable", check

@@ -12,25 +12,25 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.moving_bodies import written
-from validate.cli.main import cli
-from validate.cli.new_motion import damping, held
+from validate.commands.main import cli
+from validate.commands.questions.motion import damping, held
 from validate.compare.result import Result
+from validate.engine.cell import Where
 from validate.errors import RegistrationError, UsageError
 from validate.parameters import with_given
+from validate.pipeline import run_in_memory
+from validate.pipeline.checks.described_motion import described
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.run.followed import MAIN, Followed
+from validate.pipeline.run.solved import solve
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
-from validate.register.markers import MarkerObservation
-from validate.replay import compare
-from validate.replay.described_motion import described
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.followed import MAIN, Followed
-from validate.replay.options import folder_of
-from validate.replay.solved import solve
-from validate.scene.box import box
-from validate.scene.mesh_file import write_mesh
-from validate.study.filters import study
-from validate.study.job import Where
+from validate.register.markers.markers import MarkerObservation
+from validate.scene.geometries.box import box
+from validate.scene.mesh_files.mesh_file import write_mesh
+from validate.study.filters.study import study
 
 
 def called(*arguments: str) -> tuple[int, str]:
@@ -341,7 +341,7 @@ def judged(result: Result) -> set[tuple[str, str]]:
 @pytest.mark.parametrize("name", ["swinging", "pushed", "chamber"])
 def test_true_constants_are_good_enough(here: Path, name: str) -> None:
     new(here, name)
-    result = compare(experiment(here))
+    result = run_in_memory(experiment(here))
     assert judged(result) == {("not distinguishable", "good enough")}
     assert result.sentence.startswith("dynamic: recorded motion mostly at")
     assert not [e for e in result.exhibits if e.anchor == "likely-causes"]
@@ -350,7 +350,7 @@ def test_true_constants_are_good_enough(here: Path, name: str) -> None:
 @pytest.mark.slow
 def test_statics_of_a_pushed_beam_names_inertia_first(here: Path) -> None:
     new(here, "pushed", STATIC, (', rho = "0.2%", damping = "2%"', ""), (", rho = 1050", ""))
-    result = compare(experiment(here))
+    result = run_in_memory(experiment(here))
     assert ("differs", "not good enough") in judged(result)
     assert "statics, although inertia matters" in result.sentence
     assert "Likely causes, in order: inertia" in result.sentence
@@ -360,7 +360,7 @@ def test_statics_of_a_pushed_beam_names_inertia_first(here: Path) -> None:
 @pytest.mark.slow
 def test_a_wrong_modulus_is_named_by_its_frequency(here: Path) -> None:
     new(here, "swinging", ("E = 165000", "E = 250000"))
-    result = compare(experiment(here))
+    result = run_in_memory(experiment(here))
     assert "Likely causes, in order: " in result.sentence
     causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0].rows
     assert {str(row[3]) for row in causes} >= {"modulus or density"}
@@ -383,7 +383,7 @@ def test_statics_of_a_film_alone_names_inertia_first(here: Path) -> None:
         (', marker = "a fifteenth of the swing, peak to peak"', ""),
     )  # fmt: skip
     assert new(here, "filmed", *changes)[0] == 0
-    result = compare(experiment(here))
+    result = run_in_memory(experiment(here))
     assert "Likely causes, in order: inertia" in result.sentence
     causes = next(e for e in result.exhibits if e.anchor == "likely-causes").tables[0]
     assert {row[1] for row in causes.rows} == {"outline"}

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from commands import here, refused
 
-from validate.cli import new, new_plates
+from validate.commands.questions import new
+from validate.commands.questions import plates as new_plates
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from commands import here, refused
 
-from validate.cli.new_law import LAW_NAMES
+from validate.commands.questions.law import law_names
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.declaration import from_json, to_json
+from validate.pipeline.experiment.find import load_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.replay import compare
-from validate.replay.declaration import from_json, to_json
-from validate.replay.find import load_file
 from validate.scene.laws import Coefficients, law_kind
 from validate.scene.material import LawName
 
@@ -58,7 +58,7 @@ def value_of(name: str) -> str:
 
 
 def test_every_law_is_offered() -> None:
-    assert set(LAW_NAMES) == set(get_args(LawName))
+    assert set(law_names()) == set(get_args(LawName))
 
 
 @pytest.mark.parametrize("law", get_args(LawName))
@@ -102,7 +102,7 @@ def test_plates_run_in_every_law_at_large_strain(folder: Path, law: str) -> None
     assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml")[0] == 0
     mine = load_file(folder / "experiments" / "mine.py")
     coarse = {"body.cells": "1,1"}
-    (found,) = compare(mine, coarse, methods=("slip",), quick=True).methods
+    (found,) = run_in_memory(mine, coarse, methods=("slip",), quick=True).methods
     scores = {s.name: s.value for s in found.scores}
     assert np.isfinite(list(scores.values())).all()
     file = folder / "experiments" / "mine.py"

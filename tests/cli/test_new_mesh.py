@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from commands import here, refused
 
-from validate.cli import new
-from validate.cli.new_scene import answered_mesh
+from validate.commands.questions import new
+from validate.commands.questions.scene import answered_mesh
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.origins import opened
+from validate.pipeline.plates.scene import pressed_size
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.replay.find import load_file
-from validate.replay.origins import opened
-from validate.replay.pressed_scene import pressed_size
-from validate.scene.box import box, grid
-from validate.scene.mesh_file import write_mesh
+from validate.scene.geometries.box import box, grid
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 SIDES, E = (0.06, 0.045, 0.07), 20e3
 ANSWERS = {"test": "compression", "accept.force": "0.1N", "why.force": "felt"}

@@ -5,9 +5,9 @@ from typing import get_args
 
 import pytest
 
-from validate.cli.new_motion import _ORDER, _USUAL, NOT_OFFERED
+from validate.commands.questions.motion import _ORDER, _USUAL, NOT_OFFERED
 from validate.estimate.filters import FILTERS
-from validate.replay.moving_body import METHODS, MovingName, fits_motion
+from validate.pipeline.bodies.moving import METHODS, MovingName, fits_motion
 from validate.scene.material import LawName
 from validate.solve.schemes import SCHEMES
 

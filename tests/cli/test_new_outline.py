@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from commands import here, refused
 
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.plates.choices import Compression
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
-from validate.replay.compression_cards import Compression
-from validate.replay.find import load_file
-from validate.replay.options import folder_of
-from validate.scene.box import box
-from validate.scene.mesh_file import write_mesh
+from validate.scene.geometries.box import box
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 T = np.linspace(0.0, 10.0, 101)
 PLACE = {"outline.origin": "-20mm,0mm,35mm", "outline.image_x": "+x", "outline.image_y": "-z",

@@ -17,19 +17,19 @@ from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 from validate.arrays import Floats
-from validate.cli.asking import Question
-from validate.cli.new import _asked, fitting
+from validate.commands.questions.asking import Question
+from validate.commands.questions.new import _asked, fitting
 from validate.errors import ValidateError
+from validate.pipeline import run_in_memory
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.experiment.declaration import from_json, to_json
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.replay import compare
-from validate.replay.declaration import from_json, to_json
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.measured_cards import MeasuredBody
-from validate.scene.box import box, grid
-from validate.scene.mesh_file import write_mesh
+from validate.scene.geometries.box import box, grid
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 G = 9.80665
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -238,7 +238,7 @@ def ran(mine: Experiment, case: Case) -> None:
         if settings.motion.how == "dynamic":
             values["motion.length"] = f"{min(10, case.samples - 1) / case.rate:.6g}"
     try:
-        result = compare(mine, values, methods=(list(mine.methods)[-1],), quick=True)
+        result = run_in_memory(mine, values, methods=(list(mine.methods)[-1],), quick=True)
     except ValidateError as error:
         one_line(str(error))
         return

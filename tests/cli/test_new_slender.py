@@ -8,13 +8,13 @@ from commands import called, refused
 
 from validate.arrays import Floats
 from validate.parameters import with_given
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.run.solved import solve
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source
-from validate.replay import compare
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.options import folder_of
-from validate.replay.solved import solve
 
 LENGTH, ACROSS, NOISE = 0.1, 0.01, 2e-5
 T = np.linspace(0, 1, 11)
@@ -91,7 +91,7 @@ def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
     motion = np.abs(converged).max()  # the compared markers were recorded at rest
     assert motion > 2e-3
     assert np.abs(mine - converged).max() < 0.01 * motion
-    for check in compare(made).checks:
+    for check in run_in_memory(made).checks:
         assert 2 * check.u_val < 0.1 * motion, check
 
 

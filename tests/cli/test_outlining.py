@@ -13,12 +13,12 @@ from scipy.ndimage import gaussian_filter
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import foreign_outline
-from validate.recording.images.followed import EXPERTS
 from validate.recording.images.image import encode_png
-from validate.recording.images.outline import extract_outline
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.outlines import foreign_outline
+from validate.recording.outlines.followed import EXPERTS
+from validate.recording.outlines.outline import extract_outline
 from validate.recording.types import Frames, Recording, Source
 
 SIDE = 0.2e-3  # m of a pixel

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from commands import here, refused
 
-from validate.cli.arguments import require_new
-from validate.cli.main import cli
+from validate.commands.arguments import require_new
+from validate.commands.main import cli
 from validate.errors import UsageError
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from commands import here, refused
 
-from validate.cli import checking, running
+from validate.commands import check as checking
 from validate.errors import RecordingError
-from validate.replay.experiment import Experiment
-from validate.replay.options import Options
+from validate.library import run_report
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import Options
 
 RUNS = """from pathlib import Path
 Path(__file__).with_suffix(".ran").touch()
@@ -94,11 +95,11 @@ def test_a_folder_that_is_named_is_looked_at(
 def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compared: list[str] = []
 
-    def without_data(experiment: Experiment, options: Options, *_: object) -> None:
+    def without_data(experiment: Experiment, options: Options, *_: object, **__: object) -> None:
         compared.append(experiment.name)
         raise RecordingError("no logs")
 
-    for command in (running, checking):
+    for command in (run_report, checking):
         monkeypatch.setattr(command, "compare", without_data)
     for arguments in (["run", "--all"], ["check"]):
         compared.clear()

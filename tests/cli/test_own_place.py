@@ -9,14 +9,14 @@ from commands import here
 from study_samples import experiment_file
 
 from validate.report import write
-from validate.report.folder import MARK
+from validate.report.stored.folder import MARK
 
 
 @pytest.fixture(autouse=True)
 def _draws_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages have tests of their own, and take seconds."""
 
-    def fill(result: object, folder: Path, content: Any, *_: object) -> None:
+    def fill(result: object, table: object, folder: Path, content: Any, *_: object) -> None:
         write.write_json(content, folder / MARK)
 
     monkeypatch.setattr(write, "_fill", fill)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from validate.cli.main import run
+from validate.commands.main import run
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.read import read_recording
 from validate.recording.merge import merge

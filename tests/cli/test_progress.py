@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 from rich.spinner import Spinner
 
-from validate.cli import progress as module
-from validate.cli.progress import Watch, drawn, progress
-from validate.replay.pace import Pace
+from validate.commands import progress as module
+from validate.commands.progress import Watch, drawn, progress
+from validate.pipeline.run.runs import Pace
 
 
 class Clock:
@@ -93,7 +93,7 @@ def test_what_is_left_of_a_road_follows_the_methods_and_their_meshes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock()
-    monkeypatch.setattr("validate.replay.pace.perf_counter", clock)
+    monkeypatch.setattr("validate.pipeline.run.runs.perf_counter", clock)
     pace = Pace(since=0.0)
     pace.expect("plain", "p1")
     pace.expect("finer", "p1", cells=8.0, steps=2.0)

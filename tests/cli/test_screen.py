@@ -12,17 +12,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report_samples import CHECK, small_result
 
-from validate.cli.check_bars import check_passages, worst_first
-from validate.cli.display import say
-from validate.cli.inspecting import _passages
-from validate.cli.recordings import _besides
-from validate.cli.run_screen import show_run
-from validate.cli.screen import LINES, Passage, bar, fitted, rows, sentences, show
+from validate.commands.display import say
+from validate.commands.inspect import _passages
+from validate.commands.recordings import _besides
+from validate.commands.run_screen import show_run
+from validate.commands.screen import (
+    LINES,
+    Passage,
+    check_passages,
+    fitted,
+    rows,
+    sentences,
+    show,
+    worst_first,
+)
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.score import Score
 from validate.recording.preflight import Inspection, Topic
 from validate.recording.types import Recording, Source
-from validate.report.store import check_members
+from validate.report.stored.store import check_members
+from validate.report.views.bars import bar
 
 PAGE = Path("report.html")
 

@@ -5,11 +5,12 @@ from pathlib import Path
 import pytest
 from commands import here, refused
 
-from validate.cli import making, running, studying
+from validate.commands import record as making
 from validate.errors import RecordingError
-from validate.replay.experiment import Experiment
-from validate.replay.find import find
-from validate.replay.options import Options, configure
+from validate.library import run_report, studies
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import find
+from validate.pipeline.experiment.options import Options, configure
 
 
 @pytest.mark.parametrize(
@@ -45,8 +46,8 @@ def test_a_modulus_a_thousand_off_is_asked_about_wherever_it_is_set(
     def stop(*_: object, **__: object) -> None:
         raise RecordingError("stopped here")
 
-    monkeypatch.setattr(running, "compare", stop)
-    monkeypatch.setattr(studying, "study", stop)
+    monkeypatch.setattr(run_report, "compare", stop)
+    monkeypatch.setattr(studies, "study", stop)
     monkeypatch.setattr(making, "progress", stop)
     for command in (["run"], ["study", "filters"], ["record", "-o", str(tmp_path / "x.mcap")]):
         code, _, err = here(*command, "fluid_phantom", "--set", "material.E=15.2")

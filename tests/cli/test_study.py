@@ -12,13 +12,13 @@ import pytest
 from commands import here
 from study_samples import experiment_file
 
-from validate.cli import studying
-from validate.cli.arguments import BAD_INPUT
-from validate.cli.main import run
-from validate.replay.find import load_file
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.report.store import schema
+from validate.commands import study as studying
+from validate.commands.arguments import BAD_INPUT
+from validate.commands.main import run
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
+from validate.report.stored.store import schema
 
 SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")
 CELLS = 6 + 4  # of the sweep, and two baselines for each of two noises
@@ -97,7 +97,7 @@ def test_a_finished_study_is_not_run_again(
     made: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(made)
-    monkeypatch.setattr("validate.study.cluster._client", None)  # no cluster is started
+    monkeypatch.setattr("validate.engine.cluster.connected", None)  # no cluster is started
     file = str(made / "experiments" / "pulled.py")
     assert run(["study", "filters", file, *SWEEPS, "--seeds", "3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["study"]
@@ -108,7 +108,7 @@ def test_bad_input_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("validate.study.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("validate.engine.cluster.CONNECT_S", 0.5)
     file = str(experiment_file(tmp_path))
     for arguments, said in (
         (["--sweep", "methods.kf.QQ=1,2"], "nearest: kf.Q"),
@@ -141,18 +141,14 @@ def test_a_ranking_is_one_screen_with_nis_times_and_front(tmp_path: Path) -> Non
 
 
 def test_a_filter_outside_its_band_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
-    def row(r: str, by: str) -> tuple[object, ...]:
+    def row(r: str) -> tuple[object, ...]:
         verdict = {"sound": "consistent", "sure": "overconfident: interval not used"}[r]
         front = {"sound": "front", "sure": "#1 beats"}[r]
         return (1, r, "", 0.1, 0.01, "", None, None, "", 2.5, verdict, None, 1.0, 2.0, None, front)
 
-    monkeypatch.setattr(studying, "ranking_row", row)
-    monkeypatch.setattr(studying, "ranking_head", lambda unit: ("", "", "", "error / mm"))
-
-    class Cell(str):
-        cell = SimpleNamespace(settings={})
-
-    ranking = SimpleNamespace(rows=[Cell("sound"), Cell("sure")])
+    made = SimpleNamespace(headings=("", "", "", "error / mm"), rows=(row("sound"), row("sure")))
+    monkeypatch.setattr(studying, "ranking_table", lambda study, ranking, name: made)
+    ranking = SimpleNamespace(rows=[SimpleNamespace(cell=SimpleNamespace(settings={}))])
     found = SimpleNamespace(unit="m", by="all.rmse")
     _, sound, sure = studying._places(ranking, found)  # type: ignore[arg-type]
     assert ("!" in sound, sound.endswith("*")) == (False, True)

@@ -72,7 +72,7 @@ def test_every_shipped_recording_is_found(installed: Path, tmp_path: Path) -> No
 import sys, validate
 from pathlib import Path
 from validate.catalogue import experiment_files
-from validate.replay.find import load_file
+from validate.pipeline.experiment.find import load_file
 print(validate.__file__)
 for path in experiment_files(Path.cwd()).values():
     e = load_file(path)

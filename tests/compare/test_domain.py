@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.compare.domain import domains, hencky
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.mesh import Mesh, quadratic
 
 

@@ -5,12 +5,16 @@ import pytest
 from field_oracles import weighted_nodal_sum
 
 from validate.arrays import Floats
-from validate.compare.field_norms import relative_energy_norm, relative_l2_norm, relative_nodal_norm
-from validate.compare.interior_error import mean_distance
-from validate.compare.pair import Field, FieldPair, pair
-from validate.compare.two_fields import compare_fields
-from validate.fem.assemble import mass
-from validate.scene.box import box, grid
+from validate.compare.shapes.pair import Field, FieldPair, pair
+from validate.compare.shapes.two_fields import (
+    compare_fields,
+    mean_distance,
+    relative_energy_norm,
+    relative_l2_norm,
+    relative_nodal_norm,
+)
+from validate.fem.assembly.assemble import mass
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from validate.arrays import Floats
-from validate.compare.held_force import HeldForce
+from validate.compare.force_error import HeldForce
 from validate.errors import ComparisonError
-from validate.solve.extrapolate import between_answers
+from validate.solve.haptic.loop import between_answers
 
 K, A, H = 300.0, 0.01, 1e-3
 

@@ -23,14 +23,14 @@ from validate.compare.score import (
     scores_of,
 )
 from validate.errors import ComparisonError
-from validate.fem.locate import nearest_node_rows
-from validate.register.markers import MarkerObservation, Together
+from validate.fem.assembly.locate import nearest_node_rows
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Selection
-from validate.register.outlines import Corner, OutlineObservation
-from validate.register.plane import cavity_sampler
+from validate.register.outlines.outlines import Corner, OutlineObservation
+from validate.register.outlines.plane import cavity_sampler
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.solve.fluid import ExactPressure
+from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.march import march
 from validate.solve.types import Outcome, Run
 
@@ -304,3 +304,18 @@ def test_repeats_keep_their_measured_values_only_where_all_have_them() -> None:
     assert (both.simulated, both.measured) == (None, None)
     assert stacked([known, one])[one.name].reference is None
     assert stacked([one, known])[one.name].reference is None
+
+
+def test_arrays_in_another_order_give_the_same_digits() -> None:
+    """A stored residual comes back row by row, whatever view it was cut from."""
+    turned = np.random.default_rng(3).normal(size=(3, 400)).T
+    one, other = (
+        Residual("tip", "all", x, 0.0, 0.0, "m", "of a test", reference=x)
+        for x in (turned, turned.copy(order="C"))
+    )
+    assert one.reference is not None
+    assert other.reference is not None
+    assert one.values.sum() == other.values.sum()
+    assert one.reference.sum() == other.reference.sum()
+    assert not one.reference.flags.writeable
+    assert turned.flags.writeable

@@ -4,25 +4,32 @@ import numpy as np
 import pytest
 from phantoms import grid_mesh
 
+from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.arrays import Floats
-from validate.compare.booleans import polygon, symmetric_difference
-from validate.compare.boundary import Boundary, deformed_boundary, enclosed, outline_boundary
-from validate.compare.crossing import crossings
-from validate.compare.pair import Field, pair
-from validate.compare.shape_error import (
+from validate.compare.shapes.boundary import Boundary, deformed_boundary, enclosed, outline_boundary
+from validate.compare.shapes.pair import Field, pair
+from validate.compare.shapes.shape_error import (
     Boundaries,
     _beyond_booleans,
     boundary_scores,
+    distances,
+    hausdorff,
     mean_absolute,
+    mean_surface_distance,
+    polygon,
     shell_error,
     surface_error,
+    symmetric_difference,
 )
-from validate.compare.soundness import Soundness, inverted_cells, require_comparable
-from validate.compare.surface_distance import distances, hausdorff, mean_surface_distance
-from validate.compare.two_fields import compare_fields, compared
+from validate.compare.shapes.soundness import (
+    Soundness,
+    crossings,
+    inverted_cells,
+    require_comparable,
+)
+from validate.compare.shapes.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
-from validate.papers.fluid_inclusion.square import square_with_hole
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 
 PLANE, SOLID = ((1.0, 0.8), (6, 5)), ((1.0, 0.8, 0.6), (4, 3, 3))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.compare.bias import Size, kind_of, size_of
 from validate.compare.residual import Residual
-from validate.compare.sizes import Size, kind_of, size_of
 
 
 def residual(simulated: Floats, measured: Floats, sd: float = 0.0, **more: float) -> Residual:

@@ -8,16 +8,16 @@ import jsonschema
 import numpy as np
 import pytest
 
-from validate.compare.streams import stream_uses
+from validate.compare.result import stream_uses
+from validate.pipeline import load
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal
-from validate.replay import load
-from validate.replay.experiment import Experiment
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.report.provenance import recording as section
-from validate.report.store import document, schema
+from validate.report.sections.provenance import recording as section
+from validate.report.stored.store import document, schema
 
 T = np.array([0.0, 1.0])
 RING = 0.01 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])

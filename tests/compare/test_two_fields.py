@@ -9,12 +9,12 @@ import pytest
 
 from validate.arrays import Floats
 from validate.compare.force_error import FORCE_METRICS
-from validate.compare.metric import Metric
-from validate.compare.pair import Common, Field, FieldPair, pair
-from validate.compare.shape_error import BOUNDARY_METRICS
-from validate.compare.two_fields import METRICS_OF_FIELDS, compare_fields, compared
+from validate.compare.shapes.metric import Metric
+from validate.compare.shapes.pair import Common, Field, FieldPair, pair
+from validate.compare.shapes.shape_error import BOUNDARY_METRICS
+from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compare_fields, compared
 from validate.errors import ComparisonError
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene

@@ -11,12 +11,11 @@ from threading import Thread
 import pytest
 from commands import here, refused
 
-from validate.cli import data as command
+from validate.commands import data as command
 from validate.datasets import home, registry
-from validate.datasets.bring import bring
+from validate.datasets.bring import bring, csv_of
 from validate.datasets.home import cache_folder
 from validate.datasets.registry import DataFile, DataSet
-from validate.datasets.rows import csv_of
 from validate.errors import RecordingError
 
 LOG, NOTE = b"0.0,1.0\n" * 40_000, b"as you like"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from validate.datasets import home
-from validate.datasets.home import found, whole
+from validate.datasets.home import data_path, whole
 from validate.datasets.registry import DataFile, DataSet, data_sets, named
 from validate.errors import RecordingError, UsageError
 
@@ -59,18 +59,18 @@ def test_a_set_has_all_that_is_needed_to_bring_and_to_cite_it() -> None:
 
 def test_what_is_absent_names_the_command(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as caught:
-        found(FOLDER, FILE, tmp_path / "p" / "experiments")
+        data_path(FOLDER, FILE, tmp_path / "p" / "experiments")
     assert str(caught.value) == (
         f"{FOLDER}/{FILE} is missing: `validate data get silicone-beam` downloads it "
         "(srl-ethz/diffPD_sim2real 825e7b7, MIT); or pass --set recording=FILE, or set "
         "VALIDATE_SHARED_DATA to a folder that holds it"
     )
     with pytest.raises(RecordingError, match=r"--set landmarks=FILE"):
-        found(FOLDER, FILE, tmp_path / "p" / "experiments", by="landmarks")
+        data_path(FOLDER, FILE, tmp_path / "p" / "experiments", by="landmarks")
     with pytest.raises(RecordingError, match=r"`validate data get rubber-strip` describes how to"):
-        found("markers/rubber-strip", "points3d_mm.npz", tmp_path / "p" / "experiments")
+        data_path("markers/rubber-strip", "points3d_mm.npz", tmp_path / "p" / "experiments")
     with pytest.raises(RecordingError, match=r"get skin-pads`.*--set data=FOLDER"):
-        found("force/skin-pads", None, tmp_path / "p" / "experiments")
+        data_path("force/skin-pads", None, tmp_path / "p" / "experiments")
 
 
 def test_the_named_folder_goes_first_then_the_neighbour(
@@ -78,19 +78,19 @@ def test_the_named_folder_goes_first_then_the_neighbour(
 ) -> None:
     experiments = tmp_path / "project" / "experiments"
     near = put(tmp_path / "shared" / "data" / FOLDER / FILE)
-    assert found(FOLDER, FILE, experiments) == near
-    assert found(FOLDER, None, experiments) == near.parent
+    assert data_path(FOLDER, FILE, experiments) == near
+    assert data_path(FOLDER, None, experiments) == near.parent
     monkeypatch.setenv(home.SHARED, str(tmp_path / "elsewhere"))
     with pytest.raises(RecordingError):
-        found(FOLDER, FILE, experiments)
+        data_path(FOLDER, FILE, experiments)
     there = put(tmp_path / "elsewhere" / FOLDER / FILE)
-    assert found(FOLDER, FILE, experiments) == there
+    assert data_path(FOLDER, FILE, experiments) == there
 
 
 def test_an_empty_folder_is_none(tmp_path: Path) -> None:
     (tmp_path / "shared" / "data" / FOLDER).mkdir(parents=True)
     with pytest.raises(RecordingError):
-        found(FOLDER, None, tmp_path / "project" / "experiments")
+        data_path(FOLDER, None, tmp_path / "project" / "experiments")
 
 
 def test_the_cache_counts_only_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -100,24 +100,24 @@ def test_the_cache_counts_only_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     monkeypatch.setattr(home, "named", lambda _: beam)
     monkeypatch.setenv(home.SHARED, str(tmp_path / "without"))
     path = put(home.cache_folder() / FOLDER / FILE, b"measured")
-    assert found(FOLDER, FILE, tmp_path / "p" / "experiments") == path
+    assert data_path(FOLDER, FILE, tmp_path / "p" / "experiments") == path
     with pytest.raises(RecordingError):
-        found(FOLDER, None, tmp_path / "p" / "experiments")
+        data_path(FOLDER, None, tmp_path / "p" / "experiments")
     put(path.parent / "LICENSE", b"free")
-    assert found(FOLDER, None, tmp_path / "p" / "experiments") == path.parent
+    assert data_path(FOLDER, None, tmp_path / "p" / "experiments") == path.parent
     put(path, b"Measured")
     with pytest.raises(RecordingError):
-        found(FOLDER, FILE, tmp_path / "p" / "experiments")
+        data_path(FOLDER, FILE, tmp_path / "p" / "experiments")
 
 
 def test_a_file_of_ones_own_is_taken_or_refused(tmp_path: Path) -> None:
     own = put(tmp_path / "own.c3d")
-    assert found(FOLDER, FILE, tmp_path, str(own)) == own
-    assert found(FOLDER, None, tmp_path, str(tmp_path)) == tmp_path
+    assert data_path(FOLDER, FILE, tmp_path, str(own)) == own
+    assert data_path(FOLDER, None, tmp_path, str(tmp_path)) == tmp_path
     with pytest.raises(RecordingError, match=r"^no file .*nowhere\.c3d$"):
-        found(FOLDER, FILE, tmp_path, str(tmp_path / "nowhere.c3d"))
+        data_path(FOLDER, FILE, tmp_path, str(tmp_path / "nowhere.c3d"))
     with pytest.raises(RecordingError, match=r"^no folder .*own\.c3d$"):
-        found(FOLDER, None, tmp_path, str(own))
+        data_path(FOLDER, None, tmp_path, str(own))
 
 
 def test_another_file_of_the_set_is_found_by_its_bare_name(
@@ -125,10 +125,10 @@ def test_another_file_of_the_set_is_found_by_its_bare_name(
 ) -> None:
     beside, here = tmp_path / "p" / "experiments", tmp_path / "here"
     other = put(tmp_path / "shared" / "data" / FOLDER / "other.c3d")
-    assert found(FOLDER, FILE, beside, "other.c3d") == other
+    assert data_path(FOLDER, FILE, beside, "other.c3d") == other
     here.mkdir()
     monkeypatch.chdir(here)
     put(here / "other.c3d")
-    assert found(FOLDER, FILE, beside, "other.c3d") == Path("other.c3d")
+    assert data_path(FOLDER, FILE, beside, "other.c3d") == Path("other.c3d")
     with pytest.raises(RecordingError, match=r"^no file none\.c3d$"):
-        found(FOLDER, FILE, beside, "none.c3d")
+        data_path(FOLDER, FILE, beside, "none.c3d")

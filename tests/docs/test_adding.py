@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.guests.guest import Guest
+from validate.solve.external.scheme import Guest
 from validate.solve.march import run_scheme
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 
 
 def blocks(project_root: Path) -> list[str]:

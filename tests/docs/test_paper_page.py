@@ -8,7 +8,7 @@ import pytest
 from script_modules import module_of
 
 from validate.compare.published import Figure
-from validate.replay import load
+from validate.pipeline import load
 
 
 @pytest.fixture(scope="module")

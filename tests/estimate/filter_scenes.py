@@ -5,9 +5,9 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.estimate.measurements import Measurements
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from validate.arrays import Floats
 from validate.estimate.care import Care, care_of
 from validate.estimate.consistency import nis_consistency
-from validate.estimate.covariance import Dense
+from validate.estimate.kalman.covariance import Dense
 from validate.estimate.measurements import Measurements
 
 DT, SD_T, SD = 0.01, 0.003, 1e-4

@@ -7,22 +7,28 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cubes import case
 
 from validate.errors import ComparisonError
-from validate.estimate import filterpy_oracle
-from validate.estimate.filterpy_guest import GUESTS, FilterpyGuest, ensemble, kalman, require_shapes
-from validate.estimate.filterpy_names import drawing
-from validate.estimate.filterpy_oracle import OracleRow, oracle_table
-from validate.estimate.kalman import Gaussian
-from validate.estimate.linear_model import LinearModel
-from validate.estimate.reduced_kf import ReducedKf
-from validate.estimate.sampled_kalman import (
+from validate.estimate.filterpy import oracle as filterpy_oracle
+from validate.estimate.filterpy.filters import (
+    GUESTS,
+    FilterpyGuest,
+    ensemble,
+    kalman,
+    require_shapes,
+)
+from validate.estimate.filterpy.linear_model import LinearModel
+from validate.estimate.filterpy.names import drawing
+from validate.estimate.filterpy.oracle import OracleRow, oracle_table
+from validate.estimate.kalman.formulas import Gaussian
+from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.estimate.reduced.sampled_kalman import (
     SigmaPoints,
     enkf_update,
     ensemble_gaussian,
     ukf_predict,
 )
+from validate.testing.pulled_cube import case
 
 
 @pytest.mark.parametrize("row", oracle_table(), ids=lambda r: r.pair)

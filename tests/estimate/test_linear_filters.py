@@ -4,40 +4,51 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cubes import BELOW, CORNER, DT, PAPER, SD, SMALL, TOP, Case, case, cube
 from filterpy.kalman import KalmanFilter
 from scipy.linalg import expm, solve_discrete_are
 
 from validate.errors import SceneError
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
-from validate.estimate.covariance import Decoupled
-from validate.estimate.displacement_filter import Estimate, Structure
-from validate.estimate.gains import Claims, gain_sequence, schedule
-from validate.estimate.kalman import Gaussian, best_gain, kf_predict, kf_update
-from validate.estimate.kf_fem import KfFem, in_modes, modal_covariance
-from validate.estimate.load_scale import LoadScale, ScaleCore
+from validate.estimate.kalman.covariance import Decoupled
+from validate.estimate.kalman.displacement_filter import Estimate, Structure
+from validate.estimate.kalman.formulas import Gaussian, best_gain, kf_predict, kf_update
+from validate.estimate.kalman.gains import Claims, gain_sequence, schedule
+from validate.estimate.kalman.kf_fem import KfFem, in_modes, modal_covariance
+from validate.estimate.kalman.modal_kernel import advance, mirrored
+from validate.estimate.kalman.modal_kf import ModalKf
+from validate.estimate.kalman.observable import Spaces, observed
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.modal_kernel import advance, mirrored
-from validate.estimate.modal_kf import ModalKf
-from validate.estimate.observable import Spaces, observed
-from validate.estimate.reduced_kf import ReducedKf, _doubled, dense_covariance, steady
-from validate.estimate.reduced_linear import LoadDoubt, reduced_model
-from validate.estimate.small_state import CoreStepper
+from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
+from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
+from validate.estimate.reduced.reduced_kf import ReducedKf, _doubled, dense_covariance, steady
+from validate.estimate.reduced.small_state import CoreStepper
 from validate.fem.system import build
 from validate.scene.material import Region
 from validate.scene.scene import Drive
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.newmark_rule import propagation, rule_of
 from validate.solve.march import march
-from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import propagation, rule_of
 from validate.solve.types import Run, Stepper
+from validate.testing.pulled_cube import (
+    BELOW,
+    CORNER,
+    DT,
+    PAPER,
+    SD,
+    SMALL,
+    TOP,
+    PulledCase,
+    case,
+    cube,
+)
 
 
 @pytest.fixture(scope="module")
-def pulled() -> Case:
+def pulled() -> PulledCase:
     return case()
 
 
-def with_gaps(pulled: Case, every: int):  # type: ignore[no-untyped-def]
+def with_gaps(pulled: PulledCase, every: int):  # type: ignore[no-untyped-def]
     """Some measurements miss a component, one is missing altogether."""
     seen = pulled.measured(4, every=every)
     z = seen.z.copy()
@@ -47,7 +58,9 @@ def with_gaps(pulled: Case, every: int):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize("structure", ["white", "load"])
 @pytest.mark.parametrize("every", [1, 3])
-def test_dense_shared_and_modal_are_one_filter(pulled: Case, structure: str, every: int) -> None:
+def test_dense_shared_and_modal_are_one_filter(
+    pulled: PulledCase, structure: str, every: int
+) -> None:
     """The printed dense recursion, the same in modes, and both beforehand, to rounding."""
     seen = with_gaps(pulled, every)
     given = {"structure": structure, "settled": 0.0, "P0": 4e-9}
@@ -63,7 +76,7 @@ def test_dense_shared_and_modal_are_one_filter(pulled: Case, structure: str, eve
 
 
 @pytest.mark.parametrize("recursion", ["prior", "posterior"])
-def test_the_printed_filter_is_filterpys(pulled: Case, recursion: str) -> None:
+def test_the_printed_filter_is_filterpys(pulled: PulledCase, recursion: str) -> None:
     """filterpy's KalmanFilter on paper 001's matrices (eqs 11-14), v and a recursed beside it."""
     seen, free = pulled.measured(4), pulled.system.free
     p = propagation(pulled.system, rule_of("average", DT))
@@ -165,7 +178,7 @@ def test_gains_of_what_is_observed_are_those_of_the_whole(structure: Structure) 
         assert np.abs(short.G - long.G).max() < 1e-12 * np.abs(long.G).max()
 
 
-def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Case) -> None:
+def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: PulledCase) -> None:
     scene = pulled.system.scene
     system = build(replace(scene, material=replace(scene.material, stiffness_damping=1e-4)))
     modes = in_modes(system, rule_of("average", DT))
@@ -174,7 +187,7 @@ def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: Cas
     assert observed(whole, 60, {}) is None
 
 
-def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: Case) -> None:
+def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: PulledCase) -> None:
     """A quickly settling model: repeats from a step on, and after a gap the recursion goes on."""
     model = reduced_model(
         pulled.system, pulled.measured(1), DT, 3, LoadDoubt(0.1, 5.0), np.full(3, 1e-12)
@@ -197,7 +210,7 @@ def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: C
     assert np.abs(exact.gains[301].G - exact.gains[299].G).max() > 0
 
 
-def test_claims_walk_back_and_forth(pulled: Case) -> None:
+def test_claims_walk_back_and_forth(pulled: PulledCase) -> None:
     seen = with_gaps(pulled, 3)
     model = reduced_model(pulled.system, seen, DT, 3, LoadDoubt(0.1, 1.0), seen.sd**2).model
     covariance, when = dense_covariance(model), schedule(timetable(seen, DT))
@@ -224,7 +237,7 @@ def test_claims_walk_back_and_forth(pulled: Case) -> None:
     ],
     ids=repr,
 )
-def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: Case) -> None:
+def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: PulledCase) -> None:
     """Every kind that can share a walk, with looks missing: estimates, NIS and its degrees."""
     settings = replace(settings, settled=0.0)
     seeds = [replace(with_gaps(pulled, 2), z=with_gaps(pulled, 2).z * k) for k in (1.0, -2.0)]
@@ -245,7 +258,7 @@ def test_a_batch_is_the_filter_one_by_one(settings: KfFem | ModalKf, pulled: Cas
         assert batch.log_likelihood[i] == pytest.approx(density, rel=1e-7, abs=1e-9)
 
 
-def test_seeds_share_one_walk(pulled: Case) -> None:
+def test_seeds_share_one_walk(pulled: PulledCase) -> None:
     """A batch equals the runs one by one, and refuses another schedule."""
     stepper = ModalKf(gains="shared").prepare(pulled.system, pulled.measured(1))
     z = np.array([pulled.measured(seed).z for seed in (1, 2, 3)])
@@ -295,7 +308,7 @@ def test_truth_of_the_filters_own_model_is_consistent(
     assert states.holds
 
 
-def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: Case) -> None:
+def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: PulledCase) -> None:
     """R of 1e-12 mm^2 against noise of .001 mm^2 (an extreme)."""
     seen = pulled.measured(1)
     for settings in (KfFem(gains="every_step", R=1e-18), ModalKf(R=1e-18, Q=1e-13)):
@@ -315,7 +328,7 @@ def test_tiny_noise_keeps_the_claim_positive_and_nis_flags_it(pulled: Case) -> N
     assert "wrong model class" in found.alarm
 
 
-def test_the_reduced_model_with_all_modes_is_the_exponential(pulled: Case) -> None:
+def test_the_reduced_model_with_all_modes_is_the_exponential(pulled: PulledCase) -> None:
     """x' of all modes equals expm of the first-order system under a held force."""
     seen, free = pulled.measured(1), pulled.system.free
     reduced = reduced_model(pulled.system, seen, DT, 54, LoadDoubt(0, 0), seen.sd**2)
@@ -335,7 +348,7 @@ def test_the_reduced_model_with_all_modes_is_the_exponential(pulled: Case) -> No
     assert reduced.lift @ x == pytest.approx(state[:n], rel=1e-6, abs=1e-12)
 
 
-def test_a_load_bias_is_a_load(pulled: Case) -> None:
+def test_a_load_bias_is_a_load(pulled: PulledCase) -> None:
     seen = pulled.measured(1)
     m = reduced_model(pulled.system, seen, DT, 5, LoadDoubt(0, 0), seen.sd**2).model
     biased = m.x0.copy()
@@ -346,7 +359,7 @@ def test_a_load_bias_is_a_load(pulled: Case) -> None:
 
 
 @pytest.mark.slow
-def test_the_steady_claim_is_where_the_sequence_settles(pulled: Case) -> None:
+def test_the_steady_claim_is_where_the_sequence_settles(pulled: PulledCase) -> None:
     for every in (1, 4):
         seen = pulled.measured(1, every=every)
         m = reduced_model(pulled.system, seen, DT, 6, LoadDoubt(0.1, 1.0), seen.sd**2).model
@@ -359,7 +372,7 @@ def test_the_steady_claim_is_where_the_sequence_settles(pulled: Case) -> None:
         assert pytest.approx(m.H @ before.P @ m.H.T, rel=1e-5) == m.H @ P @ m.H.T
 
 
-def test_a_steady_filter_knows_how_often_it_measures(pulled: Case) -> None:
+def test_a_steady_filter_knows_how_often_it_measures(pulled: PulledCase) -> None:
     """At the end its claims are those that the exact sequence of gains has come to."""
     seen = pulled.measured(1, every=4)
     exact, steady = (
@@ -372,7 +385,7 @@ def test_a_steady_filter_knows_how_often_it_measures(pulled: Case) -> None:
     assert steady.sd == pytest.approx(exact.sd, rel=1e-3, abs=1e-12)
 
 
-def test_what_a_filter_cannot_do_is_refused(pulled: Case) -> None:
+def test_what_a_filter_cannot_do_is_refused(pulled: PulledCase) -> None:
     scene, seen = pulled.system.scene, pulled.measured(1)
     bare = build(replace(scene, loads=()))
     with pytest.raises(SceneError, match="0 drives and 0 loads"):
@@ -404,7 +417,7 @@ def test_a_step_of_the_load_scale_by_hand() -> None:
 
 
 def test_a_load_scales_shape_creeps_to_statics_and_swings_below_twice_critical(
-    pulled: Case,
+    pulled: PulledCase,
 ) -> None:
     """All modes creep with the stiffness damping; the shape's ratio is that times omega / 2."""
     scene, seen, free = pulled.system.scene, pulled.measured(1), pulled.system.free
@@ -425,7 +438,7 @@ def test_a_load_scales_shape_creeps_to_statics_and_swings_below_twice_critical(
     LoadScale().prepare(damped[1], seen)
 
 
-def test_regions_of_other_damping_fall_back_on_the_dense_recursion(pulled: Case) -> None:
+def test_regions_of_other_damping_fall_back_on_the_dense_recursion(pulled: PulledCase) -> None:
     scene = pulled.system.scene
     other = Region("half", np.arange(10), replace(scene.material, stiffness_damping=0.02))
     system, seen = build(replace(scene, regions=(other,))), pulled.measured(1)
@@ -438,7 +451,7 @@ def test_regions_of_other_damping_fall_back_on_the_dense_recursion(pulled: Case)
     assert shared.u == pytest.approx(dense.u, rel=1e-9, abs=1e-15)
 
 
-def test_a_wrong_modulus_is_mended_where_the_noise_model_reaches(pulled: Case) -> None:
+def test_a_wrong_modulus_is_mended_where_the_noise_model_reaches(pulled: PulledCase) -> None:
     """E 20 % too stiff, one node measured: white Q mends that node, a load-shaped one all."""
     wrong, seen = cube(1.2e4), pulled.measured(1)
     plain = pulled.march(Newmark(DT).prepare(wrong))
@@ -461,7 +474,7 @@ PAPER_TABLE = (  # Q mm^2, NRMSE of an earlier study (v, a from the prior)
 )  # fmt: skip
 
 
-def seeds_nrmse(pulled: Case, Q: float, recursion: str = "prior") -> np.ndarray:  # type: ignore[type-arg]
+def seeds_nrmse(pulled: PulledCase, Q: float, recursion: str = "prior") -> np.ndarray:  # type: ignore[type-arg]
     settings = ModalKf(Q=Q, gains="shared", recursion=recursion)  # type: ignore[arg-type]
     stepper = settings.prepare(pulled.system, pulled.measured(0))
     z = np.array([pulled.measured(seed).z for seed in range(50)])

@@ -5,19 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cubes import DT, PAPER, case, cube
 from scipy import sparse
 
 from validate.errors import ComparisonError, SceneError
-from validate.estimate.displacement_filter import load_shapes
-from validate.estimate.kalman import best_gain, innovation
-from validate.estimate.load_scale import LoadScale
+from validate.estimate.kalman.displacement_filter import load_shapes
+from validate.estimate.kalman.formulas import best_gain, innovation
 from validate.estimate.measurements import Measurements, measurements, on_steps, timetable
-from validate.fem.locate import barycentric_rows
+from validate.estimate.reduced.load_scale import LoadScale
+from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
-from validate.register.markers import MarkerObservation
+from validate.register.markers.markers import MarkerObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
+from validate.testing.pulled_cube import DT, PAPER, case, cube
 
 
 def test_measurements_land_on_the_nearest_step() -> None:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cubes import DT, PAPER, SMALL, TOP, Case, case, cube
 from filter_scenes import CENTRE, at_nodes, plain, ramp, unmeasured
 from filter_scenes import cube as explicit_cube
 from filter_scenes import run as explicit_run
@@ -15,27 +14,26 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.estimate import members
 from validate.estimate.consistency import nis_consistency
-from validate.estimate.doubtful import doubts, parts
-from validate.estimate.ensemble_kf import EnsembleKf, reached
-from validate.estimate.filterpy_names import UnscentedKalmanFilter
-from validate.estimate.kalman import Gaussian, kf_predict, kf_update
-from validate.estimate.localisation import along_mesh, gaspari_cohn
+from validate.estimate.ensemble import members
+from validate.estimate.ensemble.ensemble_kf import EnsembleKf, along_mesh, gaspari_cohn, reached
+from validate.estimate.ensemble.member_filter import MemberModel, MemberStepper
+from validate.estimate.ensemble.parameters import doubts, parts
+from validate.estimate.ensemble.roukf import Roukf, reduced_update, spread, unit_points
+from validate.estimate.filterpy.names import UnscentedKalmanFilter
+from validate.estimate.kalman.formulas import Gaussian, kf_predict, kf_update
 from validate.estimate.measurements import Measurements
-from validate.estimate.member_filter import MemberModel, MemberStepper
-from validate.estimate.reduced_unscented import reduced_update, spread, unit_points
-from validate.estimate.roukf import Roukf
-from validate.estimate.sampled_kalman import Reach, ensemble_update
-from validate.fem.assemble import stiffness
+from validate.estimate.reduced.sampled_kalman import Reach, ensemble_update
+from validate.fem.assembly.assemble import stiffness
 from validate.fem.critical import critical_step
 from validate.fem.system import System, build
-from validate.scene.box import box, centroids
+from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Region
 from validate.scene.scene import Foundation
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import march
-from validate.solve.newmark import Newmark
 from validate.solve.types import Outcome, Run
+from validate.testing.pulled_cube import DT, PAPER, SMALL, TOP, PulledCase, case, cube
 
 # --- sigma points ---------------------------------------------------------------------------------
 
@@ -225,15 +223,15 @@ def in_regions(contrast: float = 1.0, springs: float = 0.0, shape: tuple = SMALL
     return build(changed)
 
 
-def truth(system: System, steps: int, f: float = 0.048, **settings: str) -> Case:
+def truth(system: System, steps: int, f: float = 0.048, **settings: str) -> PulledCase:
     inputs = np.full((steps, 1), f)
     t = DT * np.arange(1, steps + 1)
     fem = Newmark(DT, **settings)  # type: ignore[arg-type]
     run = march("fem", fem.prepare(system), t, inputs, np.array([steps - 1]), 0.0)
-    return Case(system, inputs, run)
+    return PulledCase(system, inputs, run)
 
 
-def both_nodes(pulled: Case, sd: float) -> Measurements:
+def both_nodes(pulled: PulledCase, sd: float) -> Measurements:
     """The top node and the one below."""
     top, rng = pulled.measured(1, sd=sd), np.random.default_rng(2)
     low = pulled.probe("below") + sd * rng.normal(size=(len(pulled.t), 3))

@@ -10,10 +10,10 @@ from filterpy.kalman import ExtendedKalmanFilter
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, SceneError, UsageError
+from validate.estimate.extended.kernels import HUGE, clip
+from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.measurements import Measurements
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.node_ekf_kernel import HUGE, clip
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.scene import Drive, Support
 

@@ -12,11 +12,10 @@ from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate import reduced_ekf
-from validate.estimate.explicit_step import explicit_step
+from validate.estimate.extended.explicit_step import explicit_step
 from validate.estimate.measurements import Measurements
-from validate.estimate.reduced_basis import modes, pod
-from validate.estimate.reduced_ekf import ReducedEKF, shapes_covariance
+from validate.estimate.reduced import reduced_ekf
+from validate.estimate.reduced.reduced_ekf import ReducedEKF, modes, pod, shapes_covariance
 from validate.fem.system import System
 
 H = 2e-4  # s

@@ -6,24 +6,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cubes import DT, Case, case
 from filter_scenes import CENTRE, at_nodes, cube, plain, ramp, run
 from filterpy.kalman import KalmanFilter
 
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.estimate.consistency import nees_consistency
-from validate.estimate.covariance import Dense
-from validate.estimate.explicit_filter import ExplicitFilterStepper
-from validate.estimate.filterpy_guest import FilterpyGuest
+from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
+from validate.estimate.filterpy.filters import FilterpyGuest
 from validate.estimate.filters import FILTERS, Filter
-from validate.estimate.kf_fem import KfFem
-from validate.estimate.load_scale import LoadScale, ScaleCore
-from validate.estimate.modal_kf import ModalKf
-from validate.estimate.reduced_ekf import ReducedEKF, ShapesCore
-from validate.estimate.reduced_kf import ReducedKf, dense_covariance
-from validate.estimate.reduced_linear import LoadDoubt, reduced_model
+from validate.estimate.kalman.covariance import Dense
+from validate.estimate.kalman.kf_fem import KfFem
+from validate.estimate.kalman.modal_kf import ModalKf
+from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
+from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
+from validate.estimate.reduced.reduced_ekf import ReducedEKF, ShapesCore
+from validate.estimate.reduced.reduced_kf import ReducedKf, dense_covariance
 from validate.estimate.smoother import Look, Note, Smoothed, smoothed
+from validate.testing.pulled_cube import DT, PulledCase, case
 
 LINEAR: tuple[Any, ...] = (
     KfFem(),
@@ -40,7 +40,7 @@ LINEAR: tuple[Any, ...] = (
 
 
 @pytest.fixture(scope="module")
-def pulled() -> Case:
+def pulled() -> PulledCase:
     return case()
 
 
@@ -185,7 +185,9 @@ FRAMES = (9, 30, 45, 58, 59)
 
 
 @pytest.mark.parametrize("settings", LINEAR, ids=repr)
-def test_a_smoothed_run_knows_more_and_ends_like_the_filter(settings: Filter, pulled: Case) -> None:
+def test_a_smoothed_run_knows_more_and_ends_like_the_filter(
+    settings: Filter, pulled: PulledCase
+) -> None:
     seen = pulled.measured(1, every=3)
     late = replace(settings, smooth=True)  # type: ignore[type-var]
     one, two = (pulled.march(s.prepare(pulled.system, seen), at=FRAMES) for s in (settings, late))
@@ -203,7 +205,7 @@ def test_a_smoothed_run_knows_more_and_ends_like_the_filter(settings: Filter, pu
         assert np.array_equal(two.traces[name].y, one.traces[name].y)
 
 
-def test_coordinates_and_gains_beforehand_change_nothing(pulled: Case) -> None:
+def test_coordinates_and_gains_beforehand_change_nothing(pulled: PulledCase) -> None:
     seen = pulled.measured(1, every=3)
     runs = [
         pulled.march(s.prepare(pulled.system, seen), at=FRAMES)
@@ -219,7 +221,7 @@ def test_coordinates_and_gains_beforehand_change_nothing(pulled: Case) -> None:
         assert runs[0].sd == pytest.approx(other.sd, rel=1e-6, abs=1e-13)
 
 
-def test_a_reduced_run_is_the_posterior_of_its_model(pulled: Case) -> None:
+def test_a_reduced_run_is_the_posterior_of_its_model(pulled: PulledCase) -> None:
     seen = pulled.measured(1, every=2)
     settings = ReducedKf(modes=4, load_walk=2.0, settled=0.0)
     late = replace(settings, smooth=True)
@@ -277,7 +279,7 @@ def test_a_nonlinear_run_is_the_posterior_of_its_linearisation(substeps: int) ->
     assert found.sd.reshape(24, -1) == pytest.approx(sd, rel=1e-4, abs=1e-6 * sd.max())
 
 
-def test_a_gated_run_is_smoothed_without_its_outlier(pulled: Case) -> None:
+def test_a_gated_run_is_smoothed_without_its_outlier(pulled: PulledCase) -> None:
     seen = pulled.two_measured(1)
     z, gone = seen.z.copy(), seen.z.copy()
     z[20, 4] += 1.0
@@ -307,12 +309,12 @@ def test_a_large_strain_run_is_nearer_to_the_truth() -> None:
     assert error[True] < 0.8 * error[False]
 
 
-def test_a_steady_gain_is_refused(pulled: Case) -> None:
+def test_a_steady_gain_is_refused(pulled: PulledCase) -> None:
     with pytest.raises(UsageError, match="smooth needs the exact gains"):
         ReducedKf(gains="steady", smooth=True).prepare(pulled.system, pulled.measured(1))
 
 
-def test_a_guest_is_smoothed_as_our_own_filter_and_another_is_refused(pulled: Case) -> None:
+def test_a_guest_is_smoothed_as_our_own_filter_and_another_is_refused(pulled: PulledCase) -> None:
     seen = pulled.measured(1, every=3)
     ours, guest = (
         pulled.march(s.prepare(pulled.system, seen), at=FRAMES)

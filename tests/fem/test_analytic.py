@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats, Ints
 from validate.fem.system import build
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene

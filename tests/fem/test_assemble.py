@@ -20,7 +20,7 @@ from skfem import (
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from validate.errors import SceneError
-from validate.fem.assemble import (
+from validate.fem.assembly.assemble import (
     _renumbered,
     _require_node_major,
     divergence,
@@ -28,7 +28,7 @@ from validate.fem.assemble import (
     shape_gradients,
     stiffness,
 )
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
 from validate.scene.scene import Dilatation, Scene

@@ -17,15 +17,15 @@ from skfem import (
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
+from experiments.bending_rod.body import GRAVITY, bending_rod
+from experiments.needle_block.body import needle_block
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import mass, shape_gradients, stiffness, stiffness_damping
-from validate.fem.loads import facet_integrals
-from validate.fem.locate import barycentric_rows
+from validate.fem.assembly.assemble import mass, shape_gradients, stiffness, stiffness_damping
+from validate.fem.assembly.loads import facet_integrals
+from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
-from validate.papers.accuracy.needle import needle_block
-from validate.papers.accuracy.rod import GRAVITY, bending_rod
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Pin, PlaneState, Scene, Support, Weight

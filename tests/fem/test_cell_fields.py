@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from validate.fem.cell_fields import cell_fields
-from validate.scene.box import grid
+from validate.fem.assembly.cell_fields import cell_fields
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene

@@ -11,15 +11,15 @@ from field_oracles import frequency_range
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem import critical as module
-from validate.fem import explicit
 from validate.fem.critical import (
     critical_step,
     element_frequencies,
     lanczos_step,
 )
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain import explicit
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
 from validate.scene.scene import Scene, Support

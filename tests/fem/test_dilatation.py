@@ -5,7 +5,7 @@ import pytest
 from phantoms import COARSE_GRID, grid_mesh, phantom_responses
 from scipy.sparse.linalg import spsolve
 
-from validate.fem.assemble import stiffness
+from validate.fem.assembly.assemble import stiffness
 from validate.fem.system import Responses
 from validate.scene.material import Material
 from validate.scene.scene import Dilatation, Scene

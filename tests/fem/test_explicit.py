@@ -9,12 +9,12 @@ from scipy import sparse
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.explicit import ExplicitBody
-from validate.fem.hyperelastic import Body
-from validate.fem.kernel_tensors import inverse_cube_root
-from validate.fem.law_kernels import principal
+from validate.fem.kernels.laws import principal
+from validate.fem.kernels.tensors import inverse_cube_root
+from validate.fem.large_strain.explicit import ExplicitBody
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.rubber import ogden

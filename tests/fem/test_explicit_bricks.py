@@ -9,15 +9,15 @@ from test_mixed_cells import bent, skewed
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.explicit import ExplicitBody
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.explicit import ExplicitBody
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import march
 from validate.solve.types import Scheme
 

@@ -11,11 +11,10 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from validate.errors import SceneError
-from validate.fem import factor
-from validate.fem.assemble import stiffness
-from validate.fem.factor import Factor, factorise
-from validate.fem.frontal import Fronts
-from validate.fem.ordering import nested_dissection
+from validate.fem.assembly.assemble import stiffness
+from validate.fem.linear_solvers import factor
+from validate.fem.linear_solvers.factor import Factor, factorise, nested_dissection
+from validate.fem.linear_solvers.frontal import Fronts
 from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support

@@ -10,12 +10,10 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_scene
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness
-from validate.fem.cavity import cavity_surface, pressure_load, volume_of
-from validate.fem.follower import volume_hessian
-from validate.fem.hyperelastic import Body
-from validate.fem.laws import SaintVenantKirchhoff, law_of
-from validate.fem.neo_hooke import NeoHooke
+from validate.fem.assembly.assemble import stiffness
+from validate.fem.cavity import cavity_surface, pressure_load, volume_hessian, volume_of
+from validate.fem.large_strain.hyperelastic import Body
+from validate.fem.laws.law import NeoHooke, SaintVenantKirchhoff, law_of
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Dilatation, Foundation, Membrane, Scene

@@ -8,9 +8,9 @@ from law_samples import NAMES, sample
 from phantoms import grid_mesh
 
 from validate.arrays import Floats
-from validate.fem.factor import elimination_order, factorise_indefinite
-from validate.fem.hyperelastic import Body
-from validate.fem.laws import Law, law_of
+from validate.fem.large_strain.hyperelastic import Body
+from validate.fem.laws.law import Law, law_of
+from validate.fem.linear_solvers.factor import elimination_order, factorise_indefinite
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.scene import Dilatation, Scene
 from validate.scene.shape_functions import EDGES

@@ -7,22 +7,22 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import mean_divergence
-from validate.fem.cells import rule, values_at, volumes_at
-from validate.fem.hyperelastic import Body
-from validate.fem.incompressible import keep_volumes
-from validate.fem.mixed import mixed_static
+from validate.fem.assembly.assemble import mean_divergence
+from validate.fem.assembly.cells import rule, values_at, volumes_at
+from validate.fem.assembly.incompressible import keep_volumes
+from validate.fem.assembly.mixed import mixed_static
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material, Region
-from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import Mesh, quadratic
+from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Drive, Load, Scene, Support
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
 
 E = 3000.0  # Pa
 MU = E / 3

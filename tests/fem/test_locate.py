@@ -5,16 +5,16 @@ import pytest
 from phantoms import CAPSULE, COARSE_GRID, grid_mesh, phantom_mesh
 
 from validate.errors import RegistrationError
-from validate.fem.feet import nearest_on_surface
-from validate.fem.locate import (
+from validate.fem.assembly.locate import (
     barycentric_rows,
     facet_samples,
     nearest_node_rows,
+    nearest_on_surface,
     probe_rows,
     require_inside,
     standing_rows,
 )
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Probe
 

@@ -8,11 +8,11 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness
-from validate.fem.loads import facet_integrals
+from validate.fem.assembly.assemble import stiffness
+from validate.fem.assembly.loads import facet_integrals
 from validate.fem.locking import locking_notes
 from validate.fem.system import System, build
-from validate.scene.box import box, centroids
+from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Load, Scene, Support, Weight

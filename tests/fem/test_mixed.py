@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from experiments.bending_rod.body import GRAVITY, bending_rod
+from experiments.needle_block.body import MP2, needle_block
 from validate.errors import SceneError
-from validate.fem import mixed
+from validate.fem.assembly import mixed
+from validate.fem.assembly.mixed import mixed_static
 from validate.fem.locking import locking_notes
-from validate.fem.mixed import mixed_static
 from validate.fem.system import build
-from validate.papers.accuracy.needle import MP2, needle_block
-from validate.papers.accuracy.rod import GRAVITY, bending_rod
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Load, Mass, Membrane, Pin, Scene, Support

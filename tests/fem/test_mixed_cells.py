@@ -10,13 +10,13 @@ from test_hyperelastic import turn
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness, stiffness_points
-from validate.fem.cells import rule, values_at, volumes_at
-from validate.fem.hyperelastic import Body
-from validate.fem.laws import law_of
-from validate.fem.mean_dilatation import projections
+from validate.fem.assembly.assemble import stiffness, stiffness_points
+from validate.fem.assembly.cells import rule, values_at, volumes_at
+from validate.fem.assembly.mean_dilatation import projections
+from validate.fem.large_strain.hyperelastic import Body
+from validate.fem.laws.law import law_of
 from validate.fem.system import build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName, Material, Region
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Dilatation, Load, Scene, Support

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from phantoms import grid_mesh
 
-from validate.fem.once import once
-from validate.fem.system import build
+from validate.fem.system import build, once
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
 

@@ -11,7 +11,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene, Support

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface, pressure_load, volume_of
 from validate.fem.system import Responses, build, responses
-from validate.papers.fluid_inclusion.square import square_with_hole
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Cavity, Drive, Scene, Support
-from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
+from validate.solve.fluid.pressure_curve import pressure_at_volume, tuned_gain
 
 
 def block(n: int, order: int = 1) -> Responses:

@@ -9,17 +9,16 @@ from law_samples import NAMES, sample
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import stiffness
-from validate.fem.hyperelastic import Body
-from validate.scene.box import box, grid
-from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
+from validate.fem.assembly.assemble import stiffness
+from validate.fem.large_strain.hyperelastic import Body
+from validate.scene.geometries.box import box, grid
+from validate.scene.material import Material, Prony
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.prony import Prony
+from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Drive, PlaneState, Scene, Support
 from validate.solve.march import run_scheme
-from validate.solve.newton import StaticNewton
-from validate.solve.stretch_test import StretchTest
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.stretch_test import StretchTest
 
 SIZE, THICKNESS = (0.03, 0.02), 0.002
 MESHES = {

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.loads import load_columns
+from validate.fem.assembly.loads import load_columns
 from validate.fem.system import build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.named_place import place_of
+from validate.scene.places import OnPlane, place_of
 from validate.scene.scene import Pressure, Scene, Support
-from validate.scene.select import OnPlane
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 
 SIZE = (0.03, 0.02, 0.01)
 SOFT = Material(20e3, 0.3)

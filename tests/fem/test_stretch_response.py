@@ -5,10 +5,10 @@ import pytest
 from law_samples import NAMES, sample
 
 from validate.errors import SceneError
-from validate.fem.laws import law_of
-from validate.fem.stretch_response import response
+from validate.fem.laws.law import law_of
+from validate.fem.laws.stretch_response import response
 from validate.scene.material import LawName, Material
-from validate.scene.material_point import MaterialPoint, StretchMode
+from validate.scene.meshless import MaterialPoint, StretchMode
 from validate.scene.rubber import mooney_rivlin, ogden
 
 E, NU = 12_000.0, 0.4

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from validate.fem import threads
-from validate.fem.threads import Team, ThreadChoice, candidates, chosen, idle_of, pilot
+from validate.fem.kernels import threads
+from validate.fem.kernels.threads import Team, ThreadChoice, candidates, chosen, idle_of, pilot
 
 US = 1e-6
 

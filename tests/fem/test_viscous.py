@@ -8,13 +8,12 @@ from law_samples import SPLIT, sample
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.laws import law_of, parts_of, stiffened
-from validate.fem.stretch_response import response
-from validate.fem.viscous import Lagged, branches_of, second_stress
+from validate.fem.laws.law import law_of, parts_of, stiffened
+from validate.fem.laws.stretch_response import response
+from validate.fem.laws.viscous import Lagged, branches_of, second_stress
 from validate.scene.laws import Coefficients
-from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint, StretchMode
-from validate.scene.prony import Prony
+from validate.scene.material import Material, Prony
+from validate.scene.meshless import MaterialPoint, StretchMode
 
 LAWS = [n for n in SPLIT if n != "svk"]
 SERIES = Prony((0.8, 0.4), (0.05, 1.0))

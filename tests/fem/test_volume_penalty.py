@@ -8,10 +8,10 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assemble import divergence, stiffness
+from validate.fem.assembly.assemble import divergence, stiffness
+from validate.fem.large_strain.volume_penalty import Normals, volume_penalty
 from validate.fem.system import build
-from validate.fem.volume_penalty import Normals, volume_penalty
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene, Support

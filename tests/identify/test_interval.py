@@ -5,7 +5,7 @@ import pytest
 
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.identify.interval import mesh_share, profile_interval
+from validate.identify.profile import mesh_share, profile_interval
 
 
 def test_a_parabola_gives_its_minimum_and_two_standard_deviations() -> None:

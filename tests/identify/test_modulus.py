@@ -23,7 +23,7 @@ from validate.identify.modulus import (
     loading,
     summarise,
 )
-from validate.recording.exports.instron import read_instron
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording, Signal, Source
 
 DISC = CylinderSize(0.05, 0.03)

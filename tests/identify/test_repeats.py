@@ -9,22 +9,22 @@ import openpyxl
 import pytest
 from machine_logs import pressed_cylinder
 
-from validate.cli.main import run
+from validate.commands.main import run
 from validate.compare.verdict import Accept
 from validate.errors import RecordingError, UsageError
+from validate.identify.budget import by_specimen
 from validate.identify.repeats import averaged, labels_of
-from validate.identify.votes import by_specimen
-from validate.recording.exports.instron import read_instron
-from validate.recording.formats.text_rows import ASSUMED
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.plates.choices import Compression
+from validate.pipeline.plates.compression import compression
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.scatter import REPEATS, SHARE, repeats_share
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 from validate.register.signals import validating
-from validate.replay.compression import compression
-from validate.replay.compression_cards import Compression
-from validate.replay.method import Method
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 
 T = np.arange(60) / 10
 D = 0.05 * np.arange(60)  # mm

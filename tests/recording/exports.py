@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.recording.exports.instron import read_instron
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
 T = np.arange(40) / 10  # s

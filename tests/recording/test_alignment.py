@@ -9,8 +9,8 @@ import pytest
 from mcap_samples import sample_recording
 
 from validate.errors import RecordingError
-from validate.recording import lag
-from validate.recording.alignment import (
+from validate.recording.clocks import lag
+from validate.recording.clocks.alignment import (
     Offset,
     declared_offset,
     matched,
@@ -18,8 +18,8 @@ from validate.recording.alignment import (
     rebased,
     shift,
 )
-from validate.recording.events import event_time, offset_by_event
-from validate.recording.lag import _only_peak, refined_lag
+from validate.recording.clocks.events import event_time, offset_by_event
+from validate.recording.clocks.lag import _only_peak, refined_lag
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording

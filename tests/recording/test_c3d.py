@@ -11,8 +11,9 @@ import pytest
 from validate.child_process import python
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart, c3d
-from validate.recording.formats.c3d import _require_whole, read_c3d
+from validate.recording.formats import apart
+from validate.recording.motion_capture import c3d
+from validate.recording.motion_capture.c3d import _require_whole, read_c3d
 
 GRAVITY = Path("markers/silicone-beam/beam_gravity_V2_b.c3d")
 
@@ -145,7 +146,7 @@ def test_a_forged_number_of_values_is_told_before_any_library_reads_it(
     at = raw.index(name) + len(name) + 3
     raw[at : at + 8] = bytes([7, *[255] * 7])
     path.write_bytes(raw)
-    monkeypatch.setattr("validate.recording.formats.c3d.decoded", None)
+    monkeypatch.setattr("validate.recording.motion_capture.c3d.decoded", None)
     with pytest.raises(RecordingError, match=rf"'{name.decode()}' declares 7\.01e\+16 values"):
         read_c3d(path, {})
 
@@ -329,4 +330,4 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     monkeypatch.setattr(apart, "_LOADING", 0)
     monkeypatch.setattr(apart, "_SHARED", 0)
     with pytest.raises(RecordingError, match="file: its reader was stopped after 0 s for 7 bytes"):
-        apart.decoded("c3d_arrays", tmp_path / "file")
+        apart.decoded("validate.recording.motion_capture.c3d_arrays", tmp_path / "file")

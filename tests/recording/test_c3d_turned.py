@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.formats.c3d import read_c3d
+from validate.recording.motion_capture.c3d import read_c3d
 
 SCALE, RATE, SGI, INTEL = 0.05, 60.0, 86, 84
 GAIN, OFFSET = 0.25, 100  # of the analog channel

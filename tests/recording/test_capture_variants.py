@@ -9,9 +9,9 @@ import pytest
 from commands import here
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.optitrack import read_optitrack
-from validate.recording.formats.qualisys import read_qualisys
-from validate.recording.formats.vicon import read_vicon
+from validate.recording.motion_capture.optitrack import read_optitrack
+from validate.recording.motion_capture.qualisys import read_qualisys
+from validate.recording.motion_capture.vicon import read_vicon
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
 

@@ -10,13 +10,19 @@ import scipy.io
 from script_modules import module_of
 
 from validate.errors import RecordingError
-from validate.recording.images import followed
-from validate.recording.images.closed_path import closed_path
-from validate.recording.images.outline import Outline, _fitted, extract_outline, outlines_of
-from validate.recording.images.polar import Grey, speckle_area
-from validate.recording.images.shapes import circle_points, ellipse_points, off_curve
+from validate.recording.outlines import followed
+from validate.recording.outlines.outline import (
+    Outline,
+    _fitted,
+    circle_points,
+    ellipse_points,
+    extract_outline,
+    off_curve,
+    outlines_of,
+)
+from validate.recording.outlines.polar import Grey, closed_path, speckle_area
 from validate.recording.types import Frames
-from validate.register.outline_geometry import normal_distances
+from validate.register.outlines.distances import normal_distances
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
 PX = (1e-4, 1e-4)

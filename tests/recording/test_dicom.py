@@ -11,8 +11,10 @@ from children import lacking
 
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart, dicom, dicom_arrays, dicom_files
-from validate.recording.formats.dicom import read_dicom
+from validate.recording.formats import apart
+from validate.recording.images import dicom, dicom_arrays
+from validate.recording.images import dicom as dicom_files
+from validate.recording.images.dicom import read_dicom
 from validate.recording.readers import recognised
 
 data_store = pytest.importorskip("data_store", reason="pydicom-data is not installed")

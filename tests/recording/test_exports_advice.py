@@ -9,7 +9,7 @@ import pytest
 from exports import D, F, T
 
 from validate.errors import ValidateError
-from validate.recording.exports.instron import read_instron
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
 _ADVICE = re.compile(r"--map ('[^']+'|[^\s;,)]+)")

@@ -7,8 +7,8 @@ import pytest
 from exports import D, F, T
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.instron import read_instron
-from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.motion_capture.text_rows import ASSUMED
+from validate.recording.tables.testing_machine import read_instron
 
 
 def log(folder: Path, names: str, *columns: np.ndarray) -> Path:

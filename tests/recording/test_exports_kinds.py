@@ -7,9 +7,10 @@ import pytest
 from exports import D, F, T, rows
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.instron import read_instron
-from validate.recording.exports.kinds import kind_of_test
-from validate.recording.exports.vocabulary import (
+from validate.recording.motion_capture.text_rows import ASSUMED
+from validate.recording.tables.direction import kind_of_test
+from validate.recording.tables.testing_machine import read_instron
+from validate.recording.tables.vocabulary import (
     COMPRESSION,
     TENSION,
     is_ideographic,
@@ -17,7 +18,6 @@ from validate.recording.exports.vocabulary import (
     tells_a_stop,
     terms,
 )
-from validate.recording.formats.text_rows import ASSUMED
 from validate.recording.types import Recording
 
 BARE = "Time (s),Displacement (mm),Load (N)\n"

@@ -7,7 +7,7 @@ import pytest
 from exports import D, F, T, assert_test, read
 
 from validate.errors import RecordingError
-from validate.recording.formats.text_rows import LEFT_OUT
+from validate.recording.motion_capture.text_rows import LEFT_OUT
 
 SIZES = "Diameter: 25 mm\nHeight: 20 mm\n"
 NAMES = "Time (s),Displacement (mm),Load (N)"

@@ -7,8 +7,8 @@ import pytest
 from exports import D, F, T, assert_test
 
 from validate.errors import UsageError
-from validate.recording.exports.instron import read_instron
-from validate.recording.formats.text_rows import LEFT_OUT
+from validate.recording.motion_capture.text_rows import LEFT_OUT
+from validate.recording.tables.testing_machine import read_instron
 
 S, G = 5 * D, 2.5 * F  # strain % of 20 mm, stress kPa on 400 mm2
 SIZES = {"area": "400mm2", "length": "20mm", "measure": "engineering"}

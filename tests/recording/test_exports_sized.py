@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.recording.exports import encoding, every, repeats, sized
-from validate.recording.exports.columns import Pick, Said
-from validate.recording.exports.instron import read_instron
-from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.readers import READERS
+from validate.recording.tables import blocks as repeats
+from validate.recording.tables import encoding, every
+from validate.recording.tables import stress as sized
+from validate.recording.tables.columns import Pick, Said
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
 E = np.linspace(0.0, 0.4, 41)  # engineering strain of the path

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.exports.instron import read_instron
+from validate.recording.tables.testing_machine import read_instron
 
 T = np.linspace(0, 10, 41)
 TABLE = np.column_stack([T, 0.5 * T, 2.5 * T])  # s, mm, N

@@ -7,8 +7,8 @@ import pytest
 from exports import D, F, T, assert_test, comma, read, rows
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.specimens import _group, column_groups
-from validate.recording.exports.table import Column, Table
+from validate.recording.tables.specimens import _group, column_groups
+from validate.recording.tables.table import Column, Table
 
 NAMES = "Time (s),Extension (mm),Load (N)\n"
 LINES = rows().splitlines(keepends=True)

@@ -16,10 +16,11 @@ from odf.text import P
 
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.exports.every import every_specimen
-from validate.recording.exports.xlsx import _chosen, _Sheet, _tests, read_sheets, read_xlsx
-from validate.recording.formats import apart, sheets_arrays, xlsx_arrays
+from validate.recording.formats import apart
 from validate.recording.readers import recognised
+from validate.recording.tables import sheets_arrays, xlsx_arrays
+from validate.recording.tables.every import every_specimen
+from validate.recording.tables.workbook import _chosen, _Sheet, _tests, read_sheets, read_xlsx
 
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
 SAMPLES = [[float(t), float(d), float(f)] for t, d, f in zip(T, D, F, strict=True)]

@@ -26,10 +26,10 @@ from validate.recording.images.image import (
 )
 from validate.recording.images.numbered import numbered
 from validate.recording.images.png_stack import read_png_stack
-from validate.recording.images.raster import coverage
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import IMAGE, SCHEMAS
 from validate.recording.mcap.write import write_recording
+from validate.recording.outlines.raster import coverage
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Contours, Frames, Markers, Recording
 

@@ -13,9 +13,9 @@ from commands import here, refused
 from mcap.writer import Writer
 
 from validate.errors import RecordingError
-from validate.recording.exports.blocks import parse_tables
-from validate.recording.images.picture import decode_picture
+from validate.recording.images.packed import decode_picture
 from validate.recording.mcap.write import write_recording
+from validate.recording.tables.blocks import parse_tables
 from validate.recording.types import Frames, Recording, Source
 
 DEEP = 100_000

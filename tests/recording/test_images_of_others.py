@@ -10,15 +10,14 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image, TiffImagePlugin
 
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.video import read_video
-from validate.recording.images import image_stack, raw, stack_arrays
-from validate.recording.images.image import MAX_SIDE
+from validate.recording.images import image_stack, stack_arrays
+from validate.recording.images import packed as raw
+from validate.recording.images.image import MAX_SIDE, shallow
 from validate.recording.images.image_stack import read_image_stack
-from validate.recording.images.levels import shallow
-from validate.recording.images.picture import decode_picture
-from validate.recording.images.raw import RawImage
+from validate.recording.images.packed import RawImage, decode_picture
+from validate.recording.images.video import read_video
 from validate.recording.readers import recognised
 
 SAID = {"m_per_px": "0.1mm", "rate": "20"}

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from validate.errors import RecordingError
-from validate.recording.exports.instron import read_instron
+from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
 REAL = [f"EF30_0T_A{i}" for i in range(1, 6)] + ["EF50_0T_A1"]

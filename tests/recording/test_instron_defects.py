@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.recording.exports.columns import _same
-from validate.recording.exports.instron import read_instron
-from validate.recording.exports.rows import fitted
+from validate.recording.tables.blocks import fitted
+from validate.recording.tables.columns import _same
+from validate.recording.tables.testing_machine import INSTRON, read_instron
 from validate.recording.types import Recording
 
 T = np.arange(60) * 0.1
@@ -202,7 +202,6 @@ def test_mapping_overrides_units_signs_columns_and_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mapping", "says"),
     [
-        ({"forse": "Load (N)"}, "did you mean 'force'"),
         ({"force": "Loat (N)"}, r"no column 'Loat \(N\)'; did you mean 'Load \(N\)'"),
         ({"force": "#9"}, "no column '#9'"),
         ({"time": "every:0"}, "expected a step with its unit"),
@@ -215,6 +214,12 @@ def test_wrong_mapping_names_the_nearest(
 ) -> None:
     with pytest.raises(UsageError, match=says):
         load(tmp_path, bare(), **mapping)
+
+
+def test_a_wrong_key_names_the_nearest(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("Time (s),Load (N)\n")
+    with pytest.raises(UsageError, match=r"--map forse=\.\.\.: no such key; did you mean 'force'"):
+        INSTRON.read(tmp_path / "log.csv", {"forse": "Load (N)"})
 
 
 def test_a_unit_of_the_wrong_kind_is_refused_in_a_mapping_too(tmp_path: Path) -> None:

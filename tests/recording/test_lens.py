@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
 from validate.recording.images import lens, lens_arrays
 from validate.recording.images.image_stack import read_image_stack

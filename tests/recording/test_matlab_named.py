@@ -12,11 +12,17 @@ import pytest
 from scipy.io import savemat
 from scipy.spatial import ConvexHull
 
-from validate.cli.main import main
+from validate.commands.main import main
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import matlab, matlab73_arrays, matlab_arrays, matlab_named
-from validate.recording.formats.matlab import read_matlab
-from validate.recording.formats.matlab_named import listing
+from validate.recording.formats import (
+    matlab,
+    matlab73_arrays,
+    matlab_arrays,
+)
+from validate.recording.formats import (
+    matlab as matlab_named,
+)
+from validate.recording.formats.matlab import listing, read_matlab
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_file
 from validate.recording.types import Markers, Signal
@@ -47,7 +53,10 @@ def new(path: Path) -> Path:
 def _here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Decoded in this process, except by the command: one of its own takes half a second."""
     if "command" not in request.node.name and "damaged" not in request.node.name:
-        homes = {"matlab_arrays": matlab_arrays, "matlab73_arrays": matlab73_arrays}
+        homes = {
+            "validate.recording.formats.matlab_arrays": matlab_arrays,
+            "validate.recording.formats.matlab73_arrays": matlab73_arrays,
+        }
         monkeypatch.setattr(matlab, "decoded", lambda name, path: homes[name].arrays(path))
 
 

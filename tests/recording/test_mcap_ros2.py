@@ -15,7 +15,7 @@ from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from validate.cli.main import main
+from validate.commands.main import main
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.types import Frames, Markers, Recording
 

@@ -13,11 +13,12 @@ from commands import here
 from engine_samples import Waited, Waiting, logged, open_folder
 from test_readers import EACH, files_of, sample
 
+from validate.engine.cell import Plan, Where
+from validate.engine.finish import finish
+from validate.pipeline.run.job import Job
 from validate.recording.reader import Reader
-from validate.report import gl
-from validate.solve.guests.ran import Limits, run_guest, words
-from validate.study.engine import finish
-from validate.study.job import Job, Plan, Where
+from validate.report.scenes import gl
+from validate.solve.external.program import Limits, run_guest, words
 
 __all__ = ["folder"]  # a fixture
 

@@ -9,9 +9,9 @@ import pytest
 from exports import F, T
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.point_table import read_point_table
-from validate.recording.formats.text_rows import rows_of
+from validate.recording.motion_capture.text_rows import rows_of
 from validate.recording.readers import recognised
+from validate.recording.tables.point_table import read_point_table
 from validate.recording.types import Markers
 
 X = np.random.default_rng(0).normal(size=(len(T), 2, 3)).round(4)  # mm

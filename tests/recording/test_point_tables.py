@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.c3d import read_c3d
-from validate.recording.formats.ndi import read_ndi
-from validate.recording.formats.optitrack import read_optitrack
-from validate.recording.formats.poses import rotations
-from validate.recording.formats.qualisys import read_qualisys
 from validate.recording.formats.slicer import read_fcsv, read_markups
-from validate.recording.formats.trc import read_trc
-from validate.recording.formats.vicon import read_vicon
+from validate.recording.motion_capture.c3d import read_c3d
+from validate.recording.motion_capture.ndi import read_ndi
+from validate.recording.motion_capture.optitrack import read_optitrack
+from validate.recording.motion_capture.poses import rotations
+from validate.recording.motion_capture.qualisys import read_qualisys
+from validate.recording.motion_capture.trc import read_trc
+from validate.recording.motion_capture.vicon import read_vicon
 from validate.recording.readers import recognised
 
 MOCAP = Path("markers/mocap")

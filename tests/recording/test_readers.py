@@ -1,4 +1,4 @@
-"""One contract over every reader: a checked recording, or one typed error of one line."""
+"""The contract of `validate.testing` over every reader, and which reader a file is given to."""
 
 import json
 import shutil
@@ -23,17 +23,19 @@ from scipy.io import savemat
 from sequences import tracked
 
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.recording.digest import digest
-from validate.recording.formats.text_rows import LEFT_OUT
 from validate.recording.images.image import encode_png
-from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.reader import Reader
-from validate.recording.readers import READERS, named, recognised
-from validate.recording.types import Recording, Signal
-
-LENGTH = 3  # bytes cut off an end: a record, a number and a chunk are incomplete without them
+from validate.recording.readers import READERS, in_order, named, recognised
+from validate.recording.types import Signal
+from validate.testing.readers import (
+    ReaderSample,
+    reader_contract,
+    refuses_a_truncated_file,
+    refuses_random_bytes,
+)
+from validate.testing.requirements import refusal
 
 
 def make_mcap(path: Path) -> None:
@@ -239,87 +241,40 @@ def sample(reader: Reader, folder: Path) -> tuple[Path, Mapping[str, str]]:
     return folder / "sample", options
 
 
-def refused(reader: Reader, path: Path, options: Mapping[str, str]) -> str:
-    with pytest.raises(ValidateError) as raised:
-        reader.read(path, options)
-    (line,) = str(raised.value).splitlines()
-    return line
-
-
 def files_of(path: Path) -> list[Path]:
     return sorted(path.iterdir()) if path.is_dir() else [path]
 
 
+SLOW = (refuses_a_truncated_file, refuses_random_bytes)
+
+
 @EACH
-def test_it_gives_a_recording_that_can_be_written(reader: Reader, tmp_path: Path) -> None:
-    path, options = sample(reader, tmp_path)
-    got = reader.read(path, options)
-    assert isinstance(got, Recording)
-    assert got.streams.keys() == got.clock.keys()
-    assert min(s.t[0] for s in got.streams.values()) == 0
-    assert got.source.path == "sample"
-    assert got.source.integrity
-    write_recording(got, tmp_path / "again.mcap")
-    assert digest(read_recording(tmp_path / "again.mcap")) == digest(got)
+@pytest.mark.parametrize(
+    "check",
+    [pytest.param(c, marks=[pytest.mark.slow] if c in SLOW else []) for c in reader_contract],
+    ids=lambda check: check.__name__,
+)
+def test_a_reader_keeps_its_contract(
+    check: Callable[[ReaderSample, Path], None], reader: Reader, tmp_path: Path
+) -> None:
+    make, options = MAKE[reader.name]
+    check(ReaderSample(reader, make, options, linewise=reader.name in LINEWISE), tmp_path)
 
 
 @EACH
 def test_it_alone_recognises_its_files(reader: Reader, tmp_path: Path) -> None:
     path, _ = sample(reader, tmp_path)
-    claimed = [r.name for r in READERS if r.recognises(path)]
+    claimed = [r.name for r in in_order() if r.recognises(path)]
     assert claimed[0] == reader.name
     assert {*claimed[1:]} <= {"points", "instron"}  # any table may be one of points, or a machine's
     assert recognised(path) is reader is named(reader.name)
-    assert reader.doc
-    assert reader.sign
-
-
-@EACH
-def test_what_is_not_there_or_of_another_kind_is_one_line(reader: Reader, tmp_path: Path) -> None:
-    path, options = sample(reader, tmp_path)
-    assert "absent" in refused(reader, tmp_path / "absent", options)
-    other = tmp_path / "other"
-    if path.is_dir():
-        other.write_bytes(b"a file")
-    else:
-        other.mkdir()
-    assert "other" in refused(reader, other, options)
-    assert not reader.recognises(other)
-    assert not reader.recognises(tmp_path / "absent")
-
-
-@EACH
-def test_an_unknown_option_is_one_line_with_its_name(reader: Reader, tmp_path: Path) -> None:
-    path, options = sample(reader, tmp_path)
-    assert "--map frobnicate=...: no such key" in refused(
-        reader, path, {**options, "frobnicate": ""}
-    )
-
-
-@EACH
-@pytest.mark.parametrize(
-    "damage", ["empty", *(pytest.param(d, marks=pytest.mark.slow) for d in ("cut", "garbage"))]
-)
-def test_damage_is_one_line_with_the_name_of_the_file(
-    reader: Reader, damage: str, tmp_path: Path
-) -> None:
-    path, options = sample(reader, tmp_path)
-    for file in files_of(path):
-        whole = file.read_bytes()
-        garbage = np.random.default_rng(len(whole)).bytes(len(whole))
-        file.write_bytes({"empty": b"", "cut": whole[:-LENGTH], "garbage": garbage}[damage])
-        if damage == "cut" and reader.name in LINEWISE:
-            assert "cut" in reader.read(path, options).metadata["provenance"][LEFT_OUT]
-        else:
-            assert file.name in refused(reader, path, options)
-        file.write_bytes(whole)
 
 
 def test_a_folder_without_images_is_no_stack(tmp_path: Path) -> None:
     path, options = sample(named("png-stack"), tmp_path)
     for file in files_of(path):
         file.unlink()
-    assert "no *.png files" in refused(named("png-stack"), path, options)
+    assert "no *.png files" in refusal(lambda: named("png-stack").read(path, options))
     assert not named("png-stack").recognises(path)
     shutil.rmtree(path)
 

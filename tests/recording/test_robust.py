@@ -13,7 +13,7 @@ from attacks import damaged
 from click.testing import CliRunner
 from test_readers import EACH, MAKE, files_of, make_c3d, make_metaimage, make_vicon, sample
 
-from validate.cli.main import cli, run
+from validate.commands.main import cli, run
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.mcap.write import write_recording
 from validate.recording.reader import Reader

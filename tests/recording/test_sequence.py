@@ -8,9 +8,9 @@ import pytest
 from sequences import images, tracked
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import metaimage, nrrd, nrrd_arrays
-from validate.recording.formats.metaimage import read_metaimage
-from validate.recording.formats.nrrd import read_nrrd
+from validate.recording.images import metaimage, nrrd, nrrd_arrays
+from validate.recording.images.metaimage import read_metaimage
+from validate.recording.images.nrrd import read_nrrd
 
 STYLUS = "markers/stylus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
 FREEHAND = "ultrasound/tracked/NwirePhantomFreehand.igs.{}"

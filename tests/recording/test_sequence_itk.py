@@ -9,8 +9,8 @@ import pytest
 from itk_files import PIXELS, call, name
 
 from validate.errors import RecordingError
-from validate.recording.formats.metaimage import read_metaimage
-from validate.recording.formats.nrrd import read_nrrd
+from validate.recording.images.metaimage import read_metaimage
+from validate.recording.images.nrrd import read_nrrd
 from validate.recording.types import Recording
 
 TOOL = re.compile(r"\w+To\w+Transform")

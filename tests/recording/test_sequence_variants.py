@@ -9,8 +9,8 @@ import pytest
 from sequences import images, tracked
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.metaimage import read_metaimage
-from validate.recording.formats.nrrd import read_nrrd
+from validate.recording.images.metaimage import read_metaimage
+from validate.recording.images.nrrd import read_nrrd
 
 KINDS = ["list", "domain", "domain", "domain"]
 DIRECTIONS = np.array([[np.nan] * 3, [0.1, 0, 0], [0, 0.2, 0], [0, 0, 1]])

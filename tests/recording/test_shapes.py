@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.recording.images.shapes import circle_points
+from validate.recording.outlines.outline import circle_points
 
 
 def test_a_part_of_a_circle_gives_the_whole() -> None:

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.recording.exports.kinds import kind_of_test
-from validate.recording.exports.signs import signs
+from validate.recording.tables.direction import kind_of_test, signs
 
 
 def pick(slope: float, sign: int | None = None) -> SimpleNamespace:

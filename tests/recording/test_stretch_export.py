@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.exports.stretch import read_stretch_stress
+from validate.recording.tables.stretch import read_stretch_stress
 
 ROWS = "1,0\n1.25,0.2\n1.5,0.31\n2,0.48\n2.5,0.7\n"
 

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from validate.recording.mcap.sums import Sums
+from validate.recording.mcap.integrity import Sums
 
 
 @pytest.mark.parametrize("sizes", [(), (0,), (5,), (9, 2**20, 9, 3 * 2**20, 1), (2**19,) * 9])

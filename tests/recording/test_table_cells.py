@@ -5,9 +5,10 @@ import re
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports import cells, geometry, stepped
-from validate.recording.exports.cells import is_data, is_row, is_unit_row
-from validate.recording.exports.columns import Said
+from validate.recording.tables import cells, geometry
+from validate.recording.tables import columns as stepped
+from validate.recording.tables.cells import is_data, is_row, is_unit_row
+from validate.recording.tables.columns import Said
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording import together as module
-from validate.recording.alignment import Offset
-from validate.recording.together import (
-    ClockDrift,
-    drift_of,
-    stretched,
-    stretched_signal,
-    with_drift,
-)
+from validate.recording import merge as module
+from validate.recording.clocks.alignment import Offset
+from validate.recording.merge import ClockDrift, drift_of, stretched, stretched_signal, with_drift
 from validate.recording.types import Recording, Signal
 
 T = np.arange(0, 20, 0.01)

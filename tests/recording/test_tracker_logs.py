@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.exports.instron import read_instron
-from validate.recording.formats.ndi import read_ndi
 from validate.recording.formats.options import length
-from validate.recording.formats.point_table import read_point_table
+from validate.recording.motion_capture.ndi import read_ndi
 from validate.recording.readers import recognised
+from validate.recording.tables.point_table import read_point_table
+from validate.recording.tables.testing_machine import read_instron
 
 POSE = "1,0,0,0,{},2,3"
 

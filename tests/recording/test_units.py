@@ -7,7 +7,7 @@ import pytest
 
 from validate import units
 from validate.errors import RecordingError
-from validate.units import in_si, is_unit, si_factor, split
+from validate.units import USUAL, in_si, is_unit, pints, si_factor, split
 
 EXACT = [
     ("N", "force", 1.0),
@@ -70,7 +70,7 @@ def test_refusal_names_unit_and_quantity(unit: str, quantity: str, says: str) ->
 
 
 def test_pint_is_imported_only_when_a_unit_is_read() -> None:
-    code = "import sys, validate.recording.exports.instron; print('pint' in sys.modules)"
+    code = "import sys, validate.recording.tables.testing_machine; print('pint' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
 
@@ -123,3 +123,8 @@ def test_a_unit_that_nobody_stated_is_itself_alone() -> None:
 def test_a_quantity_that_is_none_is_an_error_of_ours() -> None:
     with pytest.raises(ValueError, match=r"quantity 'taste' is none of \['area', "):
         units._factor("mm", "taste")
+
+
+@pytest.mark.parametrize("pair", USUAL)
+def test_usual_factors_are_those_of_the_library(pair: tuple[str, str]) -> None:
+    assert USUAL[pair] == pints(*pair)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import video, video_arrays
-from validate.recording.formats.video import VIDEO, read_video
+from validate.recording.images import video, video_arrays
+from validate.recording.images.video import VIDEO, read_video
 
 UNEVEN = (0, 40, 80, 200, 230, 330, 500)  # ms
 SCALE = {"m_per_px": "0.1mm"}

@@ -6,13 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
-from validate.register import anisotropic
-from validate.register.anisotropic import covariance_of, fit_weighted, weighted_covariance
-from validate.register.fitting import MarkerFit
-from validate.register.markers import observe_markers
-from validate.register.measures import target_covariance
-from validate.register.transform import Similarity, fit_rigid
-from validate.scene.box import box
+from validate.register.markers import anisotropic
+from validate.register.markers.anisotropic import covariance_of, fit_weighted, weighted_covariance
+from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.markers import observe_markers
+from validate.register.markers.measures import target_covariance
+from validate.register.markers.transform import Similarity, fit_rigid
+from validate.scene.geometries.box import box
 
 RNG = np.random.default_rng(5)
 Y = RNG.uniform(-0.03, 0.03, (12, 3))

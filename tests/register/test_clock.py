@@ -7,16 +7,16 @@ import pytest
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError
-from validate.fem.locate import nearest_node_rows
-from validate.recording.alignment import Offset, shift
+from validate.fem.assembly.locate import nearest_node_rows
+from validate.recording.clocks.alignment import Offset, shift
 from validate.recording.types import Recording, Signal, Source
-from validate.register.clock import clock_sd, interpolated, slopes
-from validate.register.markers import MarkerObservation, Together
+from validate.register.clocks import clock_sd, interpolated, slopes
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import EVERYTHING, Selection
-from validate.register.outlines import Corner, OutlineObservation
+from validate.register.outlines.outlines import Corner, OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving, validating
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
 T = np.linspace(0.0, 2.0, 21)

@@ -12,22 +12,21 @@ import pytest
 from validate import register
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
-from validate.fem.locate import barycentric_rows
+from validate.fem.assembly.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
-from validate.register import from_rest as from_rest_module
-from validate.register.digitised import Digitised, TouchedLandmarks
-from validate.register.displacements import DisplacementObservation
 from validate.register.draws import Draw, Exact, from_rest, shifted
-from validate.register.dwell import Dwell
-from validate.register.landmarks import Match
-from validate.register.markers import MarkerObservation, Together, observe_markers
+from validate.register.markers import from_rest as from_rest_module
+from validate.register.markers.displacements import DisplacementObservation
+from validate.register.markers.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import EVERYTHING, Observation, Selection, field_at
-from validate.register.outline_geometry import normals, polar_angles, ray_points
-from validate.register.outlines import OutlineObservation, observe_outlines
-from validate.register.round_outlines import RoundOutlines
+from validate.register.outlines.distances import normals, polar_angles, ray_points
+from validate.register.outlines.outlines import OutlineObservation, observe_outlines
+from validate.register.outlines.round_outlines import RoundOutlines
 from validate.register.signals import SignalObservation
 from validate.register.stresses import StressObservation
-from validate.scene.box import box
+from validate.register.tools.digitised import Digitised, Match, TouchedLandmarks
+from validate.register.tools.dwell import Dwell
+from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
 T = np.array([0.0, 1.0, 2.0])
@@ -289,8 +288,8 @@ def test_noise_of_a_landmark_is_its_own_and_that_of_the_poses_it_makes() -> None
 
 def test_every_observation_can_be_drawn_anew() -> None:
     """Else an experiment that compares it has no coverage study."""
-    names = [m.name for m in pkgutil.iter_modules(register.__path__)]
-    modules = [importlib.import_module(f"{register.__name__}.{name}") for name in names]
+    names = [m.name for m in pkgutil.walk_packages(register.__path__, f"{register.__name__}.")]
+    modules = [importlib.import_module(name) for name in names]
     found = [c for m in modules for c in vars(m).values()
              if isinstance(c, type) and c.__module__ == m.__name__
              and hasattr(c, "deviations") and c is not Observation]  # fmt: skip

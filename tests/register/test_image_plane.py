@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError
-from validate.recording.formats.poses import pose_signals
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.types import Contours, Frames, Markers, Recording, Source
-from validate.register.image_plane import KnownTarget, SeenPoints, image_plane
-from validate.register.transform import Similarity
+from validate.register.markers.transform import Similarity
+from validate.register.tools.image_plane import KnownTarget, SeenPoints, image_plane
 
 TRUTH = Similarity(Rotation.from_euler("xyz", [80, -25, 10], degrees=True).as_matrix(),
                    np.array([0.012, -0.03, 0.045]))  # fmt: skip

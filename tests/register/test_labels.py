@@ -5,7 +5,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError
-from validate.register.labels import require_steady_labels
+from validate.register.markers.markers import require_steady_labels
 
 COUNT, SD = 20, 1e-5
 NAMES = tuple(f"m{i:02d}" for i in range(COUNT))

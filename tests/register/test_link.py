@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RegistrationError
-from validate.register.link import link
+from validate.register.markers.link import link
 
 Pair = tuple[np.ndarray, np.ndarray, np.ndarray]
 

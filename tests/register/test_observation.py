@@ -9,9 +9,9 @@ from validate.arrays import Floats, Ints, rms
 from validate.compare.residual import _of
 from validate.compare.verdict import errors_of
 from validate.errors import ComparisonError, RegistrationError
-from validate.fem.locate import nearest_node_rows
+from validate.fem.assembly.locate import nearest_node_rows
 from validate.recording.types import Contours, Markers
-from validate.register.markers import MarkerObservation, Together, observe_markers, vector
+from validate.register.markers.markers import MarkerObservation, Together, observe_markers, vector
 from validate.register.observation import (
     EVERYTHING,
     Deviation,
@@ -19,8 +19,8 @@ from validate.register.observation import (
     frame_at,
     nearest_samples,
 )
-from validate.register.outline_geometry import angular_points
-from validate.register.outlines import Corner, OutlineObservation, merged, observe_outlines
+from validate.register.outlines.distances import angular_points
+from validate.register.outlines.outlines import Corner, OutlineObservation, merged, observe_outlines
 from validate.register.registered import Registered
 from validate.register.signals import (
     SignalObservation,
@@ -29,7 +29,7 @@ from validate.register.signals import (
     require_rising,
     windows_of,
 )
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
 T = np.array([0.0, 1.0, 2.0])

@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
-from validate.recording.formats.poses import pose_signals
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.readers import recognised
 from validate.recording.types import Recording, Source
-from validate.register.pivot import pivot
+from validate.register.tools.pivot import pivot
 
 TIP = np.array([0.1086, -0.0078, 0.0025])
 N = 300

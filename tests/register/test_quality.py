@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from validate.arrays import rms
 from validate.errors import RegistrationError
 from validate.register import Similarity, fit_rigid, fit_similarity, register_points
-from validate.register.measures import (
+from validate.register.markers.measures import (
     Reflection,
     chi_square_bound,
     find_outliers,
@@ -22,7 +22,7 @@ from validate.register.measures import (
     robust_noise,
     target_covariance,
 )
-from validate.register.relabel import relabellings
+from validate.register.markers.relabel import relabellings
 
 SD = 0.577e-3  # m per axis: the 1 mm of the hand-tracked markers of paper 000
 UP = np.array([0.0, 0.0, 1.0])

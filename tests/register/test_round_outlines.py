@@ -6,9 +6,9 @@ import pytest
 from validate.arrays import Floats
 from validate.recording.types import Contours, Frames
 from validate.register.observation import EVERYTHING
-from validate.register.round_outlines import ENDS, RoundOutlines
-from validate.scene.rigid_body import RigidBody
-from validate.solve.rigid_motion import RigidMotion
+from validate.register.outlines.round_outlines import ENDS, RoundOutlines
+from validate.scene.meshless import RigidBody
+from validate.solve.static.without_mechanics import RigidMotion
 
 ANGLES = np.linspace(0, 2 * np.pi, 60, endpoint=False)
 CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)

@@ -8,10 +8,10 @@ import pytest
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Markers
-from validate.register.markers import MarkerObservation, observe_markers
+from validate.register.markers.markers import MarkerObservation, observe_markers
 from validate.register.sensing import ForceSensing, PoseShift, Sensing
 from validate.register.signals import SignalObservation
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 
 T = np.linspace(0.0, 1.0, 11)
 

@@ -12,9 +12,9 @@ from sweeps import LeaningCapsule, sweep_frames
 from validate.errors import RecordingError, RegistrationError
 from validate.fem.cavity import cavity_surface, volume_of
 from validate.recording.types import Contours
-from validate.register import sweep
-from validate.register.sweep import Stack, stacked, surface_of, sweep_outlines
-from validate.scene.inclusion import Block, block_with_inclusion
+from validate.register.outlines import sweep
+from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
+from validate.scene.geometries.inclusion import Block, block_with_inclusion
 from validate.scene.mesh import cell_volumes
 from validate.twin.ultrasound import Scanner
 
@@ -179,7 +179,7 @@ def test_slices_that_make_no_inclusion_are_refused_in_one_line(
 
 
 def test_a_sphere_ends_where_its_sections_say() -> None:
-    from validate.register.sweep import _end
+    from validate.register.outlines.sweep import _end
 
     r = 5e-3
     at = np.array([2.0e-3, 4.0e-3])

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.register import Similarity, fit_rigid, fit_similarity
-from validate.register.transform import spread
+from validate.register.markers.transform import spread
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 2, 3]])
 

@@ -7,15 +7,15 @@ from tiny import AT_HOLDS, MOVED, place_moved, record_moved
 
 from validate.compare.verdict import Accept
 from validate.parameters import with_given
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.remade import stamped
 from validate.recording.types import Recording
 from validate.register.registered import Registered
 from validate.register.sensing import ForceSensing
 from validate.register.signals import SignalObservation
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment
-from validate.replay.remade import stamped
-from validate.replay.tree import Tree
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.scene import Scene
 
 TRUE = AT_HOLDS.parameters

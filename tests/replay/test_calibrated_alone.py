@@ -12,19 +12,19 @@ import pytest
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.parameters import quantity
+from validate.pipeline.calibration.calibrated import here, identified
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.run.road import compare
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
-from validate.replay.calibrated import here, identified
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Experiment, Uncertainty
-from validate.replay.method import Method
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.replay.tree import Built, Tree
 from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
-from validate.solve.stretch_test import StretchTest
+from validate.scene.meshless import MaterialPoint
+from validate.solve.static.stretch_test import StretchTest
 
 MU, NU = 30e3, 0.4999
 POWERS = {"uniaxial": -2, "equibiaxial": -5}

@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 from calibrating import NU, OPEN, OPENED, E, known
 
-from validate.replay.calibrated import calibrated, closed, identified_by
-from validate.replay.calibration import Calibrates, Calibration
-from validate.replay.experiment import Experiment, Identified, Uncertainty, vary
-from validate.replay.tree import Tree
+from validate.pipeline.calibration.calibrated import calibrated, closed, identified_by
+from validate.pipeline.calibration.calibration import Calibrates, Calibration
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    Identified,
+    SolvesVariants,
+    Uncertainty,
+    vary,
+)
+from validate.pipeline.experiment.tree import Tree
 
 INPUTS = (
     vary("material.nu", "absolute 0.02, below 0.5", "Poisson ratio"),
@@ -19,10 +25,14 @@ INPUTS = (
 DOUBTED: Experiment = replace(OPEN, uncertainty=Uncertainty(inputs=INPUTS, surrogate="fem"))
 
 
+def nothing(_: Tree) -> SolvesVariants:
+    raise AssertionError("no run is compared")
+
+
 def identified(experiment: Experiment, p: Tree) -> Identified:
     shipped = experiment.load(p, Path())
     fitted, _ = calibrated(experiment, p, experiment.methods, shipped)
-    found = identified_by(experiment, shipped, p, experiment.methods, fitted)
+    found = identified_by(experiment, shipped, p, experiment.methods, fitted, nothing)
     assert found is not None
     return found
 
@@ -50,7 +60,7 @@ def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
     shipped = several.load(OPENED, Path())
     p = known(nu=None)
     fitted, _ = calibrated(several, p, several.methods, shipped, anyway=True)
-    found = identified_by(several, shipped, p, several.methods, fitted)
+    found = identified_by(several, shipped, p, several.methods, fitted, nothing)
     assert found is not None
     one, other = found.values
     assert set(one.parts) == set(other.parts) == {"noise"}

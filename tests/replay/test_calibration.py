@@ -11,16 +11,16 @@ from calibrating import NU, OPEN, OPENED, E, Sensed, known
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
+from validate.pipeline.bodies.own_body import own_body
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.experiment.experiment import Input, Uncertainty, vary
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.experiment.variation import change_of
+from validate.pipeline.run.reused import rests_on
+from validate.pipeline.run.road import compare, set_out
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
-from validate.replay.calibration import Calibrates, Calibration, Free
-from validate.replay.experiment import Input, Uncertainty, vary
-from validate.replay.options import Options
-from validate.replay.own_body import own_body
-from validate.replay.reused import rests_on
-from validate.replay.road import compare, set_out
-from validate.replay.tree import Tree
-from validate.replay.variation import change_of
 
 
 def test_bounds_are_two_finite_numbers_in_order() -> None:

@@ -10,11 +10,11 @@ from tiny import FIDUCIALS, LOADS, STEPS
 
 from validate.fem.system import build
 from validate.identify.identification import InTurn, identify
+from validate.pipeline.calibration.calibrated import problem_of
+from validate.pipeline.calibration.calibration import Calibrates, Calibration
 from validate.recording.types import Recording
-from validate.replay.calibrated import problem_of
-from validate.replay.calibration import Calibrates, Calibration
 from validate.scene.scene import Scene
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.types import Run
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked

@@ -7,11 +7,16 @@ import pytest
 from scipy.stats import chi2
 
 from validate.arrays import Floats
+from validate.pipeline.checks.consistency import (
+    consistency_exhibit,
+    consistency_scores,
+    nees_of,
+    nis_of,
+)
+from validate.pipeline.run.followed import Followed, Truth
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.consistency import consistency_exhibit, consistency_scores, nees_of, nis_of
-from validate.replay.followed import Followed, Truth
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support
 from validate.solve.types import Outcome, Run, Trace

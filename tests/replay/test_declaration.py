@@ -13,13 +13,13 @@ from validate.catalogue import experiment_files, shipped
 from validate.compare.verdict import Accept
 from validate.errors import UsageError
 from validate.parameters import describe
-from validate.replay.declaration import from_json, to_json
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.measured_body import solid
-from validate.replay.measured_cards import MeasuredBody
-from validate.replay.tree import Tree
-from validate.scene.geometry import Box
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.measured import solid
+from validate.pipeline.experiment.declaration import from_json, to_json
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.tree import Tree
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support, Weight
 
@@ -113,8 +113,8 @@ def test_other_json_is_no_declaration(text: str, tmp_path: Path) -> None:
 
 
 OLDER = '''"""A test of older days."""
-from validate.replay.experiment import Experiment
-from validate.replay.measured_cards import HeldAt, MeasuredBody
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.bodies.choices import HeldAt, MeasuredBody
 
 PARAMETERS = MeasuredBody("log.mcap", held=HeldAt(all="zmin"))
 EXPERIMENT = Experiment(name="older", title="older", source="mine", parameters=PARAMETERS)
@@ -128,7 +128,7 @@ def test_a_file_of_the_older_form_is_refused_with_the_command_that_writes_it_ane
     line = refused("run", str(tmp_path / "older.py"), cwd=tmp_path)
     assert "validate new older --from RECORDING --force" in line
     computed = (
-        "from validate.replay.experiment import Experiment\n"
+        "from validate.pipeline.experiment.experiment import Experiment\n"
         "def declared(**given): return Experiment(**given)\n"
         "EXPERIMENT = declared(name='other', title='', source='', **{'parameters': 1})\n"
     )

@@ -12,22 +12,21 @@ from commands import here
 from validate.compare.verdict import Accept
 from validate.errors import RegistrationError, SceneError, UsageError
 from validate.parameters import with_given
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.declaration import holds_code, require_paths, to_json
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, free, vary
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options, configure
+from validate.pipeline.experiment.tree import changed_by
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.register.as_declared import as_declared
-from validate.replay import compare
-from validate.replay.declaration import holds_code, to_json
-from validate.replay.declared_paths import require_paths
-from validate.replay.experiment import Experiment, Uncertainty, free, vary
-from validate.replay.find import load_file
-from validate.replay.method import Method
-from validate.replay.options import Options, configure
-from validate.replay.tree import changed_by
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 
 E, SIZE = 100e3, (0.02, 0.02, 0.05)
 T = np.linspace(0.0, 4.0, 21)
@@ -112,7 +111,7 @@ def test_an_open_modulus_is_identified_and_not_evidence() -> None:
         load=lambda p, folder: (log(),), path=Path("bar.py"), uncertainty=Uncertainty(), accept=(),
         variations=(free("material.E", "10 kPa", "1 MPa", on="stage.force"),),
     )  # fmt: skip
-    found = compare(other)
+    found = run_in_memory(other)
     assert found.identified[0].value == pytest.approx(E, rel=1e-3)
     assert found.sentence.startswith("Fitted: material.E = ")
     with pytest.raises(UsageError, match=r"material\.E is not set"):
@@ -141,12 +140,12 @@ def test_a_declared_scene_is_no_mesh_yet() -> None:
 
 
 DECLARATION = """
-from validate.replay.experiment import Case, Experiment, vary
-from validate.replay.method import Method
-from validate.scene.geometry import Box
+from validate.pipeline.experiment.experiment import Case, Experiment, vary
+from validate.pipeline.experiment.method import Method
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 
 EXPERIMENT = Experiment(
     name="bar",

@@ -1,25 +1,17 @@
-"""The Python that the documentation and the package's docstring show runs as it is printed."""
+"""The Python that the docstring of `validate.pipeline` shows runs as it is printed."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-import validate.replay
+import validate.pipeline
 from validate.parameters import with_given
-from validate.replay.experiment import Experiment
-
-
-def readme(project_root: Path) -> str:
-    page = (project_root / "docs" / "python.md").read_text("utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    return str(code)
+from validate.pipeline.experiment.experiment import Experiment
 
 
 def docstring() -> str:
-    return (validate.replay.__doc__ or "").split("\n\n", 1)[1]
+    return (validate.pipeline.__doc__ or "").split("\n\n", 1)[1]
 
 
 def small(phantom: Experiment) -> Experiment:
@@ -34,13 +26,6 @@ def small(phantom: Experiment) -> Experiment:
     )  # fmt: skip
 
 
-def test_readme_and_docstring_show_the_same(project_root: Path) -> None:
-    shown = [
-        [line for line in text.splitlines() if line] for text in (readme(project_root), docstring())
-    ]
-    assert shown[0] == shown[1]
-
-
 @pytest.mark.slow
 def test_the_example_prints_every_check(
     phantom: Experiment,
@@ -53,7 +38,7 @@ def test_the_example_prints_every_check(
         asked.append(name)
         return small(phantom)
 
-    monkeypatch.setattr(validate.replay, "load", load)
+    monkeypatch.setattr(validate.pipeline, "load", load)
     ran: dict[str, Any] = {}
     exec(compile(docstring(), "example", "exec"), ran)
     assert asked == [phantom.name]

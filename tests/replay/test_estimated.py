@@ -8,9 +8,9 @@ import pytest
 from test_consistency_tables import STEPS, followed
 
 from validate.errors import UsageError
-from validate.replay import compare, load
-from validate.replay.estimated import doubt, estimated_exhibit, sentences
-from validate.replay.followed import Followed
+from validate.pipeline import load, run_in_memory
+from validate.pipeline.exhibits.gated import doubt, estimated_exhibit, sentences
+from validate.pipeline.run.followed import Followed
 from validate.solve.types import Trace
 
 
@@ -83,7 +83,7 @@ def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
     short = replace(
         cube, methods=methods, accepted=("fem",), cases=(), published=(), exhibits=None, frames=5
     )
-    result = compare(short, {"methods.roukf.parameters": "stiffness,load.pull"})
+    result = run_in_memory(short, {"methods.roukf.parameters": "stiffness,load.pull"})
     found = next(e for e in result.exhibits if e.anchor == "estimates")
     assert [row[2] for row in found.tables[0].rows] == ["stiffness", "load.pull"]
     assert all("correlation 1.000" in str(row[-1]) for row in found.tables[0].rows)
@@ -92,4 +92,4 @@ def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
     with pytest.raises(
         UsageError, match=r"'stiffness.core': not in this scene, which has stiffness, load.pull"
     ):
-        compare(short, {"methods.roukf.parameters": "stiffness.core"})
+        run_in_memory(short, {"methods.roukf.parameters": "stiffness.core"})

@@ -8,25 +8,31 @@ from typing import Any
 import pytest
 from tiny import DECLARED, TINY, record
 
-from validate.cli import checking, running
-from validate.cli.run_screen import show_run
-from validate.cli.running import run as run_command
-from validate.compare.expected import Expected
+from validate.commands import check as checking
+from validate.commands import run as running
+from validate.commands.run import run as run_command
+from validate.commands.run_screen import show_run
+from validate.compare.overall import Expected
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
+from validate.engine.cell import Where
+from validate.engine.pool import Pool
 from validate.errors import ComparisonError, UsageError
+from validate.library.run_report import ReportedRun
 from validate.parameters import with_given
+from validate.pipeline.experiment.experiment import Experiment, Identified, Twin, Uncertainty, vary
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.road import compare
 from validate.recording.types import Recording
-from validate.replay.experiment import Experiment, Identified, Twin, Uncertainty, vary
-from validate.replay.options import Options
-from validate.replay.remade import stamped
-from validate.replay.road import compare
-from validate.replay.tree import Built, Tree
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 FEM = {"fem": TINY.methods["fem"]}
+
+HERE = Pool(Where(0))
 
 
 def other_model(**more: Any) -> Experiment:
@@ -171,10 +177,10 @@ def test_the_terminals_first_line_says_what_was_judged(
 ) -> None:
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     monkeypatch.setattr(
-        "validate.cli.chosen.find", lambda name, start, named: replace(TINY, cases=())
+        "validate.commands.run.find", lambda name, start, named: replace(TINY, cases=())
     )
     code = run_command(
-        ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
+        ("tiny",), pool=HERE, named=(), quick=True, out=tmp_path, values=(), methods="fem",
         as_json=False, anyway=False,
     )  # fmt: skip
     printed = " ".join(capsys.readouterr().out.split())
@@ -204,9 +210,9 @@ def test_cells_that_lock_are_a_line_on_the_terminal_and_a_note(
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     tree = DECLARED.with_scene(material=Material(10e3, 0.4999, rho=1000.0))
     locks = replace(TINY, cases=(), parameters=tree)
-    monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: locks)
+    monkeypatch.setattr("validate.commands.run.find", lambda name, start, named: locks)
     run_command(
-        ("tiny",), named=(), quick=True, out=tmp_path, values=(), methods="fem",
+        ("tiny",), pool=HERE, named=(), quick=True, out=tmp_path, values=(), methods="fem",
         as_json=False, anyway=False,
     )  # fmt: skip
     said = "linear tetrahedra lock near incompressibility"
@@ -262,13 +268,14 @@ def test_all_pass_by_declared_verdicts_and_one_by_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     shipped = declaring("not good enough")
-    monkeypatch.setattr("validate.cli.chosen.find", lambda name, start, named: shipped)
+    monkeypatch.setattr("validate.commands.run.find", lambda name, start, named: shipped)
     monkeypatch.setattr(
-        "validate.cli.chosen.experiment_files", lambda start, named: {"tiny": shipped}
+        "validate.commands.run.experiment_files", lambda start, named: {"tiny": shipped}
     )
-    monkeypatch.setattr(running, "_reported", lambda *_, **__: (known, tmp_path / "report.html"))
+    told = ReportedRun(known, tmp_path / "report.html", "")
+    monkeypatch.setattr(running, "reported_run", lambda *_, **__: told)
     found = run_command(
-        names, named=(), quick=False, out=tmp_path, values=(), methods="", as_json=False,
+        names, pool=HERE, named=(), quick=False, out=tmp_path, values=(), methods="", as_json=False,
         anyway=False,
     )  # fmt: skip
     assert found == code

@@ -6,19 +6,19 @@ from pathlib import Path
 import pytest
 from tiny import TINY
 
+from experiments.ecoflex_cylinder.cylinder import load
+from experiments.ecoflex_cylinder.published import follows, material_of
 from validate.compare.published import Figure
 from validate.compare.result import Result
 from validate.errors import RecordingError
-from validate.papers.ecoflex.cylinder import load
-from validate.papers.ecoflex.logged import follows, material_of
 from validate.parameters import with_values
-from validate.replay import load as experiment_named
-from validate.replay.experiment import Experiment, Told
-from validate.replay.followed import Cases
-from validate.replay.options import Options
-from validate.replay.origins import opened
-from validate.replay.road import compare
-from validate.replay.tree import Tree
+from validate.pipeline import load as experiment_named
+from validate.pipeline.experiment.experiment import Experiment, Told
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.origins import opened
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.road import compare
 
 FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here", 3.0, 0.0)
 

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from commands import called
 
-from validate.cli.running import _refined
+from validate.commands.run import _refined
+from validate.pipeline.bodies.mesh import unknowns_of
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options, folder_of
+from validate.pipeline.run import cost
+from validate.pipeline.run.cost import affordable, linear_seconds, newton_seconds, states_within
+from validate.pipeline.run.estimate import estimated
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.replay import cost
-from validate.replay.body_mesh import unknowns_of
-from validate.replay.cost import affordable, linear_seconds, newton_seconds, states_within
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.options import Options, folder_of
-from validate.replay.run_estimate import estimated
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_file import write_mesh
+from validate.scene.mesh_files.mesh_file import write_mesh
 
 T = np.linspace(0, 1, 40)
 ANSWERS = """

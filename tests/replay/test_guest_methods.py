@@ -11,13 +11,13 @@ import pytest
 
 from validate.compare.result import Result
 from validate.errors import UsageError
-from validate.replay import load
-from validate.replay.guests import guests_of, with_guests
-from validate.replay.named_run import run_name
-from validate.replay.options import Options, configure
-from validate.replay.road import compare
-from validate.solve.guests.guest import Guest
-from validate.solve.guests.let_go import GuestLetGo
+from validate.pipeline import load
+from validate.pipeline.experiment.external import guests_of, with_guests
+from validate.pipeline.experiment.options import Options, configure
+from validate.pipeline.run.named_run import run_name
+from validate.pipeline.run.road import compare
+from validate.solve.external.let_go import GuestLetGo
+from validate.solve.external.scheme import Guest
 
 FAKE = """
 import json, sys

@@ -16,24 +16,24 @@ from scipy.optimize import brentq
 from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
+from validate.pipeline import run_in_memory
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
+from validate.pipeline.bodies.measured import solid
+from validate.pipeline.calibration.fitted_moduli import Moves, sentence
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.choices import Compression, CompressionRanges
+from validate.pipeline.plates.compression import compression
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.replay import compare
-from validate.replay.compression import compression
-from validate.replay.compression_cards import Compression, CompressionRanges
-from validate.replay.experiment import Experiment
-from validate.replay.fitted_moduli import Moves, sentence
-from validate.replay.measured_body import solid
-from validate.replay.measured_cards import MeasuredBody, SeenOf
-from validate.replay.method import Method
-from validate.replay.tree import Tree
-from validate.report.store import document, schema
-from validate.scene.geometry import Box
+from validate.report.stored.store import document, schema
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid import NoFluid
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
 DIAMETER, HEIGHT, E, NU = 0.03, 0.02, 25e3, 0.45
 AREA = np.pi * DIAMETER**2 / 4
@@ -89,7 +89,7 @@ def experiment(folder: Path, seen: Recording, **ranges: float) -> Experiment:
 
 @cache
 def judged(folder: Path, large: bool, noise: float = 5e-3) -> Result:
-    return compare(experiment(folder, log(noise, large=large)))
+    return run_in_memory(experiment(folder, log(noise, large=large)))
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +130,7 @@ def test_the_right_law_predicts_and_the_wrong_one_is_named(folders: Sequence[Pat
 
 def test_the_interval_holds_the_truth_and_never_is_rounding(tmp_path: Path) -> None:
     """Without noise the sizes, the plates and the load cell are still uncertain."""
-    result = compare(experiment(tmp_path, log(0.0, large=False)))
+    result = run_in_memory(experiment(tmp_path, log(0.0, large=False)))
     one = values(result)["linear"]
     low, high = one.interval
     assert low < E < high
@@ -144,7 +144,7 @@ def test_the_interval_holds_the_truth_and_never_is_rounding(tmp_path: Path) -> N
 def test_an_assumed_range_does_not_replace_that_of_the_fit(
     folders: Sequence[Path], tmp_path: Path
 ) -> None:
-    wide = compare(experiment(tmp_path, log(5e-3, large=False), E=0.5))
+    wide = run_in_memory(experiment(tmp_path, log(5e-3, large=False), E=0.5))
     own = judged(folders[0], large=False)
     for name in ("linear", "neo"):
         assert values(wide)[name].u == pytest.approx(values(own)[name].u)
@@ -158,7 +158,9 @@ def test_what_identification_and_prediction_share_cancels(
 ) -> None:
     """A wider specimen has a smaller modulus and the same force."""
     seen = log(5e-3, large=False)
-    wide = compare(experiment(tmp_path, seen, diameter=0.1, height=0.1, load=0.1, friction=0.0))
+    wide = run_in_memory(
+        experiment(tmp_path, seen, diameter=0.1, height=0.1, load=0.1, friction=0.0)
+    )
     own = judged(folders[0], large=False)
     assert values(wide)["linear"].u > 5 * values(own)["linear"].u
     one, other = (checks(r, "linear")["force.max@beyond"] for r in (wide, own))
@@ -197,7 +199,7 @@ def test_a_body_s_modulus_is_its_own_law_s(tmp_path: Path) -> None:
     parameters = Tree("body.mcap", scene, settings)
     seen = machine_log(t, strain * HEIGHT, force, 2e-3)
     methods = {"solid": solid("neo-Hooke"), "linear": solid("linear", "linear")}
-    result = compare(on_a_body(tmp_path, parameters, seen, methods, {"force": 0.1}))
+    result = run_in_memory(on_a_body(tmp_path, parameters, seen, methods, {"force": 0.1}))
     found = values(result)
     assert found["solid"].value == pytest.approx(E, rel=0.01)
     assert found["linear"].value > 1.02 * E

@@ -7,17 +7,17 @@ import pytest
 
 from validate.errors import RecordingError, RegistrationError, UsageError, ValidateError
 from validate.parameters import with_given
+from validate.pipeline.experiment.declaration import from_json, holds_code, to_json
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.inclusion import InclusionTest, Streams, inclusion_test
+from validate.pipeline.plates.inclusion_body import BlockWithInclusion
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
-from validate.replay.declaration import from_json, holds_code, to_json
-from validate.replay.experiment import Experiment
-from validate.replay.inclusion import InclusionTest, Streams, inclusion_test
-from validate.replay.inclusion_body import BlockWithInclusion
-from validate.replay.method import Method
-from validate.replay.tree import Tree
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Foundation, Scene, Support
-from validate.solve.fluid import ExactPressure
+from validate.solve.fluid.cavities import ExactPressure
 
 SCENE = Scene(
     BlockWithInclusion(0.060, 0.045, 0.070, (6, 7, 10)),

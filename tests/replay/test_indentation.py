@@ -10,21 +10,21 @@ import pytest
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.ladder.default import body_of, trial_of
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import EVERYTHING
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
-from validate.replay import compare
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.ladder_default import body_of, trial_of
-from validate.replay.method import Method
-from validate.replay.tree import Tree
 from validate.report.write import write_report
 from validate.scene.contact import RigidContact, RigidSphere
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
-from validate.solve.contact import ContactNewton
+from validate.solve.static.contact import ContactNewton
 
 T = np.arange(1.0, 5.0)
 DEPTH = 0.0003 * T[:, None]
@@ -71,7 +71,7 @@ EXPERIMENT = Experiment(
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    return compare(EXPERIMENT)
+    return run_in_memory(EXPERIMENT)
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_its_report_has_the_traces(result: Result, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_contact_is_set_like_any_parameter(result: Result) -> None:
     ball = {"contacts.ball.friction": ".8", "contacts.ball.shape.radius": "15mm"}
-    rough = compare(EXPERIMENT, ball, quick=True)
+    rough = run_in_memory(EXPERIMENT, ball, quick=True)
     (run,) = rough.methods[0].runs
     smooth = result.methods[0].run
     assert run.traces["ball.slipping"].y[-1] < smooth.traces["ball.slipping"].y[-1]
@@ -105,13 +105,13 @@ def test_contact_is_set_like_any_parameter(result: Result) -> None:
 
 def test_what_is_wrong_with_contact_is_one_line() -> None:
     with pytest.raises(SceneError, match=r"contact 'ball' starts inside the body: 1 of 25 nodes"):
-        compare(EXPERIMENT, {"contacts.ball.shape.centre": "10mm,10mm,34.9mm"}, quick=True)
+        run_in_memory(EXPERIMENT, {"contacts.ball.shape.centre": "10mm,10mm,34.9mm"}, quick=True)
     with pytest.raises(SceneError, match="friction -1, expected 0 or more"):
-        compare(EXPERIMENT, {"contacts.ball.friction": "-1"}, quick=True)
+        run_in_memory(EXPERIMENT, {"contacts.ball.friction": "-1"}, quick=True)
     with pytest.raises(
         UsageError, match=r"unknown parameter 'contacts.ball.frictoin'; nearest: contacts.ball."
     ):
-        compare(EXPERIMENT, {"contacts.ball.frictoin": ".3"}, quick=True)
+        run_in_memory(EXPERIMENT, {"contacts.ball.frictoin": ".3"}, quick=True)
 
 
 @pytest.mark.parametrize("ladder", [lambda e: trial_of(e, quick=True), body_of])

@@ -8,8 +8,8 @@ import pytest
 from commands import called
 from script_modules import module_of
 
-from validate.replay import compare
-from validate.replay.find import load_file
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.find import load_file
 
 pytest.importorskip("felupe")
 FILE = Path(__file__).parents[2] / "benchmarks" / "indentation_log.py"
@@ -37,11 +37,11 @@ def test_with_the_compliance_the_verdict_is_right_and_without_it_wrong(
         made = ("new", name, "--from", "layer.mcap", "--answers", f"{name}.toml")
         assert called(*made)[0] == 0
         answers[name] = load_file(tmp_path / "experiments" / f"{name}.py")
-    right = compare(answers["declared"], SMALL, quick=True)
-    measured = compare(
+    right = run_in_memory(answers["declared"], SMALL, quick=True)
+    measured = run_in_memory(
         answers["unknown"], {**SMALL, "machine.measured": "../rigid.mcap"}, quick=True
     )
-    wrong = compare(answers["unknown"], SMALL, quick=True)
+    wrong = run_in_memory(answers["unknown"], SMALL, quick=True)
     for result in (right, measured):
         assert {c.validation for c in result.checks} == {"not distinguishable"}
         assert not result.warnings

@@ -2,16 +2,16 @@
 
 import pytest
 
-from validate.replay.ladder_solvers import (
+from validate.pipeline.ladder.references import (
     exact_in_ramps,
     exact_in_time,
     still_best,
     swinging_pair,
 )
 from validate.solve.candidates import StillBody, SwingingBody
-from validate.solve.fluid import ExactPressure
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.schemes import candidates
+from validate.solve.static.quasi_static import QuasiStatic
 
 STEPS = (0.02, 0.01)
 EXACT = {"quasi-static", "10 modes", "40 modes"}  # none of these has an error of the step

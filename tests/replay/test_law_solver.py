@@ -5,16 +5,16 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import UsageError
-from validate.replay.experiment import Experiment
-from validate.replay.law_solver import laws_of, with_law
-from validate.replay.measured_body import solid
-from validate.replay.method import Method
-from validate.replay.options import Options, all_methods
+from validate.pipeline.bodies.measured import solid
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.law_solver import laws_of, with_law
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options, all_methods
 from validate.scene.material import LawName
-from validate.solve.fluid import NoFluid
-from validate.solve.newton import StaticNewton
-from validate.solve.pressure_loop import PressureLoop
-from validate.solve.tabulated import Tabulated
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.fluid.pressure_loop import PressureLoop
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
 
 def pressed(label: str, law: LawName = "linear") -> Method:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
+from validate.pipeline.checks.likely_causes import Difference, likely_causes
 from validate.register.observation import History
-from validate.replay.likely_causes import Difference, likely_causes
 
 T = np.linspace(0.0, 2.0, 401)
 F = 2.8

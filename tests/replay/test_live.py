@@ -16,13 +16,11 @@ import pytest
 from click.testing import CliRunner
 
 from validate.arrays import Floats
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.mcap.read import read_recording
-from validate.recording.mcap.write import write_recording
-from validate.recording.types import Recording, Signal, Source
-from validate.replay import load as experiment_named
-from validate.replay.live import (
+from validate.pipeline import load as experiment_named
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.live import (
     Listener,
     Lived,
     Prepared,
@@ -32,23 +30,25 @@ from validate.replay.live import (
     realtime,
     written,
 )
-from validate.replay.live.listener import RESYNC
-from validate.replay.live.packets import (
+from validate.pipeline.live.listener import (
     CONTACT,
     FADED,
     LIMITED,
     NO_ANSWER,
+    RESYNC,
     Position,
     force_of,
     newer,
     position_bytes,
     position_of,
 )
-from validate.replay.live.tip import recorded_tip
-from validate.replay.live.written import _from_rest
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.solve.needle import NeedleStepper
+from validate.pipeline.live.path import recorded_tip
+from validate.pipeline.live.written import _from_rest
+from validate.pipeline.run.road import compare
+from validate.recording.mcap.read import read_recording
+from validate.recording.mcap.write import write_recording
+from validate.recording.types import Recording, Signal, Source
+from validate.solve.haptic.needle import NeedleStepper
 from validate.solve.types import State
 
 COARSE = {"body.plane": "10"}
@@ -459,7 +459,7 @@ def test_an_interruption_ends_the_loop_and_is_refused(monkeypatch: pytest.Monkey
     def interrupted(*_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("validate.replay.live.clock._run", interrupted)
+    monkeypatch.setattr("validate.pipeline.live.clock._run", interrupted)
     done = run(made().path, Turned())
     assert done.findings["interrupted"] == 1
     assert len(done.t) == 0

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from validate.register.fitting import MarkerFit
-from validate.register.markers import MarkerObservation
-from validate.replay.find import find
-from validate.replay.options import Options, configure, folder_of
+from validate.pipeline.experiment.find import find
+from validate.pipeline.experiment.options import Options, configure, folder_of
+from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.markers import MarkerObservation
 
 
 @pytest.mark.slow

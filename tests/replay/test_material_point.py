@@ -10,21 +10,20 @@ import pytest
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
 from validate.errors import SceneError
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.road import compare
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import driving, validating
-from validate.replay.experiment import Experiment, Uncertainty, vary
-from validate.replay.method import Method
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.replay.tree import Tree
 from validate.report.write import write_report
-from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
-from validate.scene.prony import Prony
+from validate.scene.material import Material, Prony
+from validate.scene.meshless import MaterialPoint
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
-from validate.solve.fluid import NoFluid
-from validate.solve.stretch_test import StretchTest
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.stretch_test import StretchTest
 
 MU, NU = 30e3, 0.4999
 STRETCH = np.linspace(1.0, 2.0, 41)

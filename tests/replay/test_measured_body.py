@@ -20,32 +20,37 @@ from validate.errors import (
     UsageError,
 )
 from validate.parameters import with_given, with_values
-from validate.recording.types import Contours, Markers, Recording, Signal, Source
-from validate.replay import (
-    compare,
-    ladder_default,
-    measured_drive,
-    measured_markers,
-    measured_outline,
-    measured_seen,
+from validate.pipeline import run_in_memory
+from validate.pipeline.bodies import (
+    drive as measured_drive,
 )
-from validate.replay.body_mesh import mesh_of
-from validate.replay.experiment import Experiment
-from validate.replay.measured_body import solid
-from validate.replay.measured_cards import BodyRanges, MeasuredBody, SeenOf
-from validate.replay.tree import Tree
-from validate.report.body import _frame as drawn_frame
-from validate.report.loads import held
-from validate.report.markers import markers as drawn_markers
-from validate.report.observed import shown_loads
-from validate.report.registration import registration
-from validate.scene.box import box
-from validate.scene.geometry import Box, MeshFile
+from validate.pipeline.bodies import (
+    markers as measured_markers,
+)
+from validate.pipeline.bodies import (
+    markers as measured_outline,
+)
+from validate.pipeline.bodies import (
+    registered as measured_seen,
+)
+from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody, SeenOf
+from validate.pipeline.bodies.measured import solid
+from validate.pipeline.bodies.mesh import mesh_of
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.ladder import default as ladder_default
+from validate.recording.types import Contours, Markers, Recording, Signal, Source
+from validate.report.scenes.body import _frame as drawn_frame
+from validate.report.scenes.loads import held
+from validate.report.scenes.markers import markers as drawn_markers
+from validate.report.sections.observed import shown_loads
+from validate.report.sections.registration import registration
+from validate.scene.geometries.box import box
+from validate.scene.geometries.specification import Box, MeshFile
 from validate.scene.material import Material
-from validate.scene.mesh_file import write_mesh
-from validate.scene.named_place import axis_of, place_of, point_of
+from validate.scene.mesh_files.mesh_file import write_mesh
+from validate.scene.places import axis_of, facets_of, place_of, point_of
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
-from validate.scene.select import facets_of
 from validate.scene.tracked import Prescribed
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
@@ -103,7 +108,7 @@ def verdicts(result: Result) -> dict[str, str]:
 
 
 def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
-    result = compare(experiment(tmp_path, BASE, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, BASE, recording(signals=log()), "force"))
     assert verdicts(result) == {"force.max@low": "good enough", "force.max@high": "good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["force.rms@high"] < 4e-3  # noise alone
@@ -112,7 +117,7 @@ def test_the_force_of_a_uniform_body_is_predicted(tmp_path: Path) -> None:
 def test_a_force_that_differs_has_likely_causes(tmp_path: Path) -> None:
     """Under a displacement it is the modulus: the given one is half of the true one."""
     soft = with_given(BASE, {"material.E": E / 2})
-    result = compare(experiment(tmp_path, soft, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, soft, recording(signals=log()), "force"))
     assert "Likely causes, in order: load or modulus" in result.sentence
     assert (
         "measured is 2 times simulated, at all places and times: consistent with that multiple of"
@@ -124,13 +129,13 @@ def test_a_test_may_be_longer_than_its_states_are_seconds(tmp_path: Path) -> Non
     """States more than a second apart: the force was looked for at rest, where it is zero."""
     slow = {n: replace(s, t=20 * s.t) for n, s in log().items()}
     p = with_given(BASE, {"seen.still": 8.0})
-    result = compare(experiment(tmp_path, p, recording(signals=slow), "force"))
+    result = run_in_memory(experiment(tmp_path, p, recording(signals=slow), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
 
 def test_an_open_modulus_is_found_below_and_predicted_above(tmp_path: Path) -> None:
     open_ = with_given(BASE, {"material.E": None})
-    result = compare(experiment(tmp_path, open_, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, open_, recording(signals=log()), "force"))
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.01)
     assert verdicts(result) == {"force.max@low": "fitted", "force.max@high": "good enough"}
@@ -149,7 +154,7 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
         metadata={"marker_layout": layout},
     )  # fmt: skip
     p = with_given(BASE, {"seen.markers": "markers", "seen.layout": "recorded"})
-    result = compare(experiment(tmp_path, p, both, "force", "marker"))
+    result = run_in_memory(experiment(tmp_path, p, both, "force", "marker"))
     assert set(verdicts(result).values()) == {"good enough"}
     rms = {s.name: s.value for s in result.methods[0].scores}
     assert rms["marker.rms@high"] < 1.5 * np.sqrt(3) * SD  # of a length
@@ -175,7 +180,7 @@ def test_markers_as_seen_may_stand_anywhere(
     monkeypatch.setattr(f"{__name__}.PLACES", places)
     p = with_given(BASE, {"seen.markers": "markers"})
     found = recording(signals=log(), markers={"markers": tracked(stretched)})
-    result = compare(experiment(tmp_path, p, found, "marker"))
+    result = run_in_memory(experiment(tmp_path, p, found, "marker"))
     assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"good enough"}
 
 
@@ -190,7 +195,7 @@ def test_a_single_marker_is_enough_in_the_body_s_own_frame(
     found = recording(
         signals=log(), markers={"markers": tracked(stretched)}, metadata={"marker_layout": layout}
     )
-    result = compare(experiment(tmp_path, p, found, "marker"))
+    result = run_in_memory(experiment(tmp_path, p, found, "marker"))
     assert {c.verdict for c in result.checks if c.name.startswith("marker")} == {"good enough"}
     shown = registration(result)
     assert shown.words == (
@@ -199,10 +204,10 @@ def test_a_single_marker_is_enough_in_the_body_s_own_frame(
     assert shown.pictures == ()
     laid = with_given(p, {"seen.layout": "recorded"})
     with pytest.raises(RegistrationError, match=rf"{len(some)} of its .* needs 4\. .*as seen"):
-        compare(experiment(tmp_path, laid, found, "marker"))
+        run_in_memory(experiment(tmp_path, laid, found, "marker"))
     fitted = with_given(p, {"seen.registration.robust": True})
     with pytest.raises(UsageError, match="fits nothing"):
-        compare(experiment(tmp_path, fitted, found, "marker"))
+        run_in_memory(experiment(tmp_path, fitted, found, "marker"))
 
 
 def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
@@ -217,7 +222,7 @@ def test_markers_alone_under_its_own_weight(tmp_path: Path) -> None:
     p = FREE.with_scene(body=body, loads=(GRAVITY,), material=Material(E, 0.0, rho=RHO))
     p = p.with_settings(seen=SeenOf(markers="m", still=0.4), ranges=BodyRanges(E=0.02))
     seen = recording(markers={"m": tracked(sunk)})
-    result = compare(experiment(tmp_path, p, seen, "marker"))
+    result = run_in_memory(experiment(tmp_path, p, seen, "marker"))
     assert verdicts(result) == {"marker.max@loaded": "good enough"}
     assert {s.name: s.value for s in result.methods[0].scores}["marker.rms@loaded"] < 2e-5
 
@@ -235,11 +240,11 @@ def test_markers_on_a_face_move_it(tmp_path: Path) -> None:
         material=Material(E, 0.0), supports=(Support("zmin"),),
         tracked=(Prescribed("moved", "zmax", labels=names[:3]),),
     ).with_settings(seen=SeenOf(markers="m", states=8, still=0.4))  # fmt: skip
-    result = compare(experiment(tmp_path, p, seen, "marker"))
+    result = run_in_memory(experiment(tmp_path, p, seen, "marker"))
     assert verdicts(result) == {"marker.max@low": "good enough", "marker.max@high": "good enough"}
     short = p.with_scene(tracked=(Prescribed("moved", "zmax", labels=names[:2]),))
     with pytest.raises(UsageError, match="three or more are needed"):
-        compare(experiment(tmp_path, short, seen, "marker"))
+        run_in_memory(experiment(tmp_path, short, seen, "marker"))
 
 
 @pytest.mark.slow
@@ -261,15 +266,15 @@ def test_outlines_of_a_section(tmp_path: Path) -> None:
     known = replace(looks, pose="declared", origin=(0.0, 0.015, 0.0))
     p = TETS.with_settings(seen=known)
     seen = recording(signals=log(), contours={"o": contours})
-    result = compare(experiment(tmp_path, p, seen, "contour"))
+    result = run_in_memory(experiment(tmp_path, p, seen, "contour"))
     assert verdicts(result) == {"contour.max@low": "good enough", "contour.max@high": "good enough"}
     aside = recording(signals=log(), contours={"o": replace(contours, outlines=tuple(
         s + np.array([0.3, -0.2]) for s in shapes))})  # fmt: skip
-    fitted = compare(experiment(tmp_path, p.with_settings(seen=looks), aside, "contour"))
+    fitted = run_in_memory(experiment(tmp_path, p.with_settings(seen=looks), aside, "contour"))
     assert set(verdicts(fitted).values()) == {"good enough"}
     assert any("was fitted" in note for note in fitted.notes)
     with pytest.raises(UsageError, match="two directions at right angles"):
-        compare(experiment(tmp_path, with_given(p, {"seen.image_y": "+x"}), seen))
+        run_in_memory(experiment(tmp_path, with_given(p, {"seen.image_y": "+x"}), seen))
 
 
 @pytest.mark.slow
@@ -282,19 +287,19 @@ def test_a_motion_that_was_only_noted_is_judged_by_outlines(tmp_path: Path) -> N
     p = p.with_settings(seen=looks, noted=(0.0, 0.4e-3, 1e-3))
     seen = recording(contours={"o": Contours(t, shapes, 2e-5, np.eye(4), "image")})
     names = {"contour.max@low": "good enough", "contour.max@high": "good enough"}
-    assert verdicts(compare(experiment(tmp_path, p, seen, "contour"))) == names
+    assert verdicts(run_in_memory(experiment(tmp_path, p, seen, "contour"))) == names
     twice = p.with_settings(noted=(0.0, 2e-3))
-    found = verdicts(compare(experiment(tmp_path, twice, seen, "contour")))
+    found = verdicts(run_in_memory(experiment(tmp_path, twice, seen, "contour")))
     assert found["contour.max@high"] == "not good enough"
     for noted in ((1e-3,), (1e-3, 1e-3)):
         with pytest.raises(UsageError, match="two different displacements"):
-            compare(experiment(tmp_path, p.with_settings(noted=noted), seen))
+            run_in_memory(experiment(tmp_path, p.with_settings(noted=noted), seen))
 
 
 def test_a_mesh_file_is_found_beside_the_experiment(tmp_path: Path) -> None:
     write_mesh(box(SIZE, (2, 2, 2)), tmp_path / "body.npz")
     p = BASE.with_scene(body=MeshFile("body.npz", element="linear"))
-    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
 
@@ -334,9 +339,9 @@ def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path)
     file = MeshFile("b.npz", element="linear")
     p = BASE.with_scene(body=file, supports=rests)
     with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm away.*halvings=1"):
-        compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+        run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
     p = p.with_scene(body=replace(file, halvings=1))
-    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
 
 
@@ -373,7 +378,7 @@ def test_what_cannot_be_is_refused(
 ) -> None:
     seen = recording(signals=log(), markers={"m": tracked(stretched)})
     with pytest.raises(error, match=why):
-        compare(experiment(tmp_path, change, seen, "force", "marker"))
+        run_in_memory(experiment(tmp_path, change, seen, "force", "marker"))
 
 
 def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
@@ -381,12 +386,12 @@ def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
     p = FREE.with_scene(loads=(GRAVITY,)).with_settings(seen=SeenOf(markers="m", still=0.4))
     seen = recording(markers={"m": tracked(lambda x: np.array([0.0, 0.0, 0.02]) * x)})
     with pytest.raises(RegistrationError, match=r"against \(0, 0, -1\), although 'gravity' acts"):
-        compare(experiment(tmp_path, p, seen, "marker"))
+        run_in_memory(experiment(tmp_path, p, seen, "marker"))
 
 
 def test_a_body_that_slides_on_its_plate_neither_drifts_nor_turns(tmp_path: Path) -> None:
     p = BASE.with_scene(supports=(Support("zmin", (2,), rests=True),))
-    result = compare(experiment(tmp_path, p, recording(signals=log()), "force"))
+    result = run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
     assert set(verdicts(result).values()) == {"good enough"}
     method = result.methods[0]
     x, u = method.scene.mesh.nodes, method.run.u[-1]
@@ -398,7 +403,7 @@ def test_force_and_motion_of_different_signs_are_refused(tmp_path: Path) -> None
     turned = log()
     turned["force"] = replace(turned["force"], y=-turned["force"].y)
     with pytest.raises(RegistrationError, match="must have the same sign"):
-        compare(experiment(tmp_path, BASE, recording(signals=turned), "force"))
+        run_in_memory(experiment(tmp_path, BASE, recording(signals=turned), "force"))
 
 
 @pytest.mark.parametrize(

@@ -8,28 +8,28 @@ import numpy as np
 import pytest
 from machine_logs import machine_log, on_a_body
 
-from validate.cli.new_scene import tree_of
+from validate.commands.questions.scene import tree_of
 from validate.compare.result import Result
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build
 from validate.parameters import with_given
+from validate.pipeline import run_in_memory
+from validate.pipeline.bodies.choices import BodyRanges, Machine, MeasuredBody, SeenOf
+from validate.pipeline.bodies.measured import touching
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.plates.machine_compliance import doubt, yielding
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.replay import compare
-from validate.replay.experiment import Experiment
-from validate.replay.machine_compliance import doubt, yielding
-from validate.replay.measured_body import touching
-from validate.replay.measured_cards import BodyRanges, Machine, MeasuredBody, SeenOf
-from validate.replay.tree import Built, Tree
 from validate.scene.contact import (
+    Indenter,
     RigidContact,
     RigidCylinder,
     RigidPlane,
     RigidPunch,
     RigidSphere,
 )
-from validate.scene.indented import IndentedBlock, IndentedCylinder
-from validate.scene.indenter import Indenter
+from validate.scene.geometries.indented import IndentedBlock, IndentedCylinder
 from validate.scene.material import Material
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Load, Scene, Support
@@ -82,7 +82,7 @@ def verdicts(result: Result) -> set[tuple[str, str]]:
 
 @pytest.fixture
 def known(tmp_path: Path) -> Result:
-    return compare(experiment(tmp_path, BLOCK))
+    return run_in_memory(experiment(tmp_path, BLOCK))
 
 
 def test_a_declared_compliance_makes_the_verdict_right(known: Result) -> None:
@@ -103,7 +103,7 @@ def test_its_standard_uncertainty_enters_u_input(known: Result) -> None:
 
 
 def test_without_it_the_verdict_is_wrong_and_the_doubt_comes_first(tmp_path: Path) -> None:
-    result = compare(experiment(tmp_path, BLOCK.with_settings(machine=Machine())))
+    result = run_in_memory(experiment(tmp_path, BLOCK.with_settings(machine=Machine())))
     assert ("differs", "not good enough") in verdicts(result)
     assert not any("machine" in w for w in result.warnings)  # 8 N/mm is soft for any machine
     stiff = recorded(T * 1e-4, T * 20.0)  # 2e5 N/m
@@ -138,7 +138,7 @@ def test_a_measured_compliance_is_taken_off(tmp_path: Path) -> None:
     force = T * 0.5 + np.random.default_rng(2).normal(0, NOISE, len(T))
     write_recording(recorded(C * T * 0.5, force), tmp_path / "rigid.mcap")
     made = experiment(tmp_path, BLOCK.with_settings(machine=Machine()))
-    result = compare(made, {"machine.measured": "rigid.mcap"})
+    result = run_in_memory(made, {"machine.measured": "rigid.mcap"})
     assert verdicts(result) == {("not distinguishable", "good enough")}
     used = {q.path: q.default for q in result.parameters}
     assert used["machine.compliance"] == pytest.approx(C, rel=1e-3)
@@ -147,7 +147,7 @@ def test_a_measured_compliance_is_taken_off(tmp_path: Path) -> None:
 
 def test_an_open_modulus_is_identified_through_contact(tmp_path: Path) -> None:
     p = with_given(BLOCK, {"material.E": None})
-    result = compare(experiment(tmp_path, p))
+    result = run_in_memory(experiment(tmp_path, p))
     value = result.identified_values[0]
     assert value.value == pytest.approx(E, rel=0.01)
     assert value.parts["machine compliance"] == pytest.approx(
@@ -159,7 +159,7 @@ def test_an_open_modulus_is_identified_through_contact(tmp_path: Path) -> None:
 def test_a_plate_that_presses_already(tmp_path: Path) -> None:
     """A gap below zero is a depth at the first instant."""
     p = BLOCK.with_scene(contacts=pressed(replace(PLATE, gap=-1e-4)))
-    other = compare(experiment(tmp_path, p))
+    other = run_in_memory(experiment(tmp_path, p))
     force = other.methods[0].runs[0].traces["displacement.force"].y
     assert force[-1] == pytest.approx(STIFFNESS * (DEPTH + GAP + 1e-4), rel=2e-3)
 
@@ -207,7 +207,7 @@ def test_a_quarter_has_the_force_of_the_whole(tmp_path: Path) -> None:
         tip = Indenter("sphere", 5e-3, gap=GAP, tip=() if part == "quarter" else middle)
         p = BLOCK.with_scene(body=body, supports=(Support("zmin"),), contacts=pressed(tip))
         p = p.with_settings(machine=Machine(0.0))
-        result = compare(experiment(tmp_path, p, 0.0), quick=True)
+        result = run_in_memory(experiment(tmp_path, p, 0.0), quick=True)
         assert result.methods[0].scene.copies == (4 if part == "quarter" else 1)
         forces.append(result.methods[0].runs[0].traces["displacement.force"].y[-1])
     assert forces[1] == pytest.approx(forces[0], rel=1e-3)
@@ -262,22 +262,22 @@ def test_what_cannot_be_is_refused(make: Any, words: str) -> None:
 def test_a_compliance_without_a_force_is_refused(tmp_path: Path) -> None:
     p = with_given(BLOCK, {"seen.force": None})
     with pytest.raises(UsageError, match="needs the recorded force"):
-        compare(experiment(tmp_path, p))
+        run_in_memory(experiment(tmp_path, p))
 
 
 def test_a_force_that_pulls_moves_no_indenter(tmp_path: Path) -> None:
     part = replace(pressed(PLATE)[0], name="force")
     with pytest.raises(UsageError, match="'force' moves the body: unit N; expected a signal in m"):
-        compare(experiment(tmp_path, BLOCK.with_scene(contacts=(part,))))
+        run_in_memory(experiment(tmp_path, BLOCK.with_scene(contacts=(part,))))
     both = BLOCK.with_scene(loads=(Load("force", "zmax", "-z"),))
     with pytest.raises(UsageError, match="2 parts that move or load"):
-        compare(experiment(tmp_path, both))
+        run_in_memory(experiment(tmp_path, both))
 
 
 def test_a_quarter_shows_its_force_alone(tmp_path: Path) -> None:
     p = with_given(BLOCK, {"seen.markers": "m"})
     with pytest.raises(UsageError, match="a quarter, of which only the force"):
-        compare(experiment(tmp_path, p))
+        run_in_memory(experiment(tmp_path, p))
 
 
 def test_hertz_on_a_large_block() -> None:
@@ -302,7 +302,7 @@ def test_a_bonded_plate_is_stiffer_than_a_slippery_one(tmp_path: Path) -> None:
     forces = []
     for bonded in (False, True):
         stuck = p.with_scene(contacts=pressed(replace(PLATE, bonded=bonded)))
-        result = compare(experiment(tmp_path, stuck, 0.0), quick=True)
+        result = run_in_memory(experiment(tmp_path, stuck, 0.0), quick=True)
         forces.append(result.methods[0].runs[0].traces["displacement.force"].y[-1])
     assert forces[0] == pytest.approx(STIFFNESS * DEPTH, rel=1e-3)
     assert forces[1] > 1.1 * forces[0]

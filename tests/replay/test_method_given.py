@@ -10,34 +10,31 @@ from machine_logs import machine_log, pressed_cylinder
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
+from validate.pipeline.calibration import asked, calibrated
+from validate.pipeline.checks import refined
+from validate.pipeline.experiment.experiment import Variant
+from validate.pipeline.experiment.find import _executed, load_file
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.ladder import default as ladder_default
+from validate.pipeline.ladder.ladder import turned
+from validate.pipeline.live import prepared as prepared_live
+from validate.pipeline.live.written import as_given
+from validate.pipeline.plates import inclusion
+from validate.pipeline.plates import outline as pressed_outline
+from validate.pipeline.plates.choices import Compression, CompressionRanges
+from validate.pipeline.plates.compression import compression
+from validate.pipeline.plates.outline import PressedOutline
+from validate.pipeline.run import remade
+from validate.pipeline.run.followed import Followed
 from validate.recording.types import Recording, Source
-from validate.replay import (
-    asked,
-    calibrated,
-    inclusion,
-    ladder_default,
-    pressed_outline,
-    refined,
-    remade,
-)
-from validate.replay.compression import compression
-from validate.replay.compression_cards import Compression, CompressionRanges
-from validate.replay.experiment import Variant
-from validate.replay.find import _executed, load_file
-from validate.replay.followed import Followed
-from validate.replay.ladder import turned
-from validate.replay.live import prepared as prepared_live
-from validate.replay.live.replayed import as_given
-from validate.replay.method import Method
-from validate.replay.options import folder_of
-from validate.replay.pressed_outline import PressedOutline
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
-from validate.scene.material_point import Meshless
-from validate.solve.fluid import NoFluid
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.tabulated import Tabulated
+from validate.scene.meshless import Meshless
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 
 
 @pytest.mark.parametrize("stride", [1, 3])
@@ -169,7 +166,7 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
     def refuse(variant: object) -> None:
         raise SceneError("a hole without a node")
 
-    road = SimpleNamespace(main=refuse)
+    road = SimpleNamespace(varied=refuse)
     own, other = Variant("m"), Variant("m", split=2)
     assert refined._solved(road, other) is None  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="a hole without a node"):
@@ -246,7 +243,7 @@ def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
 
 
 def test_an_experiment_is_named_as_its_file(tmp_path: Path) -> None:
-    head = "from validate.replay.experiment import Experiment\n"
+    head = "from validate.pipeline.experiment.experiment import Experiment\n"
     (tmp_path / "other.py").write_text(f"{head}EXPERIMENT = Experiment('bar', 'A bar', 'made')\n")
     with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'bar', not the file's name"):
         load_file(tmp_path / "other.py")

@@ -19,11 +19,7 @@ from validate.compare.score import Score
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.parameters import with_given
-from validate.recording.types import Recording
-from validate.register.markers import MarkerObservation
-from validate.register.registered import Registered
-from validate.register.signals import SignalObservation
-from validate.replay.experiment import (
+from validate.pipeline.experiment.experiment import (
     Case,
     EffectSpec,
     Experiment,
@@ -33,14 +29,18 @@ from validate.replay.experiment import (
     Variant,
     vary,
 )
-from validate.replay.followed import Cases
-from validate.replay.method import Method
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.replay.tree import Built, Tree
-from validate.replay.variation import change_of
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.experiment.variation import change_of
+from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.road import compare
+from validate.recording.types import Recording
+from validate.register.markers.markers import MarkerObservation
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 
 harder = change_of({"material.E": "x 1.3"})
 shifted = change_of({"sd": "x 2"})

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from validate.parameters import Parameter
+from validate.pipeline.checks.plausible import doubts
+from validate.pipeline.run.followed import Followed
 from validate.recording.types import Frames, Recording, Signal, Source
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay.followed import Followed
-from validate.replay.plausible import doubts
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene
 

@@ -7,8 +7,8 @@ import pytest
 from machine_logs import pressed_cylinder
 
 from validate.parameters import describe
-from validate.replay.pressed import pressed_log
-from validate.replay.refined import Refined
+from validate.pipeline.checks.refined import Refined
+from validate.pipeline.plates.scene import pressed_log
 
 
 def test_a_log_begins_where_the_fitted_line_meets_no_force() -> None:

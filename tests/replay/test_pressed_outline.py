@@ -14,25 +14,25 @@ from validate.arrays import Floats
 from validate.compare.result import MethodResult
 from validate.errors import ComparisonError, RegistrationError, SceneError, UsageError
 from validate.fem.system import build as build_system
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.experiment import Experiment, Uncertainty
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.plates.choices import Compression, PressedOutline
+from validate.pipeline.plates.compression import compression
+from validate.pipeline.plates.outline import with_outline
 from validate.recording.types import Contours, Recording, Signal, Source
 from validate.register.observation import Selection
-from validate.register.outlines import OutlineObservation
+from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay import compare
-from validate.replay.compression import compression
-from validate.replay.compression_cards import Compression, PressedOutline
-from validate.replay.experiment import Experiment, Uncertainty
-from validate.replay.method import Method
-from validate.replay.pressed_outline import with_outline
-from validate.replay.tree import Tree
-from validate.scene.cylinder import whole_cylinder
-from validate.scene.geometry import MeshFile
-from validate.scene.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.cylinder import whole_cylinder
+from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.specification import MeshFile
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_file import write_mesh
+from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.scene.scene import Cavity, Drive
-from validate.solve.fluid import ExactPressure, NoFluid
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
 
 T = np.linspace(0.0, 10.0, 51)
 D, H = 0.02, 0.03
@@ -188,7 +188,7 @@ def test_an_inclusions_wall_of_a_mesh_file_is_judged_with_its_fluid(tmp_path: Pa
 
     def judged(outline: Callable[[float], Floats], *, fluid: bool) -> MethodResult:
         made = recorded(outline)
-        return compare(
+        return run_in_memory(
             replace(
                 experiment(card, tmp_path, fluid=fluid),
                 uncertainty=Uncertainty(),

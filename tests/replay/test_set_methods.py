@@ -10,9 +10,9 @@ import pytest
 from validate.catalogue import experiment_files, name_of
 from validate.errors import UsageError
 from validate.parameters import Parameter, describe
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.options import Options, configure
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options, configure
 
 FILES = sorted(experiment_files(Path(__file__).resolve().parents[2]).values(), key=name_of)
 PARTS = ("settings", "scene")

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from validate.replay import ladder_default, solved
-from validate.scene.box import box, centroids
+from validate.pipeline.ladder import default as ladder_default
+from validate.pipeline.run import solved
+from validate.scene.geometries.box import box, centroids
 
 
 def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,23 +8,23 @@ import pytest
 
 from validate.arrays import Floats
 from validate.catalogue import experiment_files
-from validate.cli.new_scene import geometry_of
+from validate.commands.questions.scene import geometry_of
 from validate.fem.system import build
 from validate.parameters import describe, with_values
+from validate.pipeline import load
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.first_modes import model_of
+from validate.pipeline.bodies.measured import measured_body, solid, static_scene
+from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
+from validate.pipeline.experiment.tree import Meshes, Tree
+from validate.pipeline.run import cost
+from validate.pipeline.run.cost import fits
 from validate.recording.types import Recording, Source
-from validate.replay import cost, load
-from validate.replay.body_mesh import mesh_of, unknowns_of
-from validate.replay.cards import Meshes
-from validate.replay.cost import fits
-from validate.replay.measured_body import measured_body, solid, static_scene
-from validate.replay.measured_cards import MeasuredBody
-from validate.replay.solid_model import model_of
-from validate.replay.tree import Tree
-from validate.scene.geometry import Box
+from validate.scene.geometries.similar_grids import divided, fitting, member, similarity
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.scene.similar_grids import divided, fitting, member, similarity
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 
 PAD, BAR, BRICK = (0.050, 0.050, 0.008), (0.060, 0.030, 0.030), (0.060, 0.045, 0.070)
 _COUNTS = ("along", "across", "up", "radial", "axial", "plane",

@@ -31,16 +31,24 @@ from validate.errors import ComparisonError, UsageError
 from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.pipeline.experiment.experiment import (
+    Case,
+    Experiment,
+    MeshLadder,
+    Told,
+    Twin,
+    Uncertainty,
+    vary,
+)
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.tree import CellSize, Tree
+from validate.pipeline.experiment.variation import change_of
+from validate.pipeline.run.followed import Cases, Truth, truth_of
+from validate.pipeline.run.road import compare
 from validate.recording.types import Recording
 from validate.register.registered import Registered
-from validate.replay.experiment import Case, Experiment, MeshLadder, Told, Twin, Uncertainty, vary
-from validate.replay.followed import Cases, Truth, truth_of
-from validate.replay.method import Method
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.replay.tree import CellSize, Tree
-from validate.replay.variation import change_of
-from validate.solve.newmark import Newmark
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.types import Stepper
 
 METRICS = ("mae", "rmse", "sd", "max", "nrmse")
@@ -62,6 +70,14 @@ def table(result: Result, name: str) -> list[tuple[Any, ...]]:
     found = [t for e in result.exhibits for t in e.tables if t.name == name]
     assert len(found) == 1
     return list(found[0].rows)
+
+
+def speeds(result: Result) -> dict[str, dict[str, float]]:
+    """Speed rows by method and quantity."""
+    found: dict[str, dict[str, float]] = {}
+    for block in result.rows:
+        found.setdefault(block.row.method, {})[block.row.quantity] = float(block.values[0])
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -156,9 +172,8 @@ def test_a_method_that_fails_is_a_row_and_the_others_go_on(whole: Result) -> Non
     for name in ("refused", "diverged"):
         assert not {n for n in scores(whole, name) if n.startswith("node_")}
         assert not of(whole, name).residuals
-    rows = {row[0]: row for row in table(whole, "speeds")}
-    assert rows["refused"][-2:] == (0, "refused at step 0: told so")
-    assert rows["diverged"][-2:] == (7, "diverged at step 7: told so")
+    assert "refused" not in speeds(whole)
+    assert speeds(whole)["diverged"]["steps"] == 7
     cases = [row for row in table(whole, "cases") if row[1] == "diverged"]
     assert [row[0] for row in cases] == ["stiff", "missing"]
     assert all(row[2:] == (None, None, None, "diverged") for row in cases)
@@ -219,9 +234,11 @@ def test_long_steps_are_scored_at_their_own_times(whole: Result) -> None:
     value = scores(whole, "slow")["node_A.max"]
     assert value == pytest.approx(float(np.abs(off).max()), rel=1e-12)
     assert value > 0
-    speed = next(row for row in table(whole, "speeds") if row[0] == "FEM, long steps")
-    assert speed[5] == pytest.approx(3e3 * DT, rel=1e-12)  # ms
-    assert speed[7] == pytest.approx(3 * DT * speed[4], rel=1e-12)  # real-time factor, rate
+    speed, step = speeds(whole)["slow"], found.step_s
+    assert step is not None
+    assert speed["dt"] == pytest.approx(3 * DT, rel=1e-12)
+    assert speed["real-time factor"] == pytest.approx(3 * DT / step.p50, rel=1e-12)
+    assert speed["steps"] == STEPS // 3
 
 
 def test_a_baseline_is_timed_and_neither_scored_nor_run_on_other_cases(whole: Result) -> None:
@@ -238,7 +255,7 @@ def test_a_baseline_is_timed_and_neither_scored_nor_run_on_other_cases(whole: Re
 @pytest.mark.parametrize("method", ["timed", "refused", "diverged"])
 def test_methods_without_a_score_alone_are_a_result_too(method: str) -> None:
     result = run(TINY, method)
-    assert [row[0] for row in table(result, "speeds")] == [METHODS[method].label]
+    assert [(m.name, m.label) for m in result.methods] == [(method, METHODS[method].label)]
     assert not result.passed
 
 

@@ -19,14 +19,14 @@ from test_measured_body import (
 )
 
 from validate.compare.verdict import Accept
+from validate.pipeline import run_in_memory
+from validate.pipeline.bodies.choices import BodyRanges, SeenOf
+from validate.pipeline.checks.uncertain_drives import drive_inputs
 from validate.recording.types import Markers, Signal
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.replay import compare
-from validate.replay.measured_cards import BodyRanges, SeenOf
-from validate.replay.uncertain_drives import drive_inputs
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
 from validate.scene.tracked import Prescribed
@@ -44,7 +44,7 @@ def noisy(sd: float) -> dict[str, Signal]:
 def test_the_sd_of_a_displacement_is_sd_times_stiffness(tmp_path: Path) -> None:
     """u_input = sd dF/du, and the mean of the samples at rest, from which it is counted."""
     p = BASE.with_settings(ranges=SURE)
-    result = compare(experiment(tmp_path, p, recording(signals=noisy(SD)), "force"))
+    result = run_in_memory(experiment(tmp_path, p, recording(signals=noisy(SD)), "force"))
     zeroed = SD * np.sqrt(1 + 1 / int((p.settings.seen.still >= T).sum()))
     assert [i.name for i in result.inputs][-1] == "sd of displacement"
     assert result.inputs[-1].source == "recorded"
@@ -57,7 +57,9 @@ def test_the_sd_of_a_displacement_is_sd_times_stiffness(tmp_path: Path) -> None:
 
 def test_a_drive_without_one_has_no_input(tmp_path: Path) -> None:
     still = {n: replace(s, y=s.y.round(3)) for n, s in noisy(0.0).items()}
-    result = compare(experiment(tmp_path, BASE, recording(signals=still), "force"), quick=True)
+    result = run_in_memory(
+        experiment(tmp_path, BASE, recording(signals=still), "force"), quick=True
+    )
     names = [i.name for i in result.inputs]
     sd = result.methods[0].registered[0].drives[0].sd
     assert ("sd of displacement" in names) == (sd > 0)
@@ -72,7 +74,7 @@ def test_a_force_that_pulls(tmp_path: Path) -> None:
     seen = Markers(T, tuple(PLACES), x + share * stretched(x), 1e-6, "body")
     p = FREE.with_scene(loads=(Load("force", "zmax", "-z"),))
     p = p.with_settings(seen=SeenOf(markers="m", states=9, still=0.4), ranges=SURE)
-    result = compare(
+    result = run_in_memory(
         experiment(tmp_path, p, recording(signals={"force": pull}, markers={"m": seen}), "marker")
     )
     assert [i.name for i in result.inputs][-1] == "sd of force"
@@ -133,7 +135,7 @@ def test_markers_that_move_a_body(tmp_path: Path) -> None:
         tracked=(Prescribed("moved", "zmax", labels=tuple(corners)),),
     ).with_settings(seen=SeenOf(markers="m", states=6, still=0.4), ranges=SURE)  # fmt: skip
     made = experiment(tmp_path, p, recording(markers={"m": markers}), "marker")
-    result = compare(replace(made, accept=(Accept("marker", 1e-4, "of a test"),)))
+    result = run_in_memory(replace(made, accept=(Accept("marker", 1e-4, "of a test"),)))
     drive = result.methods[0].registered[0].drives[0]
     assert sum(i.name.startswith("sd of moved") for i in result.inputs) == 6
     least = 0.5 * drive.sd / np.sqrt(len(corners))

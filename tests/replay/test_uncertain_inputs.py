@@ -11,11 +11,15 @@ from validate.compare.residual import Residual
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.parameters import with_given
-from validate.replay.checks import joint_inputs
-from validate.replay.experiment import Input, Variant
-from validate.replay.find import find
-from validate.replay.inclusion import InclusionRanges, rubbed
-from validate.scene.plates import plates_of_share, rubbing_share
+from validate.pipeline.checks.checks import joint_inputs
+from validate.pipeline.experiment.experiment import Input, Variant
+from validate.pipeline.experiment.find import find
+from validate.pipeline.plates.inclusion import (
+    InclusionRanges,
+    plates_of_share,
+    rubbed,
+    rubbing_share,
+)
 
 
 @pytest.mark.parametrize("name", ["fluid_phantom", "ekf_cone", "ecoflex_cylinder"])
@@ -52,7 +56,9 @@ def test_bonded_and_partial_plates_are_uncertain_too() -> None:
 
 def test_the_default_ranges_are_those_that_a_new_experiment_states() -> None:
     """Also the friction, three hundredths of the share."""
-    template = files("validate.cli").joinpath("new_inclusion.py.txt").read_text("utf-8")
+    template = (
+        files("validate.commands.questions").joinpath("new_inclusion.py.txt").read_text("utf-8")
+    )
     assert "ranges=InclusionRanges(E=0.05, nu=0.005, friction=0.03)," in template
     assert InclusionRanges() == InclusionRanges(E=0.05, nu=0.005, friction=0.03)
     (plates,) = rubbed(PHANTOM, 1.0).scene.foundations
@@ -79,7 +85,7 @@ def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:
         Input("b", lambda p, z: (p[0], p[1] - 4 * z), "second", "assumed"),
     )
 
-    def main(variant: Variant) -> SimpleNamespace:
+    def varied(variant: Variant) -> SimpleNamespace:
         force = np.array([[2.0 + sum(variant.change((0.0, 0.0)))]])
         seen = Residual("force", "3mm", force, 0.0, 0.0, "N", "force")
         return SimpleNamespace(residuals={seen.name: seen})
@@ -88,7 +94,7 @@ def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:
     experiment = SimpleNamespace(
         name="x", uncertainty=declared, accept=(Accept("force", 1.0, "assumed"),)
     )
-    road = SimpleNamespace(experiment=experiment, kind="measured", quick=False, main=main)
+    road = SimpleNamespace(experiment=experiment, kind="measured", quick=False, varied=varied)
     (found,) = joint_inputs(road)  # type: ignore[arg-type]
     assert found.first_order == pytest.approx(5.0, rel=1e-12)
     assert found.sampled == pytest.approx(5.0, rel=0.05)

@@ -10,15 +10,13 @@ from hypothesis import strategies as st
 from validate.catalogue import experiment_files
 from validate.errors import UsageError
 from validate.parameters import describe, value_at
-from validate.replay.cards import TrackedTwin
-from validate.replay.experiment import Case, vary
-from validate.replay.find import load_file
-from validate.replay.measured_cards import MeasuredBody
-from validate.replay.tree import Tree
-from validate.replay.variation import Shift, change_of
-from validate.scene.contact import RigidContact
-from validate.scene.geometry import Box
-from validate.scene.indenter import Indenter
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.experiment.experiment import Case, vary
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.tree import TrackedTwin, Tree
+from validate.pipeline.experiment.variation import Shift, change_of
+from validate.scene.contact import Indenter, RigidContact
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 

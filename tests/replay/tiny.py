@@ -9,26 +9,26 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.verdict import Accept
-from validate.estimate.reduced_kf import ReducedKf
+from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.fem.system import System, build
 from validate.parameters import quantity
+from validate.pipeline.experiment.experiment import Case, Experiment, Twin
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Built, Tree
+from validate.pipeline.experiment.variation import change_of
+from validate.pipeline.run.followed import Truth, truth_of
+from validate.pipeline.run.remade import stamped
 from validate.recording.types import Recording
-from validate.register.follow import follow_signal
-from validate.register.markers import placed_markers
+from validate.register.as_declared import follow_signal
+from validate.register.markers.markers import placed_markers
 from validate.register.registered import Registered
 from validate.register.signals import driving, holds_at, validating
-from validate.replay.experiment import Case, Experiment, Twin
-from validate.replay.followed import Truth, truth_of
-from validate.replay.method import Method
-from validate.replay.remade import stamped
-from validate.replay.tree import Built, Tree
-from validate.replay.variation import change_of
-from validate.scene.geometry import Box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
-from validate.solve.fluid import NoFluid
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
-from validate.solve.newmark import Newmark
 from validate.solve.types import Ending, State, Stepper
 from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
 

@@ -3,9 +3,9 @@
 import pytest
 
 from validate.compare.result import Result
-from validate.replay.experiment import Experiment
-from validate.replay.options import Options
-from validate.replay.road import compare
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
 
 
 @pytest.fixture(scope="session")

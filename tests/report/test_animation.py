@@ -16,10 +16,10 @@ from validate.compare.result import Result
 from validate.register.observation import Selection
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation
-from validate.report.animation import moving_outline
-from validate.report.encode import gif
-from validate.report.loads import at_times, held, in_steps
-from validate.report.observed import driven, holds
+from validate.report.charts.encode import gif
+from validate.report.scenes.animation import moving_outline
+from validate.report.scenes.loads import at_times, held, in_steps
+from validate.report.sections.observed import driven, holds
 from validate.report.write import write_report
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]

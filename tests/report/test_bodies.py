@@ -11,9 +11,9 @@ import pytest
 import report_samples
 from report_samples import small_result
 
-from validate.report import gl
-from validate.report.bodies import _without_gl
-from validate.report.body import ShownBody, shown_body
+from validate.report.scenes import gl
+from validate.report.scenes.bodies import _without_gl
+from validate.report.scenes.body import ShownBody, shown_body
 
 
 def cube_body() -> ShownBody:
@@ -54,21 +54,22 @@ def test_a_probe_that_dies_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
     died = subprocess.CompletedProcess([], -11)
     monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
     monkeypatch.setattr(subprocess, "run", lambda *_a, **_k: died)
-    gl._working_window.cache_clear()
+    gl._KNOWN.clear()
     assert not gl.available()
-    gl._working_window.cache_clear()
+    gl._KNOWN.clear()
 
 
 def test_gl_is_probed_once_by_who_asks_early_and_who_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     probes: list[int] = []
     alive = subprocess.CompletedProcess([], 0)
     monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
-    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "")
     monkeypatch.setattr(subprocess, "run", lambda *_a, **_k: probes.append(1) or alive)
-    gl._working_window.cache_clear()
+    gl._KNOWN.clear()
     gl.ask()
     assert gl.available()
-    gl._working_window.cache_clear()
+    assert gl.available(), "the first answer has set the window class"
+    gl._KNOWN.clear()
     assert len(probes) == 1
 
 
@@ -78,9 +79,9 @@ def test_a_probe_that_hangs_means_no_gl(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
     monkeypatch.setattr(subprocess, "run", hangs)
-    gl._working_window.cache_clear()
+    gl._KNOWN.clear()
     assert not gl.available()
-    gl._working_window.cache_clear()
+    gl._KNOWN.clear()
 
 
 RENDER = """
@@ -91,8 +92,8 @@ from report_samples import small_result
 from validate.report import gl
 if not gl.available():
     raise SystemExit(3)
-from validate.report.body import shown_body
-from validate.report.renders import renders
+from validate.report.scenes.body import shown_body
+from validate.report.scenes.renders import renders
 one = shown_body(small_result())
 for factor in (1.0, 2.0):
     np.savez(f"{sys.argv[1]}/{factor:g}.npz",

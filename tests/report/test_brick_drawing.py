@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from validate.papers.accuracy.rod import bending_rod
-from validate.report import gl
-from validate.report.body import ShownBody
-from validate.report.cut import _polygons
-from validate.report.skin import skins
+from experiments.bending_rod.body import bending_rod
+from validate.report.scenes import gl
+from validate.report.scenes.bodies import _polygons
+from validate.report.scenes.body import ShownBody
+from validate.report.scenes.skin import skins
 from validate.scene.shape_functions import LATTICE
 
 ROD = bending_rod(3)
@@ -55,7 +55,7 @@ def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
         pytest.skip(gl.HOW_TO_GET)
     from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
 
-    from validate.report.renders import vtk_order
+    from validate.report.scenes.renders import vtk_order
 
     theirs = vtkTriQuadraticHexahedron().GetParametricCoords()
     assert LATTICE[3][vtk_order()] == pytest.approx(np.array(theirs[: 3 * 27]).reshape(27, 3))

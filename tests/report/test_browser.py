@@ -106,7 +106,7 @@ def test_why_a_check_ends_as_it_does_is_seen_without_scrolling(
     page = write_report(replace(result, methods=methods), folder, created="2026-11-21T04:00:00Z")
     found, text = look(browser, page, tmp_path, width)
     assert found["overflow"] <= 0
-    assert len(found["whys"]) == 1
+    assert len(found["whys"]) == 2  # of the check, and of the identified value
     assert check.why in text
     for left, right in (*found["whys"], *found["verdicts"]):
         assert 0 <= left < right <= found["wide"]
@@ -119,7 +119,7 @@ def test_dom_of_a_result_over_time(
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     page = write_report(tracking_result(), tmp_path / "box", created="2026-11-21T04:00:00Z")
     found, _ = look(browser, page, tmp_path)
-    assert len(found["pictures"]) == 8  # 3 charts, 2 maps, errors over noise, body, registration
+    assert len(found["pictures"]) == 9  # checks, 3 charts, 2 maps, noise, body, registration
     assert all(width > 300 for width in found["pictures"])
     assert found["overflow"] <= 0
     assert found["spilt"] == []  # no text of a cell lies on the next one

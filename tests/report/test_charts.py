@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from chart_contract import drawn_lines, faults
 from matplotlib.figure import Figure
+from report_samples import sections_of
 from tracking_samples import shown, tracking_result
 
 from validate.compare.exhibit import Chart, Series
 from validate.compare.result import Result
-from validate.replay import load
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.report import charts
-from validate.report.chart_axes import beneath, floor_of
-from validate.report.chart_looks import TOGETHER, alone, panels, styled
-from validate.report.sections import exhibits
-from validate.report.style import ACCEPTED, MEASURED, PALETTE, WIDTH, painted
+from validate.pipeline import load
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
+from validate.report.charts import chart as charts
+from validate.report.charts.axes import beneath, floor_of
+from validate.report.charts.looks import TOGETHER, alone, panel_labels, styled
+from validate.report.charts.style import ACCEPTED, MEASURED, PALETTE, WIDTH, painted
 
 X = np.linspace(0.0, 1.0, 50)
 METHODS = 17
@@ -117,9 +117,9 @@ def test_zigzags_of_several_recordings_keep_their_dashes(result: Result) -> None
 def test_jagged_lines_have_axes_of_their_own(result: Result) -> None:
     x, rng = np.linspace(0, 1, 1000), np.random.default_rng(0)
     rough = [Series(name, x, rng.standard_normal(1000)) for name in ("a", "b")]
-    assert panels(chart(*rough)) == ("a", "b")
+    assert panel_labels(chart(*rough)) == ("a", "b")
     swings = [Series(name, x, np.sin(f * x)) for name, f in (("a", 40.0), ("b", 30.0))]
-    assert panels(chart(*swings)) == ()
+    assert panel_labels(chart(*swings)) == ()
     smooth = [Series("first", x, x), Series("smooth", x, 2 * x), rough[0]]
     (ax,) = drawn(result, chart(*smooth)).axes
     assert [line.get_linestyle() for line in ax.get_lines()] == ["-", "--", "-"]
@@ -172,7 +172,7 @@ def test_names_of_levels_lie_beside_the_axes(result: Result) -> None:
 @pytest.mark.parametrize("name", ["needle_block", "bending_rod", "ekf_cube"])
 def test_charts_of_shipped_experiments_keep_the_contract(name: str) -> None:
     found = compare(load(name), Options({}, quick=True))
-    shown_charts = [c for e in exhibits(found, lambda _: None) for c in e.charts]
+    shown_charts = [c for e in sections_of(found) for c in e.charts]
     assert shown_charts
     wrong = {c.name: faults(drawn(found, c)) for c in shown_charts}
     assert not any(wrong.values()), wrong

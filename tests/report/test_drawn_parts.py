@@ -9,14 +9,12 @@ import pytest
 from matplotlib.figure import Figure
 from report_samples import small_result
 
-from validate.compare.effects import Change, Effect
 from validate.recording.types import Recording, Source
-from validate.report import curves, cut, markers, outlines
-from validate.report.body import ShownIndenter, shown_body
-from validate.report.discrimination import _budget
-from validate.report.provenance import _assumed, _metadata, _points
-from validate.report.registration import _residuals
-from validate.report.renders import _fill, _View, drawn_indenter, renders
+from validate.report.scenes import bodies, markers, outlines
+from validate.report.scenes.body import ShownIndenter, shown_body
+from validate.report.scenes.renders import _fill, _View, drawn_indenter, renders
+from validate.report.sections.provenance import _assumed, _metadata, _points
+from validate.report.sections.registration import _residuals
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere, Shape
 
 
@@ -64,7 +62,7 @@ def test_a_cut_takes_the_plates_with_it_and_rest_is_rest() -> None:
 
 def test_the_body_is_shown_deformed_and_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     views: dict[str, _View] = {}
-    module = "validate.report.renders._picture"
+    module = "validate.report.scenes.renders._picture"
     monkeypatch.setattr(module, lambda name, words, body, view: views.update({name: view}))
     renders(shown_body(small_result()))
     assert {name: (v.scale, v.oblique, v.edges) for name, v in views.items()} == {
@@ -77,11 +75,11 @@ def test_the_body_is_shown_deformed_and_at_rest(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_section_fills_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     square = np.array([[1.0, 10.0], [3.0, 10.0], [3.0, 14.0], [1.0, 14.0]])
-    monkeypatch.setattr(cut, "_polygons", lambda body, normal: ([square], np.array([0.5])))
+    monkeypatch.setattr(bodies, "_polygons", lambda body, normal: ([square], np.array([0.5])))
     body = shown_body(small_result())
     assert body is not None
     figure = Figure()
-    cut._axes(figure, body, np.array([0.0, 0.0, 1.0]))
+    bodies._axes(figure, body, np.array([0.0, 0.0, 1.0]))
     assert figure.axes[0].get_xlim() == pytest.approx((1 - 0.24, 3 + 0.24))
     assert figure.axes[0].get_ylim() == pytest.approx((10 - 0.24, 14 + 0.24))
 
@@ -140,35 +138,8 @@ def test_every_load_shows_the_section_of_the_judged_method(
     assert shown == [judged, ("judged's", "judged")]
 
 
-def test_a_budget_has_the_quantities_of_its_load() -> None:
-    def moved(name: str, size: float) -> Change:
-        return Change(name, size, size, "m", 3.0)
-
-    other = Effect("nu", "ratio", (moved("pressure@1mm", 1.0), moved("force@2mm", 2.0)), (), ())
-    table = _budget((other,))
-    assert [h.split(" /")[0] for h in table.headings[1:-2]] == ["force"]
-
-
 def test_a_result_without_methods_has_no_registration_to_show() -> None:
     assert _residuals(Made(recordings=(Made(name="a"),), registered=())).rows == ()
-
-
-def test_lines_hide_each_other_within_a_share_of_the_largest_range(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    method = Made(name="soft", label="soft")
-    logs = [(0, None, Made(y=np.array([0.0, 2.0]))), (1, None, Made(y=np.array([1.0, 11.0])))]
-    line = Made(method=method, y=(np.zeros(2),))
-    within: list[float] = []
-    for name, value in {
-        "finished": lambda result: [method],
-        "_line": lambda method, quantity: line,
-        "_logs": lambda method, quantity: logs,
-        "distinct": lambda pairs, size: within.append(size) or {},
-    }.items():
-        monkeypatch.setattr(curves, name, value)
-    assert curves._lines(Made(methods=(method,)), "force") == ([line], [])
-    assert within == [pytest.approx(0.1)]
 
 
 def test_what_was_assumed_of_a_file_stands_apart_and_unfolded() -> None:

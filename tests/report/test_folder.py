@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from validate.errors import UsageError
-from validate.report import folder as folders
-from validate.report.folder import MARK, STUDIES, locked, replace_folder
+from validate.report.stored import folder as folders
+from validate.report.stored.folder import MARK, STUDIES, locked, replace_folder
 
 
 def fill(text: str) -> object:
@@ -72,7 +72,7 @@ def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
 HOLD = """
 import sys
 from pathlib import Path
-from validate.report.folder import locked
+from validate.report.stored.folder import locked
 with locked(Path(sys.argv[1]), shared=len(sys.argv) > 2):
     print("held", flush=True)
     sys.stdin.read()

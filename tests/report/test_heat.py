@@ -3,7 +3,7 @@
 import numpy as np
 
 from validate.compare.exhibit import Heat
-from validate.report.heat import _norm, picture
+from validate.report.charts.heat import _norm, picture
 
 VALUES = np.array([[0.1, 1.0, 100.0], [np.nan, 2.0, 0.5]])
 HEAT = Heat("nis_kf", "NIS", "Q", "R", ("1", "2", "3"), ("a", "b"), VALUES, "NIS per dof / 1", 1.0)

@@ -9,10 +9,11 @@ import pytest
 from report_samples import small_result
 
 from validate.report import write
-from validate.report.folder import MARK
-from validate.report.history import LINES, replaced
-from validate.report.made import Commit, Made
-from validate.report.since import history, since
+from validate.report.export.table_file import CSV, PARQUET
+from validate.report.stored.folder import MARK
+from validate.report.stored.history import LINES, current, replaced
+from validate.report.stored.made import Commit, Made
+from validate.report.stored.since import history, since
 from validate.report.write import write_report
 from validate.seals import sealed
 
@@ -21,7 +22,7 @@ DAYS = [f"2026-11-2{i}T04:00:00+00:00" for i in range(1, 6)]
 
 @pytest.fixture(autouse=True)
 def _draws_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fill(result: object, folder: Path, content: Any, *_: object) -> None:
+    def fill(result: object, table: object, folder: Path, content: Any, *_: object) -> None:
         write.write_json(content, folder / MARK)
 
     monkeypatch.setattr(write, "_fill", fill)
@@ -58,8 +59,21 @@ def test_runs_whose_code_is_unknown_are_never_alike(tmp_path: Path) -> None:
     assert [r.created for r in history(tmp_path, "cube")] == DAYS[:2]
 
 
-def test_a_report_of_before_has_a_history_too(tmp_path: Path) -> None:
+def test_the_line_of_a_table_is_that_of_the_document(tmp_path: Path) -> None:
+    """Digit by digit, whichever of the two a version left."""
     folder = wrote(tmp_path / "cube", 0, made("a"))
+    line = current(folder)
+    assert line is not None
+    checks = [(m.name, c) for m in small_result().methods for c in m.checks]
+    assert [(c["method"], c["value"], c["u_num"], c["margin"], c["verdict"], c["raw"])
+            for c in line["checks"]] == [
+        (name, c.value, c.u_num, c.margin, c.verdict, c.raw) for name, c in checks
+    ]  # fmt: skip
+    assert current(without_table(folder)) == line
+
+
+def test_a_report_of_before_has_a_history_too(tmp_path: Path) -> None:
+    folder = without_table(wrote(tmp_path / "cube", 0, made("a")))
     content = json.loads((folder / MARK).read_text("utf-8"))
     del content["made"], content["changed"]
     (folder / MARK).write_text(json.dumps(sealed(content)), "utf-8")
@@ -98,10 +112,23 @@ def test_a_line_that_was_edited_or_damaged_is_told_and_left_out(
         assert "cube/history.jsonl, line 1: ignored" in caplog.text
 
 
+def without_table(folder: Path) -> Path:
+    """The folder as a version before the long table left it."""
+    (table,) = (f for f in folder.iterdir() if f.name in (PARQUET, CSV))
+    table.unlink()
+    return folder
+
+
 def test_an_edited_result_is_told_and_no_run(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = wrote(tmp_path / "cube", 0, made("a"))
+    table = next(f for f in folder.iterdir() if f.name in (PARQUET, CSV))
+    table.write_bytes(table.read_bytes()[:-20])
+    assert history(tmp_path, "cube") == ()
+    assert f"cube/{table.name}: ignored (" in caplog.text
+    without_table(folder)
+    assert len(history(tmp_path, "cube")) == 1
     text = (folder / MARK).read_text("utf-8")
     (folder / MARK).write_text(text.replace('"quick": false', '"quick": true'), "utf-8")
     assert (folder / MARK).read_text("utf-8") != text

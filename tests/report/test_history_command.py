@@ -9,8 +9,9 @@ from commands import here, refused
 from report_samples import small_result
 
 from validate.parameters import Changed
-from validate.report.made import Commit, Made
-from validate.report.store import document, write_json
+from validate.report.stored.made import Commit, Made
+from validate.report.stored.plain import write_json
+from validate.report.stored.store import document
 
 
 @pytest.fixture

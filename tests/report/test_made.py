@@ -10,13 +10,13 @@ import pytest
 from report_samples import small_result
 
 from validate.parameters import Changed
-from validate.report import environment as module
-from validate.report.environment import environment
 from validate.report.exhibits import draw_all
 from validate.report.html import page
-from validate.report.made import Commit, Made, UsedFile, commit_of, made
-from validate.report.provenance import how
-from validate.report.store import document, schema
+from validate.report.sections.provenance import how
+from validate.report.stored import environment as module
+from validate.report.stored.environment import environment
+from validate.report.stored.made import Commit, Made, UsedFile, commit_of, made
+from validate.report.stored.store import document, schema
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -103,7 +103,7 @@ def test_command_and_files_without_the_folders_of_the_machine(clone: Path) -> No
 def test_the_file_and_the_page_say_it() -> None:
     by = Made(
         "validate run cube", Commit("a" * 40, dirty=True), None, "b" * 64,
-        (UsedFile("mesh", "cube.npz", "c" * 64, 12),),
+        (UsedFile("mesh", "cube.npz", "c" * 64, 12),), ("gauges 1.2",),
     )  # fmt: skip
     result = replace(small_result(), changed=(Changed("material.E", 1e4, 1.4e4, "Pa"),))
     content = document(result, CREATED, by)
@@ -114,9 +114,11 @@ def test_the_file_and_the_page_say_it() -> None:
     told = content["made"]
     assert (told["command"], told["commit"], told["dirty"]) == ("validate run cube", "a" * 40, True)
     assert told["files"][0]["sha256"] == "c" * 64
+    assert told["plug_ins"] == ["gauges 1.2"]
     changed, code, files = how(result, by).tables
     assert changed.rows == (("material.E", "10000", "14000", "Pa"),)
     assert ("commit", "aaaaaaaaaa, with changes") in code.rows
+    assert ("plug-ins", "gauges 1.2") in code.rows
     assert files.rows == (("mesh", "cube.npz", 12, "c" * 64),)
     assert how(small_result(), Made()).tables[0].note == "None differs."
 

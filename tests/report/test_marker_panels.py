@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.report.markers import _limits
+from validate.report.scenes.markers import _limits
 
 
 def test_a_line_along_one_axis_has_room_across() -> None:

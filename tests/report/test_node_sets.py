@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from validate.report import node_sets
-from validate.report.maps import TOWARD_EYE, facing, screen
-from validate.report.node_sets import node_sets_picture
-from validate.scene.box import box
+from validate.report.scenes import node_sets
+from validate.report.scenes.maps import TOWARD_EYE, facing, screen
+from validate.report.scenes.node_sets import node_sets_picture
+from validate.scene.geometries.box import box
 
 MESH = box((0.1, 0.1, 0.1), (2, 2, 2))
 TOP, BOTTOM = MESH.facet_nodes("z1"), MESH.facet_nodes("z0")

@@ -14,8 +14,10 @@ from junitparser import Error, Failure, JUnitXml, Skipped
 from pylatexenc.latexwalker import LatexEnvironmentNode, LatexWalker, get_default_latex_context_db
 from pylatexenc.macrospec import EnvironmentSpec
 
-from validate.cli.main import cli
-from validate.report.outside import junit, latex
+from validate.commands.export import checks_in_latex
+from validate.commands.main import cli
+from validate.report.export.outside import junit
+from validate.report.long_table import long_table
 from validate.seals import sealed
 
 
@@ -120,13 +122,17 @@ def test_a_printed_figure_that_fell_is_a_failure(tmp_path: Path) -> None:
     assert [s.failures for s in found.values()] == [0, 0, 0, 1]
 
 
+def latex(*checks: dict[str, Any]) -> str:
+    return checks_in_latex(long_table(content(*checks), "run"))
+
+
 def test_latex_escapes_and_is_a_whole_table() -> None:
-    table = latex(content(check("a_b@1", "good enough"), check("c", "fitted", None)))
+    table = latex(check("a_b@1", "good enough"), check("c", "fitted", None))
     assert (
-        r"FEM\_1 \& 50 \% & a\_b@1 & $1.5\times10^{-5}$ & $2$ & $9$ & $5$ & m & 7 & good enough & "
+        r"FEM\_1 \& 50 \% & a\_b@1 & good enough & differs & $0.0150$ & $4\,000$ & $9\,000$ & "
         in table
     )
-    assert " -- & $2$" in table
+    assert "& fitted & differs & -- & $4\\,000$" in table
     assert table.isascii()
     known = get_default_latex_context_db()
     known.add_context_category("own", environments=[EnvironmentSpec("tabular", "{")], prepend=True)
@@ -134,7 +140,7 @@ def test_latex_escapes_and_is_a_whole_table() -> None:
     (tabular,) = (n for n in nodes if isinstance(n, LatexEnvironmentNode))
     assert tabular.environmentname == "tabular"
     inside = tabular.latex_verbatim().splitlines()
-    assert {line.replace(r"\&", "").count("&") for line in inside if "&" in line} == {9}
+    assert {line.replace(r"\&", "").count("&") for line in inside if "&" in line} == {10}
 
 
 def test_latex_typesets_it(tmp_path: Path) -> None:
@@ -142,9 +148,7 @@ def test_latex_typesets_it(tmp_path: Path) -> None:
         assert os.environ.get("VALIDATE_REQUIRE_LATEX") != "1", "no pdflatex"
         pytest.skip("no pdflatex (VALIDATE_REQUIRE_LATEX=1 makes this a failure)")
     rows = (check("a_b@1 {x}~^", "good enough"), check("50 % \\ # $", "fitted", None))
-    document = (
-        r"\documentclass{article}\begin{document}" + latex(content(*rows)) + r"\end{document}"
-    )
+    document = r"\documentclass{article}\begin{document}" + latex(*rows) + r"\end{document}"
     (tmp_path / "x.tex").write_text(document)
     said = subprocess.run(
         ["pdflatex", "-halt-on-error", "x.tex"], cwd=tmp_path, capture_output=True, text=True

@@ -6,16 +6,15 @@ from html import unescape
 from html.parser import HTMLParser
 
 import pytest
-from report_samples import BLIND, CHECK, bare_result, small_result
+from report_samples import BLIND, CHECK, bare_result, sections_of, small_result
 
 from validate.compare.effects import Change
 from validate.compare.result import Result
 from validate.compare.verdict import Acceptance, Validation
 from validate.report.exhibits import DrawnExhibit, draw_all
+from validate.report.export.tables import shown
 from validate.report.html import page
-from validate.report.sections import exhibits
-from validate.report.tables import shown
-from validate.report.verdicts import band
+from validate.report.sections.verdicts import band
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -26,7 +25,7 @@ def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def made(result: Result) -> tuple[dict[str, DrawnExhibit], str]:
-    drawn = draw_all(result, exhibits(result, lambda _: None))
+    drawn = draw_all(result, sections_of(result))
     return {d.exhibit.anchor: d for d in drawn if d.shown}, page(
         result, drawn, CREATED, band(result)
     )
@@ -87,9 +86,9 @@ def test_sections_when_nothing_finished() -> None:
 def test_all_recordings_are_drawn() -> None:
     found, _ = made(small_result())
     level, off = found["curves"].exhibit.charts
-    assert "2 recordings" in level.caption
-    labels = [s.label for s in level.series if s.style == "points"]
+    labels = [s.name for s in level.series if s.style == "points"]
     assert labels == ["measured, cube_a", "measured, cube_b"]
+    assert (level.x, level.y) == ("stage / mm", "force.plate / N")
     assert off.linear == pytest.approx(0.04)
 
 
@@ -148,9 +147,9 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
         "force@3mm", "N", "0.0200", "0.0300", "? 50.0", "12",
     ]  # fmt: skip
     assert [shown(c) for c in table.rows[0]] == [
-        "soft", "force.plate@2mm", "✓ good enough", "not distinguishable", "N", "0.0100", "0.0400",
-        "0.500", "0.450", "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1",
-        "|E| is 0.5 u_val. Limit: ours: a half.",
+        "soft <cube>", "force.plate@2mm", "✓ good enough", "not distinguishable", "0.0100",
+        "0.0400", "0.500", "0.450", "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1",
+        "ours: a half", "|E| is 0.5 u_val",
     ]  # fmt: skip
 
 
@@ -173,10 +172,10 @@ def test_references_without_noise_are_no_sensors() -> None:
     soft = replace(soft, residuals={**soft.residuals, noiseless.name: noiseless})
     found, _ = made(replace(result, effects=(effect, BLIND), methods=(soft,)))
     tables = found["discrimination"].exhibit.tables
-    assert tables[0].headings == ("effect", "force.plate")
-    assert [shown(c) for c in tables[0].rows[0]] == ["modulus: E 10 % higher", "✓ 7.0"]
-    assert [shown(c) for c in tables[0].rows[1]] == ["nu: nu 0.45", "0.1"]
-    assert [getattr(row[1], "emphasis", None) for row in tables[0].rows] == ["good", ""]
+    assert tables[0].headings == ("variation", "note", "force.plate")
+    assert [shown(c) for c in tables[0].rows[0]] == ["modulus", "E 10 % higher", "7.00"]
+    assert [shown(c) for c in tables[0].rows[1]] == ["nu", "nu 0.45", "0.100"]
+    assert tables[1].headings[2:] == ("force.plate / N", "volume.relative_error")
 
 
 def test_a_line_on_another_is_named() -> None:

@@ -9,8 +9,8 @@ import pytest
 import pyvista as pv
 from tracking_samples import SIDE, tracking_result
 
-from validate.report.observed import markers_seen
-from validate.report.paraview import MOST, write_series
+from validate.report.export.paraview import MOST, write_series
+from validate.report.sections.observed import markers_seen
 from validate.report.write import write_report
 from validate.scene.scene import Scene
 

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import jsonschema
 import pytest
-from report_samples import CHECK
+from report_samples import CHECK, sections_of
 
 from validate.compare.result import Result
-from validate.register.outline_geometry import normal_distances
+from validate.register.outlines.distances import normal_distances
 from validate.report.exhibits import DrawnExhibit, draw_all
-from validate.report.observed import outline_seen
-from validate.report.sections import SECTIONS, exhibits
-from validate.report.store import document, schema
-from validate.report.tables import shown as read
+from validate.report.export.tables import shown as read
+from validate.report.sections.observed import outline_seen
+from validate.report.sections.sections import SECTIONS
+from validate.report.stored.store import document, schema
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
 
@@ -21,12 +21,12 @@ pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark
 def sections(result: Result) -> dict[str, DrawnExhibit]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VALIDATE_NO_GL", "1")
-        drawn = draw_all(result, exhibits(result, lambda _: None))
+        drawn = draw_all(result, sections_of(result))
     return {d.exhibit.anchor: d for d in drawn if d.shown}
 
 
 def test_all_sections_that_apply(result: Result, sections: dict[str, DrawnExhibit]) -> None:
-    left_out = {make.__name__ for make in SECTIONS} - set(sections) - {"published"}
+    left_out = {s.anchor for s in SECTIONS} - set(sections) - {"published"}
     assert left_out == {"checks"}
     assert ("published" in sections) == bool(result.published)
 
@@ -36,8 +36,8 @@ def test_pictures_of_the_paper(sections: dict[str, DrawnExhibit]) -> None:
     assert names == {
         "outline", "outlines", "chart_outline_errors", "markers", "markers_across",
         "errors_over_noise",
-        "chart_curve_force_plate", "chart_curve_force_plate_error", "chart_curve_pressure",
-        "chart_curve_pressure_error", "chart_volume_ratio", "cut", "registration",
+        "chart_curve_force_plate", "chart_difference_force_plate", "chart_curve_pressure",
+        "chart_difference_pressure", "chart_curve_inclusion_volume_ratio", "cut", "registration",
     }  # fmt: skip
 
 

@@ -10,16 +10,16 @@ from chart_contract import faults
 from matplotlib.figure import Figure
 from report_samples import small_result
 
-from validate.recording.images.outline import outlines_of
+from validate.recording.outlines.outline import outlines_of
 from validate.recording.types import Contours, Frames, Recording, Source
-from validate.register.quality import Registration, register_points
-from validate.report import outline_images as module
-from validate.report.observed import Held
-from validate.report.outline_images import outline_images
-from validate.report.over_noise import noise_rows, over_noise
-from validate.report.plane import flattest
-from validate.report.residual_arrows import arrow_axes, magnified, residual_arrows
-from validate.report.style import WIDTH, painted
+from validate.register.markers.quality import Registration, register_points
+from validate.report.charts.style import WIDTH, painted
+from validate.report.scenes import outline_images as module
+from validate.report.scenes.body import flattest
+from validate.report.scenes.outline_images import outline_images
+from validate.report.scenes.residual_arrows import arrow_axes, magnified, residual_arrows
+from validate.report.sections.discrimination import noise_rows, over_noise
+from validate.report.sections.observed import Held
 
 SD = 1e-4  # m
 
@@ -142,7 +142,7 @@ def test_images_leave_room_for_their_labels(
         seen.append(painted(*drawing))
         return np.zeros((1, 1, 3), np.uint8)
 
-    monkeypatch.setattr("validate.report.outline_images.draw", kept)
+    monkeypatch.setattr("validate.report.scenes.outline_images.draw", kept)
     holds = tuple(Held(f"{i}mm", 1e-3 * i, "m", float(i)) for i in range(count))
     assert len(outline_images(made, "outline", holds, SECTIONS[:count], "a model")) == 1
     assert faults(seen[0]) == []

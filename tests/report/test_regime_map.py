@@ -5,7 +5,7 @@ import pytest
 
 from validate.compare.exhibit import Mark, Panel, RegimeMap
 from validate.errors import ComparisonError
-from validate.report.regime_map import _edges, picture
+from validate.report.charts.regime_map import _edges, picture
 
 X = np.array([1e-3, 1e-2, 1e-1])
 CODES = np.array([[0, 0, 1], [0, 1, 2]])

@@ -31,11 +31,13 @@ from validate.installation import install_command
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames
-from validate.register.outline_geometry import normal_distances
-from validate.register.plane import from_image
-from validate.report import observed, replay_mcap, replay_signals
-from validate.report.replay_mcap import tracks, views, write_replay
-from validate.report.replay_view import Track
+from validate.register.outlines.distances import normal_distances
+from validate.register.outlines.plane import from_image
+from validate.report.replay import mcap as replay_mcap
+from validate.report.replay import signals as replay_signals
+from validate.report.replay.mcap import tracks, views, write_replay
+from validate.report.replay.view import Track
+from validate.report.sections import observed
 from validate.scene.mesh import boundary_facets
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
@@ -302,7 +304,7 @@ def test_what_it_was_made_from(path: Path, result: Result) -> None:
         "path": "fluid_phantom.mcap", "sha256": source.sha256, "bytes": str(source.bytes),
         "integrity": "verified",
     }  # fmt: skip
-    record = found["validate.replay"]
+    record = found["validate.pipeline"]
     assert (record["experiment"], record["method"]) == ("fluid_phantom", "p1_fluid")
     assert (record["thinned"], record["left_out"]) == ("nothing", "other methods: p1_dry")
     assert "linearly in the drive" in record["interpolated"]
@@ -566,7 +568,7 @@ def test_several_recordings_each_under_its_name(tmp_path: Path) -> None:
                          ("surface/simulated/scene", 61), ("surface/simulated/points", 61))
     }  # fmt: skip
     assert set(metadata(tmp_path / "replay.mcap")) == {
-        "validate.replay", "input/cube_a", "input/cube_b"
+        "validate.pipeline", "input/cube_a", "input/cube_b"
     }  # fmt: skip
     assert "/somewhere" not in str(metadata(tmp_path / "replay.mcap"))
     assert inspect_recording(tmp_path / "replay.mcap").defects == ()
@@ -584,7 +586,7 @@ def test_nothing_simulated_when_nothing_finished(tmp_path: Path) -> None:
     ended = replace(ended, runs=(ended.run, ended.run))
     write_replay(replace(result, methods=(ended,)), tmp_path / "replay.mcap")
     assert all(t.endswith("/measured") for t in read(tmp_path / "replay.mcap"))
-    left_out = metadata(tmp_path / "replay.mcap")["validate.replay"]["left_out"]
+    left_out = metadata(tmp_path / "replay.mcap")["validate.pipeline"]["left_out"]
     assert left_out == "everything simulated: no method finished"
 
 
@@ -599,7 +601,7 @@ def test_a_signal_without_a_trace_is_named(tmp_path: Path) -> None:
     one = result.methods[0]
     runs = tuple(replace(r, traces={"updates": r.traces["updates"]}) for r in one.runs)
     write_replay(replace(result, methods=(replace(one, runs=runs),)), tmp_path / "replay.mcap")
-    left_out = metadata(tmp_path / "replay.mcap")["validate.replay"]["left_out"]
+    left_out = metadata(tmp_path / "replay.mcap")["validate.pipeline"]["left_out"]
     assert "/cube_a/force/simulated: the run does not predict it" in left_out
 
 
@@ -669,7 +671,7 @@ def test_many_images_are_thinned_but_for_the_loads(
     kept = [ns for ns, _ in found["/image/measured"]]
     assert 8 <= len(kept) < 20
     assert {ns for ns, _ in found["/outline/measured"]} <= set(kept)
-    thinned = metadata(tmp_path / "replay.mcap")["validate.replay"]["thinned"]
+    thinned = metadata(tmp_path / "replay.mcap")["validate.pipeline"]["thinned"]
     assert "of 31 images, and those at the loads" in thinned
 
 
@@ -684,6 +686,6 @@ def test_too_large_a_file_is_thinned_and_says_so(
     assert 10 <= len(found["/surface/simulated/scene"]) < 61
     assert len(found["/outline/simulated"]) == 4
     assert len(found["/force/measured"]) < 371
-    thinned = metadata(tmp_path / "replay.mcap")["validate.replay"]["thinned"]
+    thinned = metadata(tmp_path / "replay.mcap")["validate.pipeline"]["thinned"]
     assert "/force/measured: one in" in thinned
     assert "interpolated instants: one in 4" in thinned

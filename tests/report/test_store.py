@@ -1,6 +1,7 @@
 """results.json: valid against its schema, SI, no NaN, no places; runs readable without pickle."""
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +10,17 @@ import numpy as np
 import pytest
 from report_samples import CHECK, bare_result, small_result
 
+from validate.compare.exhibit import TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import Score
-from validate.report.environment import without_folder
-from validate.report.over_noise import _row
-from validate.report.registration import _statistics
-from validate.report.store import Json, _rest, document, schema, write_json, write_runs
+from validate.errors import UsageError
+from validate.report.export.fields import open_fields, write_fields
+from validate.report.sections.discrimination import _row
+from validate.report.sections.registration import _rest as rest_table
+from validate.report.stored.environment import without_folder
+from validate.report.stored.plain import write_json
+from validate.report.stored.store import Json, _rest, document, schema
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -52,7 +57,9 @@ def test_every_table_shows_the_root_mean_square() -> None:
     seen = Residual("force.plate", "2mm", values, 0.3, 0.4, "N", "plate force")
     rms = np.sqrt(50 / 3)
     assert _rest(seen)["rms"] == pytest.approx(rms)
-    assert _statistics(seen) == pytest.approx((rms, 5.0, np.sqrt(2) * 0.3))
+    (row,) = rest_table((seen,)).rows
+    sizes = [cell.value for cell in row if isinstance(cell, TableCell)]
+    assert sizes == pytest.approx([rms, 5.0, np.sqrt(2) * 0.3])
     method = replace(small_result().methods[0], residuals={seen.name: seen})
     ((_, ratio),) = _row([method], "force.plate").ratios
     assert ratio == pytest.approx(rms / np.sqrt(2 * (0.3**2 + 0.4**2)))
@@ -112,15 +119,37 @@ def test_schema_refuses_a_wrong_verdict() -> None:
         jsonschema.validate(content, schema())
 
 
-def test_runs_without_pickle(tmp_path: Path) -> None:
+def test_fields_are_arrays_with_dimensions_and_units(tmp_path: Path) -> None:
+    pytest.importorskip("h5netcdf")
     result = small_result()
-    write_runs(result, tmp_path)
-    with np.load(tmp_path / "soft.npz", allow_pickle=False) as stored:
-        first = result.methods[0].run
-        np.testing.assert_array_equal(stored["u"], first.u)
-        np.testing.assert_array_equal(stored["t"], first.t)
+    (tmp_path / "runs").mkdir()
+    write_fields(result, tmp_path / "runs")
+    names = {"soft.nc", "soft_2.nc", "stiff.nc", "stiff_2.nc"}
+    assert {f.name for f in (tmp_path / "runs").iterdir()} == names
+    first, second = result.methods[0].runs
+    with open_fields(tmp_path, "soft") as stored:
+        assert stored.u.dims == ("frame", "node", "axis")
+        np.testing.assert_array_equal(stored.u, first.u)
+        np.testing.assert_array_equal(stored.time, first.t)
+        np.testing.assert_array_equal(stored.frame, first.t[first.at])
         np.testing.assert_array_equal(stored["at"], first.at)
-        np.testing.assert_array_equal(stored["nodes"], result.methods[0].scene.mesh.nodes)
-        assert stored["cells"].shape[1] == 4
-        assert {"t_2", "u_2", "at_2"} <= set(stored.files)
-        assert not {"allow_pickle"} & set(stored.files)
+        np.testing.assert_array_equal(stored.nodes, result.methods[0].scene.mesh.nodes)
+        np.testing.assert_array_equal(stored.cells, result.methods[0].scene.mesh.cells)
+        force = stored["trace:stage.force"]
+        np.testing.assert_array_equal(force, first.traces["stage.force"].y)
+        assert (force.dims, force.units, stored.u.units) == (("time",), "N", "m")
+        assert stored.attrs == {"experiment": "cube", "method": "soft"}
+    with open_fields(tmp_path, "soft", 2) as stored:
+        np.testing.assert_array_equal(stored.u, second.u)
+
+
+def test_fields_that_are_not_there_or_not_readable_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "runs").mkdir()
+    write_fields(small_result(), tmp_path / "runs")
+    with pytest.raises(UsageError, match=r"no fields of sfot in .*; nearest: soft"):
+        open_fields(tmp_path, "sfot")
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(UsageError, match=r"need xarray and h5netcdf: .*tables"):
+        open_fields(tmp_path, "soft")

@@ -1,6 +1,5 @@
 """The folder: complete or not there, the old one kept until the new one is complete."""
 
-import csv
 import json
 import subprocess
 import sys
@@ -15,10 +14,14 @@ from report_samples import small_result
 from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
 from validate.errors import UsageError
-from validate.report import sections
+from validate.report.export import parquet
+from validate.report.export.table_file import CSV, PARQUET, stored_table
+from validate.report.sections import sections
+from validate.report.sections.sections import Section
 from validate.report.write import write_report
 
 CREATED = "2026-11-21T04:00:00Z"
+LONG_TABLE = PARQUET if parquet.available() else CSV
 
 
 @pytest.fixture(autouse=True)
@@ -35,10 +38,11 @@ def test_files_without_gl(tmp_path: Path) -> None:
     folder = path.parent
     names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     assert names >= {
-        "report.html", "results.json", "runs/soft.npz", "runs/stiff.npz", "figures/map_body.png",
-        "figures/chart_curve_force_plate.png", "tables/scores.csv", "tables/checks.csv",
-        "tables/effects.csv", "tables/published.csv", "tables/load_displacement.csv",
+        "report.html", "results.json", "runs/soft.nc", "runs/stiff.nc", "figures/map_body.png",
+        "figures/chart_curve_force_plate.png", LONG_TABLE,
     }  # fmt: skip
+    now_in_it = ("scores", "residuals", "effects", "checks", "published", "identified")
+    assert not names & {f"tables/{name}.csv" for name in now_in_it}
     assert "libegl1 and libgl1-mesa-dri" in path.read_text()
     assert json.loads((folder / "results.json").read_text())["experiment"] == "cube"
     assert steps[0] == "runs"
@@ -55,16 +59,15 @@ def test_figures_are_whole_pictures(tmp_path: Path) -> None:
             assert len(set(image.convert("L").tobytes())) > 10
 
 
-def test_tables_are_si(tmp_path: Path) -> None:
+def test_samples_are_si(tmp_path: Path) -> None:
     folder = write_report(small_result(), tmp_path / "cube", created=CREATED).parent
-    with (folder / "tables" / "load_displacement.csv").open(newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    assert {(r["recording"], r["who"]) for r in rows} == {
+    table = stored_table(folder, part="sample")
+    rows = table.where(quantity="force.plate").rows
+    assert {(r.recording, r.method) for r in rows} == {
         (a, b) for a in ("cube_a", "cube_b") for b in ("measured", "soft", "stiff")
     }
-    last = [r for r in rows if r["who"] == "soft"][-1]
-    assert float(last["drive_m"]) == pytest.approx(0.002)
-    assert float(last["value"]) == pytest.approx(4.0)
+    assert table.where(role="drives").rows[-1].value == pytest.approx(0.002)
+    assert [r for r in rows if r.method == "soft"][-1].value == pytest.approx(4.0)
 
 
 @pytest.mark.slow
@@ -89,7 +92,9 @@ def test_failing_figure_leaves_the_old_report(
     def fails(_: Result) -> Exhibit:
         raise RuntimeError("no figure today")
 
-    monkeypatch.setattr(sections, "SECTIONS", (*sections.SECTIONS[:2], fails))
+    monkeypatch.setattr(
+        sections, "SECTIONS", (*sections.SECTIONS[:2], Section("x", "X", also=fails))
+    )
     with pytest.raises(RuntimeError, match="no figure today"):
         write_report(replace(small_result(), title="Second"), folder, created=CREATED)
     assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before

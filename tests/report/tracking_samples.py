@@ -12,10 +12,10 @@ from validate.compare.score import run_scores, scores_of
 from validate.compare.track import track_error, track_scores
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.markers import observe_markers
+from validate.register.markers.markers import observe_markers
 from validate.register.registered import Registered
 from validate.register.signals import driving
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.types import Ending, Outcome, Run, StepTimes, Trace

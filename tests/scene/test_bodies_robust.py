@@ -21,14 +21,14 @@ from attacks import damaged
 from click.testing import CliRunner
 from test_abaqus import body, cae, inp
 
-from validate.cli.main import cli, run
+from validate.commands.main import cli, run
 from validate.errors import SceneError
-from validate.scene.filled import SUFFIXES as SURFACES
-from validate.scene.filled import filled
-from validate.scene.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.foreign_mesh import read_foreign
+from validate.scene.geometries.filled import SUFFIXES as SURFACES
+from validate.scene.geometries.filled import filled
 from validate.scene.mesh import Mesh, cell_volumes
-from validate.scene.mesh_file import MAX_BYTES, read_mesh, write_mesh
+from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.foreign_mesh import read_foreign
+from validate.scene.mesh_files.mesh_file import MAX_BYTES, read_mesh, write_mesh
 
 SPARSE = 4 * 2**30  # bytes
 

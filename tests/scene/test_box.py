@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.scene.box import box, centroids
+from validate.scene.geometries.box import box, centroids
 from validate.scene.mesh import cell_volumes
 
 

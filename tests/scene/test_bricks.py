@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.bending_rod.body import bending_rod
+from experiments.needle_block.body import needle_block
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.papers.accuracy.needle import needle_block
-from validate.papers.accuracy.rod import bending_rod
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
+from validate.scene.geometries.remeshed import linear, refined
 from validate.scene.material import Material
 from validate.scene.mesh import (
     Mesh,
@@ -18,7 +19,6 @@ from validate.scene.mesh import (
     quadratic,
     require_positive_cells,
 )
-from validate.scene.refine import linear, refined
 from validate.scene.scene import Cavity, Drive, Foundation, Scene, Weight
 from validate.scene.shape_functions import CORNERS
 

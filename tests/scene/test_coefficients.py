@@ -5,15 +5,14 @@ import pytest
 from law_samples import NAMES, sample
 
 from validate.errors import SceneError
-from validate.fem.stretch_response import response
+from validate.fem.laws.stretch_response import response
 from validate.parameters import describe, with_values
-from validate.scene.box import box
-from validate.scene.laws import LAWS, Coefficients
+from validate.scene.geometries.box import box
+from validate.scene.laws import LAWS, Coefficients, lost_stability
 from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import MaterialPoint
 from validate.scene.rubber import mooney_rivlin, ogden, yeoh
 from validate.scene.scene import Scene
-from validate.scene.stability import lost_stability
 
 
 def test_coefficients_that_the_law_would_not_use_are_refused() -> None:

@@ -11,15 +11,15 @@ import pytest
 import pyvista as pv
 from click.testing import CliRunner
 
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import SceneError, UsageError, ValidateError
-from validate.scene import foreign_mesh, meshio_arrays, vtu_series
 from validate.scene.body_facts import facts, odd_size, quality
-from validate.scene.box import grid
-from validate.scene.filled import filled
-from validate.scene.foreign_mesh import read_foreign
+from validate.scene.geometries.box import grid
+from validate.scene.geometries.filled import filled
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
-from validate.scene.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files import foreign_mesh, meshio_arrays, vtu_series
+from validate.scene.mesh_files.foreign_mesh import read_foreign
+from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
 
 SIZE = (0.01, 0.02, 0.03)
 

@@ -9,14 +9,20 @@ import pytest
 
 from validate.errors import SceneError, UsageError
 from validate.parameters import with_given
-from validate.scene.box import grid
-from validate.scene.geometry import Box, Cylinder, Geometry, MeshFile, SurfaceFile, cell_size
+from validate.scene.geometries.box import grid
+from validate.scene.geometries.specification import (
+    Box,
+    Cylinder,
+    Geometry,
+    MeshFile,
+    SurfaceFile,
+    cell_size,
+)
 from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
-from validate.scene.mesh_file import write_mesh
-from validate.scene.named_place import place_of
+from validate.scene.mesh_files.mesh_file import write_mesh
+from validate.scene.places import OnPlane, facets_of, nodes_of, place_of
 from validate.scene.scene import Foundation, Mass, Membrane, Scene, Support
-from validate.scene.select import OnPlane, facets_of, nodes_of
 
 HERE = Path()
 BOX = Box((0.02, 0.01, 0.04), (4, 2, 8))

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from validate.cli.main import cli
+from validate.commands.main import cli
 from validate.errors import SceneError, UsageError
 from validate.scene.body_facts import quality
-from validate.scene.foreign_mesh import read_foreign
 from validate.scene.mesh import cell_volumes
-from validate.scene.mesh_file import read_mesh
+from validate.scene.mesh_files.foreign_mesh import read_foreign
+from validate.scene.mesh_files.mesh_file import read_mesh
 
 FILES = Path(__file__).parent / "gmsh"
 SIDES = {f"side{i}": n for i, n in enumerate((6, 6, 12, 12, 12, 12), 1)}

@@ -8,7 +8,7 @@ from phantoms import BLOCK, CAPSULE, COARSE_GRID, PAPER_GRID, phantom_mesh
 
 from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface, volume_of
-from validate.scene.inclusion import SIDES, Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import SIDES, Block, Capsule, block_with_inclusion
 from validate.scene.mesh import cell_volumes, require_positive_cells
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from validate.errors import SceneError
-from validate.scene.inclusion_shape import SlicedShape
+from validate.scene.geometries.inclusion import SlicedShape
 
 
 def sphere(pose: np.ndarray, r: float = 6e-3, step: float = 1e-3) -> SlicedShape:

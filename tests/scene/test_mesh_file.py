@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from validate.errors import SceneError
-from validate.scene import mesh_file
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
-from validate.scene.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files import mesh_file
+from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
 
 BOX = box((0.1, 0.2, 0.3), (1, 2, 3))
 

@@ -8,8 +8,8 @@ import pytest
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import box
-from validate.scene.geometry import Box
+from validate.scene.geometries.box import box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Contact, Drive, Foundation, Pin, Scene, Support
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from validate.scene.box import box
+from validate.scene.geometries.box import box
+from validate.scene.geometries.remeshed import refined
 from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
-from validate.scene.refine import refined
 from validate.scene.scene import Scene
 
 

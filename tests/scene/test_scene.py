@@ -10,14 +10,14 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
-from validate.scene.box import box
-from validate.scene.geometry import Box
+from validate.scene.geometries.box import box
+from validate.scene.geometries.specification import Box
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
+from validate.scene.places import Chosen, Nearest
 from validate.scene.scene import Cavity, Drive, Foundation, Pin, Scene, Support
-from validate.scene.select import Chosen, Nearest
 from validate.scene.tool import Needle, require_usable
-from validate.solve.entry import Surface
+from validate.solve.haptic.needle import Surface
 
 
 @pytest.mark.parametrize("E", [0.0, -1.0, math.nan, math.inf])

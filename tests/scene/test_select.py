@@ -7,14 +7,14 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.loads import uniform_shares
+from validate.fem.assembly.loads import uniform_shares
 from validate.fem.system import build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
+from validate.scene.geometries.remeshed import refined
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.refine import refined
+from validate.scene.places import InBox, Labelled, Nearest, OnPlane, Site, facets_of, nodes_of
 from validate.scene.scene import Foundation, Load, Mass, Scene, Support
-from validate.scene.select import InBox, Labelled, Nearest, OnPlane, Site, facets_of, nodes_of
 
 SIZE = (0.03, 0.02, 0.01)
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

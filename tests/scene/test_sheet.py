@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from validate.errors import UsageError
-from validate.scene.geometry import Geometry
+from validate.scene.geometries.sheet import Sheet
+from validate.scene.geometries.specification import Geometry
 from validate.scene.material import Material
+from validate.scene.places import nodes_of
 from validate.scene.scene import Drive, Scene, Support
-from validate.scene.select import nodes_of
-from validate.scene.sheet import Sheet
 
 SHEET = Sheet("60 mm", "40 mm", "8 mm", "8 mm", "30 mm", cells=1)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import System, build
-from validate.scene.box import grid
 from validate.scene.contact import RigidContact, RigidPlane, Shape
+from validate.scene.geometries.box import grid
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene, Support, Weight

@@ -7,7 +7,7 @@ from law_samples import sample
 
 from validate.arrays import Floats
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.march import march
 from validate.solve.types import Run, Scheme, Stepper

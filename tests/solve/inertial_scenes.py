@@ -6,9 +6,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from validate.arrays import Floats
-from validate.fem.matrices import MassName, damping_of, mass_of
-from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.fem.system import MassName, System, build, damping_of, mass_of
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
 

@@ -9,7 +9,7 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_scene
 from validate.fem.system import System, build
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Cavity, Dilatation, Drive, Scene, Support
-from validate.solve.newton import NewtonStepper, StaticNewton
+from validate.solve.static.newton import NewtonStepper, StaticNewton
 from validate.solve.types import State
 
 SIDE = 0.1

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from inertial_scenes import driven, small
 
+from experiments.bending_rod.body import bending_rod
+from experiments.needle_block.body import needle_block
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build
-from validate.papers.accuracy.needle import needle_block
-from validate.papers.accuracy.rod import bending_rod
 from validate.scene.material import Region
 from validate.solve.amplification import amplification
-from validate.solve.dynamic import Moving
-from validate.solve.explicit_linear import ExplicitLinear, stable_step
-from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import rule_of
-from validate.solve.step_maps import explicit_maps, newmark_maps, spectral_radii
+from validate.solve.dynamic.linear import Moving
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.solve.stepping import explicit_maps, newmark_maps, spectral_radii
 from validate.solve.types import Stepper
 
 SCHEMES = [

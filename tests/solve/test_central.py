@@ -12,12 +12,12 @@ from law_samples import NAMES
 from scipy.linalg import eigh
 
 from validate.errors import SceneError
-from validate.fem.hyperelastic import Body
+from validate.fem.kernels.threads import Team, ThreadChoice
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System
-from validate.fem.threads import Team, ThreadChoice
-from validate.solve.central import CentralDifference, CentralStepper, Damping
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.newton import StaticNewton
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import State
 
 LAWS = [
@@ -76,7 +76,7 @@ def test_threads_change_no_more_than_rounding() -> None:
 
 
 def test_no_threads_run_where_no_core_is_idle(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 1)
+    monkeypatch.setattr("validate.solve.explicit.central.idle_cores", lambda: 1)
     system, dt = pressed(), 3e-4
     run = ran(CentralDifference(dt, threads=2), system, rise(20, 0.02), dt)
     assert run.said == ("threads: 1 of 2; no other core is idle",)
@@ -87,7 +87,7 @@ def test_no_threads_run_where_no_core_is_idle(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.slow
 def test_a_measured_number_of_threads_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.solve.central.idle_cores", lambda: 2)
+    monkeypatch.setattr("validate.solve.explicit.central.idle_cores", lambda: 2)
     run = ran(CentralDifference(3e-4, threads=2), pressed(), rise(20, 0.02), 3e-4)
     assert re.match(r"threads: [12] of 2, pilot 1: \S+ us, 2: \S+ us", run.said[0])
 

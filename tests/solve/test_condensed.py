@@ -11,10 +11,10 @@ from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import Condensed, condense
 from validate.fem.system import System, build
-from validate.solve.swap import Swapped, mixed
-from validate.solve.working_set import WorkingSet, along, between, displaced
+from validate.solve.fluid.swap import Swapped, mixed
+from validate.solve.haptic.working_set import WorkingSet, along, between, displaced
 
 
 def system(nu: float = 0.485) -> System:

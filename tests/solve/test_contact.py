@@ -22,7 +22,6 @@ from scipy import sparse
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import box, grid
 from validate.scene.contact import (
     RigidContact,
     RigidCylinder,
@@ -31,18 +30,19 @@ from validate.scene.contact import (
     RigidSphere,
     Shape,
 )
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
+from validate.scene.places import OnPlane
 from validate.scene.scene import Drive, Load, Pin, Scene, Support
-from validate.scene.select import OnPlane
-from validate.solve.central import CentralDifference
-from validate.solve.contact import ContactNewton, ContactStepper
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import march
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
-from validate.solve.touching import SLIP, STICK
+from validate.solve.static.contact import ContactNewton, ContactStepper
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.touching import SLIP, STICK
 
 BOX = (0.1, 0.1, 0.1)
 MESHES = {

@@ -1,6 +1,6 @@
 """The one list of schemes: step maps and candidates come from their classes, a new one's too."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from study_samples import experiment_file
 
+from validate.engine.cell import Where
 from validate.fem.system import System
-from validate.replay.find import find, load_file
-from validate.replay.ladder_default import trial_of
+from validate.pipeline.experiment.find import find, load_file
+from validate.pipeline.ladder.default import trial_of
 from validate.solve import schemes
 from validate.solve.candidates import RUNGS, Asked, Rival, StillBody, SwingingBody
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.handles import LINEAR_DYNAMICS, Handles
-from validate.solve.newmark import Newmark
 from validate.solve.schemes import candidates, steppings, steppings_for
 from validate.solve.stepping import Rates, Stepping, implicit_maps
 from validate.solve.types import Scheme, Stepper
-from validate.study.choose import choose, wanted
-from validate.study.climb import Climb
-from validate.study.job import Where
-from validate.study.stability import declared
-from validate.study.trade import again
+from validate.study.choose.climb import Climb
+from validate.study.choose.study import choose, wanted
+from validate.study.stability.study import declared
+from validate.study.tradeoff.study import again
 
 EXPERIMENTS = Path(__file__).parents[2] / "experiments"
 STEPS = (0.02, 0.01)
@@ -54,7 +54,8 @@ class Toy:
 
 @pytest.fixture
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(schemes, "SCHEMES", (*schemes.SCHEMES, Toy))
+    own = (*schemes.SCHEMES.own, Toy)
+    monkeypatch.setattr(schemes, "SCHEMES", replace(schemes.SCHEMES, own=own))
 
 
 def test_names_of_step_maps_stay() -> None:
@@ -117,7 +118,7 @@ def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """`study choose` runs its candidates: as the only scheme in the list it is the choice."""
-    monkeypatch.setattr(schemes, "SCHEMES", (Toy,))
+    monkeypatch.setattr(schemes, "SCHEMES", replace(schemes.SCHEMES, own=(Toy,)))
     pulled, here = load_file(experiment_file(tmp_path)), Where(workers=0)
     climb = Climb(pulled, quick=True, out=tmp_path, where=here)
     found = choose(

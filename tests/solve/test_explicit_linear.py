@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from inertial_scenes import driven, orders, small
 
+from experiments.needle_block.body import MP2, needle_block
 from validate.errors import SceneError
 from validate.fem.critical import critical_step
-from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
-from validate.fem.system import System, build
-from validate.papers.accuracy.needle import MP2, needle_block
-from validate.solve.explicit_linear import ExplicitLinear, highest_frequency, stable_step
+from validate.fem.system import DampingTerms, MassName, System, build, damping_of, mass_of
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.explicit.linear import ExplicitLinear, highest_frequency, stable_step
 from validate.solve.march import march
-from validate.solve.newmark import Newmark
 from validate.solve.types import Run, Scheme
 
 END = 0.05  # s

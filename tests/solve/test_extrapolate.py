@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from validate.errors import UsageError
-from validate.solve.extrapolate import NAMES, answers_of, between_answers, extrapolated
+from validate.solve.haptic.loop import NAMES, answers_of, between_answers, extrapolated
 
 
 @given(

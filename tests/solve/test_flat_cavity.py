@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from validate.fem.cavity import cavity_surface, pressure_load, volume_of
-from validate.fem.follower import volume_hessian
+from validate.fem.cavity import cavity_surface, pressure_load, volume_hessian, volume_of
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
 from validate.scene.scene import Cavity, Drive, Scene, Support
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 
 
 def holed(order: int) -> Mesh:

@@ -13,14 +13,17 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.pressure_curve import pressure_at_volume, tuned_gain
-from validate.solve.pressure_loop import PressureLoop
-from validate.solve.pulse import PulsePressure
-from validate.solve.schemes import LINEAR
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.pressure_curve import pressure_at_volume, tuned_gain
+from validate.solve.fluid.pressure_loop import PressureLoop
+from validate.solve.fluid.pulse import PulsePressure
+from validate.solve.schemes import schemes_that
 from validate.solve.types import Scheme
 
 # Contracts of every scheme
+
+
+LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities and "needle" not in h.contact)
 
 
 @pytest.mark.parametrize("scheme", LINEAR, ids=lambda s: s.__name__)

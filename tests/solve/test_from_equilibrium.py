@@ -8,13 +8,13 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support, Weight
-from validate.solve.from_equilibrium import FromEquilibrium
+from validate.solve.dynamic.from_equilibrium import FromEquilibrium
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import run_scheme
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
 
 DT, STEPS = 2e-3, 60

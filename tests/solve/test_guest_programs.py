@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support, Weight
-from validate.solve.guests.guest import Guest
-from validate.solve.guests.suite import OffBy, check_guest
+from validate.solve.external.scheme import Guest
+from validate.solve.external.suite import OffBy, check_guest
 from validate.solve.march import run_scheme
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 
 STATICS = ("rigid motion", "rigid turn", "patch test", "uniaxial, linear", "hanging bar")
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from validate.cli.main import run as command_line
-from validate.solve.guests.suite import SmallScene, small_scenes
+from validate.commands.main import run as command_line
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.external.suite import SmallScene, small_scenes
 from validate.solve.march import run_scheme
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run, Scheme
 
 SCENES = small_scenes()

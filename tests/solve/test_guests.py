@@ -16,20 +16,20 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
 from validate.parameters import with_values
-from validate.replay.method import Method
-from validate.scene.box import grid
+from validate.pipeline.experiment.method import Method
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
+from validate.scene.mesh_files.vtu import write_vtu
 from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
-from validate.scene.vtu import write_vtu
-from validate.solve.guests import fields as fields_module
-from validate.solve.guests import job, limits, ran
-from validate.solve.guests.answer import echoed
-from validate.solve.guests.fields import NoAnswerError
-from validate.solve.guests.guest import Guest, run_of
-from validate.solve.guests.job import write_job
-from validate.solve.guests.ran import Ended
+from validate.solve.external import answer as fields_module
+from validate.solve.external import job, limits
+from validate.solve.external import program as ran
+from validate.solve.external.answer import NoAnswerError, echoed
+from validate.solve.external.job import write_job
+from validate.solve.external.program import Ended
+from validate.solve.external.scheme import Guest, run_of
 from validate.solve.march import run_scheme
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run
 
 SIZE = (0.02, 0.02, 0.04)
@@ -351,7 +351,7 @@ def test_a_program_that_is_not_there_is_a_row() -> None:
 @pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8"])
 def test_the_mesh_is_read_by_another_library(tmp_path: Path, kind: str) -> None:
     meshio = pytest.importorskip("meshio")
-    from validate.scene.box import box
+    from validate.scene.geometries.box import box
     from validate.scene.mesh import quadratic
 
     mesh = grid(SIZE, (1, 2, 2)) if kind == "hex8" else box(SIZE, (1, 2, 2))

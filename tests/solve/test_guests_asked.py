@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.scene.box import grid
-from validate.scene.material import Material
-from validate.scene.prony import Prony
+from validate.scene.geometries.box import grid
+from validate.scene.material import Material, Prony
+from validate.scene.places import OnPlane
 from validate.scene.scene import Mass, Scene, Support, Weight
-from validate.scene.select import OnPlane
-from validate.solve.guests.asked import Asked, at_levels, at_rest, changes
-from validate.solve.guests.job import write_job
+from validate.solve.external.job import write_job
+from validate.solve.external.scheme import Asked, at_levels, at_rest, changes
 from validate.solve.types import Ending, Outcome, Run, Trace
 
 

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
-from validate.solve.guests.answer import read_answer
-from validate.solve.guests.job import GuestJob, write_job
+from validate.solve.external.answer import read_answer
+from validate.solve.external.job import GuestJob, write_job
 
 SIZE, COUPLED = (0.02, 0.02, 0.04), Coefficients(volumetric="coupled")
 TET = Scene(

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from validate.fem.system import build
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
+from validate.scene.places import OnPlane
 from validate.scene.scene import Scene, Support, Weight
-from validate.scene.select import OnPlane
 from validate.solve.march import march
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Run
 
 MU, LAM, GRAVITY = 1e4, 5e4, 9.80665

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import UsageError
-from validate.solve.haptic import QUANTILES, RealTime, TickTimes
+from validate.solve.haptic.rates import QUANTILES, RealTime, TickTimes
 
 
 def test_a_rate_means_something_beside_its_step() -> None:

@@ -10,14 +10,13 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.scene.tool import Needle
-from validate.solve.central import CentralDifference
-from validate.solve.extrapolate import between_answers
-from validate.solve.haptic_loop import HapticLoop, HapticStepper
-from validate.solve.spring_probe import Hold
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.haptic.loop import HapticLoop, HapticStepper, between_answers
+from validate.solve.haptic.spring_probe import Hold
 from validate.solve.types import State
 
 L, H = 0.1, 1e-3

@@ -9,15 +9,15 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
+from validate.scene.places import Labelled, nodes_of
 from validate.scene.scene import Drive, DriveShape, Scene
-from validate.scene.select import Labelled, nodes_of
-from validate.solve.harmonic import Harmonic
 from validate.solve.march import run_scheme
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.without_mechanics import Harmonic
 
 ALL = reduce(or_, [Labelled(f"{a}{e}") for a in "xyz" for e in (0, 1)]).faces
 MESH = quadratic(grid((1.0, 2.0, 1.5), (2, 2, 2)))

@@ -8,17 +8,17 @@ import pytest
 
 from validate.fem.modes import modes_of
 from validate.fem.system import System, build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
+from validate.scene.places import InBox, Nearest, OnPlane
 from validate.scene.scene import Load, Mass, Scene, Support, Weight
-from validate.scene.select import InBox, Nearest, OnPlane
-from validate.solve.central import CentralDifference
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.march import march
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
 from validate.solve.types import Scheme
 
 E, L, A, RHO, HUNG = 1e4, 0.1, 0.01, 1000.0, 0.7

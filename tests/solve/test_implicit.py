@@ -7,7 +7,7 @@ import pytest
 from explicit_scenes import pulled, ran, rise
 
 from validate.errors import SceneError
-from validate.solve.implicit import ImplicitStepper, NewtonDynamics, RateRule
+from validate.solve.dynamic.implicit import ImplicitStepper, NewtonDynamics, RateRule
 
 
 @pytest.mark.slow

@@ -7,17 +7,16 @@ import pytest
 
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import grid
-from validate.scene.material import Material, Region
-from validate.scene.prony import Prony
+from validate.scene.geometries.box import grid
+from validate.scene.material import Material, Prony, Region
+from validate.scene.places import OnPlane
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
-from validate.scene.select import OnPlane
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.let_go import LetGo
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.let_go import LetGo
+from validate.solve.dynamic.viscous_modes import ViscousModes
 from validate.solve.march import march, run_scheme
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Run
-from validate.solve.viscous_modes import ViscousModes
 
 RELAXING = Prony((0.25, 0.05), (0.02, 0.5))
 SCENE = Scene(

@@ -7,7 +7,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.fem.locking import locking_notes
-from validate.scene.box import box, centroids, grid
+from validate.scene.geometries.box import box, centroids, grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Probe, Scene, Support

@@ -10,13 +10,13 @@ from phantoms import COARSE_GRID, phantom_responses
 
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.system import Responses
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve import march as march_module
-from validate.solve.fluid import ExactPressure, NoFluid
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.pressure_loop import PressureLoop
 from validate.solve.march import march, run_scheme
-from validate.solve.pressure_loop import PressureLoop
 from validate.solve.types import Run, State, Stepper, Trace
 
 STEPS = 60

@@ -13,16 +13,15 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.modes import modes_of
 from validate.fem.system import System, build
-from validate.scene.box import box, centroids
+from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene, Support
+from validate.solve.dynamic.modal import Modal, exact_walk
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.newmark_rule import RuleName
 from validate.solve.march import march
-from validate.solve.modal import Modal
-from validate.solve.modal_walk import exact_walk
-from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import RuleName
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run, Scheme
 
 

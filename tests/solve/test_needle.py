@@ -10,18 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from phantoms import COARSE_GRID, phantom_mesh
 
+from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.fluid_inclusion.square import square_with_hole
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.scene.tool import Needle
-from validate.solve.entry import Surface
+from validate.solve.haptic.needle import NeedleLoop, NeedleStepper, Surface
 from validate.solve.march import march
-from validate.solve.needle import NeedleLoop, NeedleStepper
 from validate.solve.types import State
 
 DOWN = (0.0, -1.0)

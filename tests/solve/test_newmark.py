@@ -10,16 +10,16 @@ from inertial_scenes import TOTAL, cube, driven, exact, orders, small
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build, responses
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
 from validate.solve.excitation import excitation
-from validate.solve.linear_solvers import SolverName, solver_of
 from validate.solve.march import march
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import RuleName, propagation, rule_of
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.linear_solvers import SolverName, solver_of
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run, State
 
 RULES: tuple[RuleName, ...] = get_args(RuleName)

@@ -10,15 +10,15 @@ from newton_scenes import SIDE, cube, phantom, phantom_system, prepared, pressed
 from scipy.optimize import brentq
 
 from validate.errors import SceneError
-from validate.fem.laws import law_of
+from validate.fem.laws.law import law_of
 from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.rubber import mooney_rivlin
 from validate.scene.scene import Dilatation
-from validate.solve import newton
-from validate.solve.fluid import ExactPressure, NoFluid
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.march import march
-from validate.solve.newton import NewtonStepper, StaticNewton
+from validate.solve.static import newton
+from validate.solve.static.newton import NewtonStepper, StaticNewton
 from validate.solve.types import State
 
 ELEMENTS: list[tuple[int, Dilatation]] = [(1, "pointwise"), (1, "nodal_mean"), (2, "pointwise")]

@@ -10,15 +10,15 @@ from explicit_scenes import pulled, ran
 from law_samples import NAMES, sample
 
 from validate.errors import SceneError
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
-from validate.scene.box import box, grid
+from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName, Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Dilatation, Drive, Load, Scene, Support, Weight
-from validate.solve.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.march import march
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import State
 
 SIZE, G = (0.1, 0.03, 0.03), 9.80709

@@ -6,13 +6,13 @@ from newton_scenes import cube, phantom_system, prepared, pressed, two_cavities,
 from phantoms import grid_mesh
 from scipy.linalg import null_space
 
-from validate.fem.follower import volume_hessian
+from validate.fem.cavity import volume_hessian
 from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Scene, Support
-from validate.solve.equilibrium import equilibrium
 from validate.solve.march import march
-from validate.solve.newton import NewtonStepper, StaticNewton
+from validate.solve.static.equilibrium import equilibrium
+from validate.solve.static.newton import NewtonStepper, StaticNewton
 
 STILL = np.zeros(1)  # the drive
 

@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
-import validate.fem.matrices as matrices_module
+import validate.fem.system as matrices_module
 import validate.fem.system as system_module
-import validate.solve.central as central_module
-import validate.solve.equilibrium as equilibrium_module
-from validate.fem.hyperelastic import Body
+import validate.solve.explicit.central as central_module
+import validate.solve.static.equilibrium as equilibrium_module
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.central import CentralDifference
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import ExactPressure, NoFluid
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.explicit.linear import ExplicitLinear
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Scheme
 
 PARTS = {

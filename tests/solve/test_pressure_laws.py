@@ -11,10 +11,15 @@ from phantoms import phantom_responses
 
 from validate.errors import SceneError
 from validate.fem.system import Responses
-from validate.solve.fluid import ElasticPressure, ExactPressure
-from validate.solve.pressure_curve import RATIOS, cubic, pressure_at_volume, still, tuned_gain
-from validate.solve.pressure_loop import PressureLoop, UpdateName, gain_matrix, spectral_radius
-from validate.solve.pulse import MMHG, PulsePressure
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
+from validate.solve.fluid.pressure_curve import RATIOS, cubic, pressure_at_volume, still, tuned_gain
+from validate.solve.fluid.pressure_loop import (
+    PressureLoop,
+    UpdateName,
+    gain_matrix,
+    spectral_radius,
+)
+from validate.solve.fluid.pulse import MMHG, PulsePressure
 
 UPDATES: tuple[UpdateName, ...] = (
     "proportional", "retuned", "piecewise", "secant", "newton", "golden",

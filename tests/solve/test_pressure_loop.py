@@ -7,9 +7,9 @@ import pytest
 from fluid_steps import NINE, pressures, slope_at, stepped, volume_ratios
 
 from validate.fem.system import Responses
-from validate.solve.fluid import ExactPressure
-from validate.solve.pressure_curve import tuned_gain
-from validate.solve.pressure_loop import PressureLoop
+from validate.solve.fluid.cavities import ExactPressure
+from validate.solve.fluid.pressure_curve import tuned_gain
+from validate.solve.fluid.pressure_loop import PressureLoop
 
 
 @pytest.mark.parametrize("strain", [0.003, 0.01, 0.03, 0.05, 0.08, 0.1, 0.12, 0.15])

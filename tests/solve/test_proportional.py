@@ -7,14 +7,14 @@ import pytest
 from law_samples import sample
 
 from validate.errors import SceneError
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material, Region
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.march import run_scheme
-from validate.solve.newton import StaticNewton
-from validate.solve.proportional import Proportional
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.proportional import Proportional
+from validate.solve.static.quasi_static import QuasiStatic
 
 T, INPUTS, AT = np.array([1.0, 2.0]), np.array([[0.002], [0.005]]), np.array([1])
 NEWTON = StaticNewton("none")

@@ -9,16 +9,16 @@ import pytest
 from scipy import sparse
 from touched import AREA, LENGTH, bar, block, pad_of
 
+from experiments.async_line.runs import growth, pushed
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.hyperelastic import Body
+from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
-from validate.papers.async_regions.runs import growth, pushed
-from validate.scene.prony import Prony
+from validate.scene.material import Prony
 from validate.scene.scene import Scene
-from validate.solve.region_primary import PrimarySolver, UnsettledError
-from validate.solve.region_size import PrimarySize
-from validate.solve.regions import AsyncRegions
+from validate.solve.regions.map import PrimarySize
+from validate.solve.regions.primary import PrimarySolver, UnsettledError
+from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import State
 
 E, H, KS, CELLS = 5e3, 1e-3, 1000.0, 6

@@ -5,11 +5,10 @@ import pytest
 
 from validate.errors import SceneError
 from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
-from validate.scene.rigid_body import RigidBody
+from validate.scene.meshless import MaterialPoint, RigidBody
 from validate.solve.march import run_scheme
-from validate.solve.quasi_static import QuasiStatic
-from validate.solve.rigid_motion import RigidMotion
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.without_mechanics import RigidMotion
 
 BODY = RigidBody(("a", "b"), np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]))
 

@@ -1,6 +1,7 @@
 """The contract of every scheme: prepare, rest, step, field, traces."""
 
-from dataclasses import FrozenInstanceError, fields, replace
+from collections.abc import Callable
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,25 +11,31 @@ from validate.errors import SceneError
 from validate.estimate.filters import FILTERS
 from validate.fem.system import System, build
 from validate.parameters import with_values
-from validate.scene.box import box
 from validate.scene.contact import RigidContact, RigidPlane
+from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.scene.tool import Needle
+from validate.solve.dynamic.modal import Modal
 from validate.solve.handles import INSTEAD, LARGE
-from validate.solve.modal import Modal
-from validate.solve.newton import StaticNewton
-from validate.solve.schemes import (
-    INERTIAL,
-    LARGE_INERTIAL,
-    LINEAR,
-    NEEDLES,
-    SCHEMES,
-    SOLVERS,
-    TOUCHING,
-)
-from validate.solve.tabulated import Tabulated
+from validate.solve.schemes import SCHEMES, SOLVERS, schemes_that
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.tabulated import Tabulated
 from validate.solve.types import Scheme
+from validate.testing import scheme_contract
+
+# Linear schemes of drives and cavities, and those of drives and loads.
+LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities and "needle" not in h.contact)
+INERTIAL = schemes_that(lambda h: h.law == ("linear",) and h.loads)
+
+# Dynamics at large strain of drives and loads, without cavities.
+LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia and h.loads)
+
+# Bodies that touch rigid ones.
+TOUCHING = schemes_that(lambda h: "rigid" in h.contact)
+
+# Bodies that a needle touches, whose path is given.
+NEEDLES = schemes_that(lambda h: "needle" in h.contact)
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +90,6 @@ def test_a_scheme_steps_and_says_what_its_states_mean(
     assert stepper.units["stage.force"] == "N"
     assert rest.numbers["stage.force"] == pytest.approx(0.0, abs=1e-12)
     assert state.numbers["stage.force"] > 0.1
-    with pytest.raises(FrozenInstanceError):
-        state.updates = 7  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("scheme", INERTIAL, ids=lambda s: s.__name__)
@@ -104,8 +109,6 @@ def test_a_scheme_of_drives_and_loads_steps_and_says_what_its_states_mean(
     assert u[plate, 2] == pytest.approx(np.full(len(plate), -0.001))
     assert stepper.units == {"press.force": "N"}
     assert state.numbers["press.force"] > 0.1
-    with pytest.raises(FrozenInstanceError):
-        state.updates = 7  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
@@ -135,8 +138,6 @@ def test_a_scheme_of_a_touched_body_steps_and_says_what_its_states_mean(
     assert u[scene.mesh.nearest_node(np.array([0.02, 0.01, 0.01])), 0] < 0
     assert stepper.units["tip.force.x"] == "N"
     assert state.numbers["tip.force.x"] > 0.1
-    with pytest.raises(FrozenInstanceError):
-        state.updates = 7  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("scheme", INERTIAL, ids=lambda s: s.__name__)
@@ -181,8 +182,6 @@ def test_dynamics_at_large_strain_step_drives_and_loads(
     assert rest.numbers["press.force"] == rest.numbers["energy.strain"] == 0.0
     assert first.numbers["press.force"] > 0
     assert (stepper.units["press.force"], stepper.units["energy.strain"]) == ("N", "J")
-    with pytest.raises(FrozenInstanceError):
-        state.updates = 7  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("scheme", LARGE_INERTIAL, ids=lambda s: s.__name__)
@@ -228,11 +227,20 @@ def test_contact_is_refused_by_the_others(scheme: type[Scheme], pressed: System)
         settings(scheme).prepare(build(scene))
 
 
+OTHER_BLOCKS = ("Tabulated", "NeedleLoop", "HapticLoop")  # of one drive, or of a needle in it
+
+
+@pytest.mark.parametrize("check", scheme_contract, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: scheme.__name__)
+def test_a_scheme_keeps_its_contract(scheme: type[Scheme], check: Callable[[Scheme], None]) -> None:
+    if scheme.__name__ not in OTHER_BLOCKS or check in scheme_contract[3:]:
+        check(settings(scheme))
+
+
 @pytest.mark.parametrize("kind", SCHEMES)
-def test_every_setting_says_what_it_is_and_in_which_unit(kind: type[Scheme]) -> None:
+def test_only_the_step_is_in_seconds(kind: type[Scheme]) -> None:
     for f in fields(kind):  # type: ignore[arg-type]
         if f.name != "inner":  # itself a scheme
-            assert f.metadata["doc"], f.name
             assert (f.metadata["unit"] == "s") == (f.name == "dt"), f.name
 
 

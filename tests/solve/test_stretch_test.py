@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.stretch_response import response
-from validate.scene.box import box
+from validate.fem.laws.stretch_response import response
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.material_point import MaterialPoint
+from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Load, Scene, Support
 from validate.solve.march import run_scheme
-from validate.solve.quasi_static import QuasiStatic
 from validate.solve.schemes import SOLVERS
-from validate.solve.stretch_test import StretchTest
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.stretch_test import StretchTest
 
 T = np.linspace(0.1, 1.0, 10)
 STRETCHES = np.linspace(0.9, 1.5, 10)[:, None]

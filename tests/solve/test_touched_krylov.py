@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from touched import AREA, LENGTH, bar, block, pad_of
 
+from experiments.async_line.runs import off, pushed
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.papers.async_regions.runs import off, pushed
-from validate.solve.regions import AsyncRegions
-from validate.solve.touched_krylov import KrylovStepper, TouchedKrylov
+from validate.solve.regions.krylov import KrylovStepper, TouchedKrylov
+from validate.solve.regions.scheme import AsyncRegions
 
 E, H, KS = 5e3, 1e-3, 1000.0
 WHOLE = AsyncRegions(H, (), ())

@@ -8,14 +8,14 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
+from validate.scene.places import InBox, OnPlane
 from validate.scene.scene import Load, Probe, Scene
-from validate.scene.select import InBox, OnPlane
 from validate.scene.tracked import Prescribed
 from validate.solve.march import run_scheme
-from validate.solve.newton import StaticNewton
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run, SceneSolver, Scheme
 
 SIZE = (0.03, 0.02, 0.02)

@@ -9,25 +9,24 @@ from law_samples import SPLIT
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.node_ekf import NodeEKF
-from validate.fem.assemble import stiffness
+from validate.estimate.extended.node_ekf import NodeEKF
+from validate.fem.assembly.assemble import stiffness
 from validate.fem.critical import critical_step
-from validate.fem.hyperelastic import Body
-from validate.fem.laws import stiffened
-from validate.fem.stretch_response import response
+from validate.fem.large_strain.hyperelastic import Body
+from validate.fem.laws.law import stiffened
+from validate.fem.laws.stretch_response import response
+from validate.fem.laws.viscous import cell_branches
 from validate.fem.system import System, build
-from validate.fem.viscous import cell_branches
-from validate.scene.box import grid
-from validate.scene.material import Region
-from validate.scene.material_point import MaterialPoint
+from validate.scene.geometries.box import grid
+from validate.scene.material import Prony, Region
 from validate.scene.mesh import quadratic
-from validate.scene.prony import Prony
+from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Dilatation, Support
-from validate.solve.central import CentralDifference, CentralStepper
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.explicit.central import CentralDifference, CentralStepper
 from validate.solve.handles import require_handled
-from validate.solve.implicit import NewtonDynamics
 from validate.solve.march import march
-from validate.solve.newton import StaticNewton
+from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
 
 SERIES = Prony((0.8, 0.4), (0.05, 1.0))

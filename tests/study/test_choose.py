@@ -6,12 +6,12 @@ from dataclasses import replace
 import pytest
 
 from validate.errors import UsageError
-from validate.replay.ladder import Rival
-from validate.solve.newmark import Newmark
+from validate.pipeline.ladder.ladder import Rival
+from validate.solve.dynamic.newmark import Newmark
 from validate.solve.types import StepTimes
-from validate.study import choose
-from validate.study.choose import Wanted, left_out, meeting, misses, nearest, wanted
-from validate.study.trade import TradeRow
+from validate.study.choose import study as choose
+from validate.study.choose.study import Wanted, left_out, meeting, misses, nearest, wanted
+from validate.study.tradeoff.study import TradeRow
 
 WANTED = Wanted(0.5e-3, 1000.0)
 ANY = Rival("any", "prefactored", Newmark)

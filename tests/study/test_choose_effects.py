@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from validate.replay.experiment import Experiment
-from validate.replay.ladder import Rival
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.ladder.ladder import Rival
 from validate.solve.candidates import StillBody
 from validate.solve.schemes import candidates
-from validate.study.choose_effects import ShownEffects, effect_words, stored_effects, with_effects
+from validate.study.choose.facts import ShownEffects, effect_words, stored_effects, with_effects
 
 
 def stored(folder: Path, experiment: Experiment, shown: dict[str, float]) -> None:

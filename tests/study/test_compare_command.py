@@ -11,8 +11,7 @@ from PIL import Image
 from test_stored import method, stored
 
 from validate.errors import UsageError
-from validate.study.narrow import SORTS, narrowed, ordered
-from validate.study.stored import Row, read_run, side_by_side
+from validate.study.stored_runs.stored import SORTS, Row, narrowed, ordered, read_run, side_by_side
 
 
 def score(name: str, value: float, unit: str = "m") -> dict[str, Any]:
@@ -37,7 +36,7 @@ def two(folder: Path, count: int = 60) -> tuple[str, str]:
 def test_one_screen_of_80_columns_and_the_largest_change_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = "validate.cli.comparing.write_comparison"  # has a test of its own
+    page = "validate.commands.compare.write_comparison"  # has a test of its own
     monkeypatch.setattr(page, lambda found, document, folder: folder / "report.html")
     runs = two(tmp_path / "Läufe hier")
     code, out, err = here("compare", *runs, cwd=tmp_path, COLUMNS="80")
@@ -83,7 +82,7 @@ def test_a_closed_place_costs_the_pictures_only(
         raise UsageError("cannot write there")
 
     runs = two(tmp_path, 2)
-    monkeypatch.setattr("validate.cli.comparing.try_results", closed)
+    monkeypatch.setattr("validate.commands.compare.try_results", closed)
     code, out, err = here("compare", *runs, cwd=tmp_path)
     assert (code, err) == (0, "validate: no charts: cannot write there\n")
     assert "node_1.rmse" in out

@@ -11,19 +11,21 @@ import jsonschema
 import numpy as np
 import pytest
 
-from validate.cli.main import run
+from validate.commands.main import run
 from validate.compare.overall import ALPHA
+from validate.engine.cell import Record, Where
 from validate.errors import ComparisonError, UsageError
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.report.store import schema
-from validate.study import coverage as coverage_module
-from validate.study import coverage_bench, coverage_worlds
-from validate.study.coverage import Coverage, coverage
-from validate.study.coverage_bench import ExactReading, opened_here
-from validate.study.coverage_found import Quantity
-from validate.study.coverage_page import sentence
-from validate.study.coverage_plan import (
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.run.job import job_of
+from validate.report.stored.store import schema
+from validate.study.coverage import bench as coverage_bench
+from validate.study.coverage import study as coverage_module
+from validate.study.coverage import worlds as coverage_worlds
+from validate.study.coverage.bench import ExactReading, opened_here
+from validate.study.coverage.found import Quantity
+from validate.study.coverage.page import sentence
+from validate.study.coverage.plan import (
     World,
     draws_of,
     in_world,
@@ -31,16 +33,15 @@ from validate.study.coverage_plan import (
     true_method,
     wrong_paths,
 )
-from validate.study.coverage_worlds import Study, _alike
-from validate.study.job import Where, job_of
-from validate.study.store import Record
+from validate.study.coverage.study import Coverage, coverage
+from validate.study.coverage.worlds import Study, _alike
 
 ROOT = Path(__file__).parents[2]
 HERE = Where(0)
 TINY = (ROOT / "tests" / "replay" / "tiny.py").read_text("utf-8")
 # The block at three holds: one force each, its sensor's noise .1 mN, E perhaps uncertain.
 OWN = """
-from validate.replay.experiment import Uncertainty, vary
+from validate.pipeline.experiment.experiment import Uncertainty, vary
 
 EXPERIMENT = replace(
     AT_HOLDS, name="{name}", accept=(Accept("{quantity}", {limit}, "ours"),),

@@ -10,22 +10,22 @@ import pytest
 from study_samples import experiment_file
 
 from validate.compare.track import rmse, track_error
+from validate.engine.cell import Plan, Record, Where
+from validate.engine.finish import finish
+from validate.engine.kept import fingerprint
+from validate.engine.store import read_records
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.batch import Batch
-from validate.estimate.displacement_filter import DisplacementStepper
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.followed import Truth
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.study.engine import finish
-from validate.study.filter_bench import Bench, Ready, open_bench
-from validate.study.filter_cell import run_cell
-from validate.study.filter_plan import FilterPlan, plan
-from validate.study.job import Plan, Where
-from validate.study.kept import fingerprint
-from validate.study.score import FilterScores
-from validate.study.store import Record, read_records
+from validate.estimate.kalman.batch import Batch
+from validate.estimate.kalman.displacement_filter import DisplacementStepper
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.followed import Truth
+from validate.pipeline.run.road import compare
+from validate.study.filters.bench import Bench, Ready, open_bench
+from validate.study.filters.cell import run_cell
+from validate.study.filters.plan import FilterPlan, plan
+from validate.study.filters.score import FilterScores
 from validate.study.sweep import axes
 
 
@@ -91,7 +91,7 @@ def test_the_first_seed_scores_what_a_run_of_the_experiment_scores(pulled: Exper
 
 
 def test_the_pooled_error_is_that_of_all_probes() -> None:
-    from validate.study.score import error_scores
+    from validate.study.filters.score import error_scores
 
     rng = np.random.default_rng(1)
     truth = {n: rng.standard_normal((9, 3)) for n in "ab"}

@@ -6,13 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.study.agreement import picks
-from validate.study.blocks import Blocks, blocks_of, cut, nested, score_difference
-from validate.study.filter_exhibits import ranking_row
-from validate.study.filter_plan import FilterCell
-from validate.study.filters import Best, _best, _edges, usual_score
-from validate.study.ranking import Ranked, rankings
-from validate.study.score import (
+from validate.engine.cell import Record
+from validate.study.filters.blocks import Blocks, blocks_of, cut, nested, score_difference
+from validate.study.filters.exhibits import consistency_words
+from validate.study.filters.plan import FilterCell
+from validate.study.filters.ranking import Ranked, picks, rankings
+from validate.study.filters.score import (
     AHEAD,
     HELD_OUT,
     LOG_LOSS,
@@ -21,9 +20,9 @@ from validate.study.score import (
     FilterScores,
     withheld_scores,
 )
-from validate.study.store import Record
+from validate.study.filters.study import Best, _best, _edges, usual_score
+from validate.study.filters.withheld import Innovations, Withheld
 from validate.study.sweep import axes
-from validate.study.withheld import Innovations, Withheld
 
 ONE_SEGMENT = 0.1  # s
 BLOCKS = Blocks((0, 1, 2, 3), ONE_SEGMENT, ONE_SEGMENT, "kf")
@@ -124,7 +123,7 @@ def place(nis: float) -> Ranked:
 def test_a_filter_outside_of_its_nis_band_is_marked(nis: float, mark: str, doubt: str) -> None:
     """chi-square of 100 degrees of freedom: 95 % between 0.742 and 1.296 per degree."""
     row = place(nis)
-    assert ranking_row(row, WITHHELD)[10] == mark
+    assert consistency_words(row) == mark
     doubts = Best(row, "", 0, ()).doubts
     assert (doubt in doubts) if doubt else "NIS" not in doubts
 

@@ -10,21 +10,21 @@ import pytest
 from click.testing import CliRunner
 from study_samples import experiment_file
 
-from validate.cli import running
-from validate.cli.arguments import pairs
-from validate.cli.main import cli
+from validate.commands import run as running
+from validate.commands.arguments import pairs
+from validate.commands.main import cli
+from validate.engine.cell import Where
 from validate.errors import UsageError
-from validate.replay.experiment import Case, Experiment, Told, vary
-from validate.replay.find import load_file
-from validate.replay.named_run import run_name
-from validate.replay.options import Options, chosen_cases
-from validate.replay.road import compare
-from validate.study import filter_plan
-from validate.study.filter_bench import Bench
-from validate.study.filter_cell import run_cell
-from validate.study.filter_plan import FilterPlan, plan
-from validate.study.filters import run_line, study
-from validate.study.job import Where
+from validate.pipeline.experiment.experiment import Case, Experiment, Told, vary
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.options import Options, chosen_cases
+from validate.pipeline.run.named_run import run_name
+from validate.pipeline.run.road import compare
+from validate.study.filters import plan as filter_plan
+from validate.study.filters.bench import Bench
+from validate.study.filters.cell import run_cell
+from validate.study.filters.plan import FilterPlan, plan
+from validate.study.filters.study import run_line, study
 from validate.study.sweep import axes
 
 
@@ -165,11 +165,11 @@ def with_cases(folder: Path) -> Path:
     """The file of the experiment with two cases, the second one for the solver alone."""
     path = experiment_file(folder)
     text = path.read_text("utf-8")
-    head = "from validate.replay.experiment import Experiment, Twin"
+    head = "from validate.pipeline.experiment.experiment import Experiment, Twin"
     assert head in text
     text = text.replace(
         head,
-        "from validate.replay.experiment import Case, Experiment, Twin",
+        "from validate.pipeline.experiment.experiment import Case, Experiment, Twin",
     )
     text = text.replace("    twin=Twin(record", """    cases=(
         Case("soft", "half as stiff", {"twin.stiffness": 0.5}),

@@ -6,19 +6,18 @@ from pathlib import Path
 import pytest
 from study_samples import experiment_file
 
+from validate.engine.cell import Record, Where
 from validate.estimate.filters import FILTERS
-from validate.replay import load
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.study.filter_stability import (
+from validate.pipeline import load
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.study.filters.stability import (
     FilterEnding,
     FilterEndings,
     endings_exhibit,
     filter_endings,
     sentence,
 )
-from validate.study.job import Where
-from validate.study.store import Record
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,11 @@ from types import SimpleNamespace
 import pytest
 from commands import here, refused
 
+from validate.engine.cell import Record, Where
 from validate.errors import ComparisonError
-from validate.replay.find import load_file
-from validate.study import identify as identify_module
-from validate.study.identify import IdentifyStudy, identification
-from validate.study.job import Where
-from validate.study.store import Record
+from validate.pipeline.experiment.find import load_file
+from validate.study.identify import study as identify_module
+from validate.study.identify.study import IdentifyStudy, identification
 
 ALONE = ("--workers", "0")
 

@@ -10,26 +10,26 @@ import pytest
 from beside import experiment
 from study_samples import experiment_file
 
+from experiments.kf_cube.ladder import PRINTED_LADDER
+from experiments.needle_block.body import MP1, MP2
+from experiments.needle_block.ladder import NEEDLE_LADDER
 from validate.errors import SceneError, UsageError
 from validate.fem.system import Responses
-from validate.papers.accuracy.ladders import NEEDLE_LADDER
-from validate.papers.accuracy.needle import MP1, MP2
-from validate.papers.kf_fem.ladders import PRINTED_LADDER
+from validate.pipeline.bodies.own_body import OwnBody, own_body
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.ladder.default import body_of, trial_of
+from validate.pipeline.ladder.ladder import LARGEST, Rival, StabilityBody, Turned
 from validate.register.registered import Registered
-from validate.replay.experiment import Experiment
-from validate.replay.find import load_file
-from validate.replay.ladder import LARGEST, Rival, StabilityBody, Turned
-from validate.replay.ladder_default import body_of, trial_of
-from validate.replay.own_body import OwnBody, own_body
-from validate.scene.box import box
+from validate.scene.geometries.box import box
+from validate.scene.geometries.remeshed import linear, of_element, refined
 from validate.scene.material import Material, Region
-from validate.scene.material_point import MaterialPoint
 from validate.scene.mesh import boundary_facets, cell_volumes
-from validate.scene.refine import linear, of_element, refined
+from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Scene, Support
-from validate.solve.quasi_static import QuasiStatic
-from validate.study.gain import DECADES, GainBench, GainCell, run_cell
-from validate.study.stability import stability
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.study.stability.gain import DECADES, GainBench, GainCell, run_cell
+from validate.study.stability.study import stability
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_a_declared_ladder_is_the_one_that_is_climbed(phantom: Experiment) -> No
 def test_a_body_that_cannot_be_coarsened_says_what_to_do(
     pulled: Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validate.replay.ladder_default.LARGEST", 50)
+    monkeypatch.setattr("validate.pipeline.ladder.default.LARGEST", 50)
     with pytest.raises(UsageError, match="number of cells as a parameter"):
         body_of(of_a_mesh(pulled))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from validate.cli.main import run
+from validate.commands.main import run
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from study_samples import experiment_file
 
-from validate.replay.find import load_file
-from validate.study import filter_page
-from validate.study.blocks import Blocks, cut
-from validate.study.filters import study
-from validate.study.job import Where
-from validate.study.predictive import predictive_likelihood, with_likelihood
-from validate.study.ranking import rankings
-from validate.study.score import LOG_LOSS, FilterScores
-from validate.study.store import Record
-from validate.study.withheld import PredictionErrors, Segments, prediction_errors
+from validate.engine.cell import Record, Where
+from validate.pipeline.experiment.find import load_file
+from validate.study.filters import page as filter_page
+from validate.study.filters.blocks import Blocks, cut
+from validate.study.filters.cell import predictive_likelihood, with_likelihood
+from validate.study.filters.ranking import rankings
+from validate.study.filters.score import LOG_LOSS, FilterScores
+from validate.study.filters.study import study
+from validate.study.filters.withheld import PredictionErrors, Segments, prediction_errors
 
 SAMPLES, SEGMENTS = 40_000, 100
 T = np.arange(1.0, SAMPLES + 1)

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from validate.engine.cell import Record
 from validate.errors import ComparisonError, UsageError
-from validate.study import filters
-from validate.study.filter_plan import FilterCell
-from validate.study.ranking import Ranking, dominator, rankings
-from validate.study.score import FilterScores
-from validate.study.store import Record
+from validate.study.filters import study as filters
+from validate.study.filters.plan import FilterCell
+from validate.study.filters.ranking import Ranking, dominator, rankings
+from validate.study.filters.score import FilterScores
 
 
 def ranked(**cells: tuple[Sequence[float], float | None]) -> Ranking:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from study_samples import experiment_file
 
-from validate.study.filters import study
+from validate.study.filters.study import study
 
 VALUES = 12
 BASELINES = 2  # the filter given nothing, the last measurement held

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from validate.study.blocks import score_difference
-from validate.study.interval import SeedInterval, interval
-from validate.study.score import FilterScores
+from validate.study.filters.blocks import score_difference
+from validate.study.filters.score import FilterScores, SeedInterval, interval
 
 
 def test_the_95_percent_interval_of_five_numbers() -> None:

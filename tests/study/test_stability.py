@@ -15,32 +15,31 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from validate.engine.cell import Plan, Record, Where
+from validate.engine.finish import Finished, finish
 from validate.errors import SceneError
 from validate.fem.critical import cell_altitudes
 from validate.fem.system import build
-from validate.replay.experiment import Experiment
-from validate.replay.find import find
-from validate.replay.ladder import StabilityBody, squeezed
-from validate.report.store import schema
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import find
+from validate.pipeline.ladder.ladder import StabilityBody, squeezed
+from validate.pipeline.run.job import Job
+from validate.report.stored.store import schema
 from validate.solve.amplification import amplification
-from validate.solve.central import CentralDifference
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.misprint import misprint_limit
-from validate.solve.newmark import Newmark
-from validate.study import precision, stability_page
-from validate.study import stability as stability_module
-from validate.study.engine import Finished, finish
-from validate.study.job import Job, Plan, Where
-from validate.study.precision import drift
-from validate.study.stability import Stability, declared, points, stability
-from validate.study.stability_cell import (
+from validate.solve.dynamic.newmark import Newmark, misprint_limit
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.explicit.linear import ExplicitLinear
+from validate.study.stability import page as stability_page
+from validate.study.stability import precision
+from validate.study.stability import study as stability_module
+from validate.study.stability.cell import (
     StabilityBench,
     Stepped,
     frequencies,
     measured_limit,
     run_cell,
 )
-from validate.study.stability_plan import (
+from validate.study.stability.plan import (
     _PAIR_NU,
     NU,
     StabilityCell,
@@ -48,7 +47,8 @@ from validate.study.stability_plan import (
     stability_cells,
     step_grid,
 )
-from validate.study.store import Record
+from validate.study.stability.precision import drift
+from validate.study.stability.study import Stability, declared, points, stability
 from validate.study.study_page import write_study
 
 W, ALPHA, BETA = 30.0, 0.7, 0.02
@@ -228,7 +228,7 @@ def test_explicit_steps_of_one_mass_are_the_cosine(positions: bool) -> None:
 
 
 def test_energy_over_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.study.precision.DRIFT_STEPS", 2000)
+    monkeypatch.setattr("validate.study.stability.precision.DRIFT_STEPS", 2000)
     omegas = np.array([1.0, 7.0, 30.0])
     for scheme in declared().values():
         if scheme.conserves:
@@ -267,7 +267,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> tuple[StabilityCell, ...]:
     """The base, nu = 0, and what must be refused."""
     cells = stability_cells(body("needle_block"), JOB, quick=True)
     without_nu = replace(body("needle_block").base, nu=0.0)
-    monkeypatch.setattr("validate.study.precision.DRIFT_STEPS", 200)
+    monkeypatch.setattr("validate.study.stability.precision.DRIFT_STEPS", 200)
     picked = [
         replace(cells[0], drift=True),
         *(c for c in cells if c.expected or c.variant == without_nu),

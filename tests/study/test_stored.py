@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
-from validate.cli.arguments import BAD_INPUT
-from validate.cli.main import run
+from validate.commands.arguments import BAD_INPUT
+from validate.commands.main import run
 from validate.errors import ComparisonError, UsageError
+from validate.report.export.table_file import stored_table, write_long_table
+from validate.report.long_table import content_of
 from validate.seals import sealed
-from validate.study.stored import pairs, read_run, side_by_side
+from validate.study.stored_runs.stored import pairs, read_run, read_table, side_by_side
 
 
 def stored(folder: Path, **changes: Any) -> Path:
@@ -185,3 +187,18 @@ def test_scores_that_the_first_run_lacks_are_counted(tmp_path: Path) -> None:
         ("a", "b", [(2e-3, 3e-3)]), ("a", "c", [(2e-3, 3e-3)]),
     ]  # fmt: skip
     assert (more, unseen) == (0, 1)
+
+
+def test_a_run_reads_alike_from_its_table_and_from_its_results(tmp_path: Path) -> None:
+    """A table beside results.json holds the scores; a run of an older version has none."""
+    folder = stored(tmp_path / "one")
+    old, content = read_run(folder), content_of(read_table(folder))
+    assert content["methods"][0]["scores"][0]["value"] == 2e-3
+    write_long_table(stored_table(folder), folder)
+    (folder / "results.json").write_text("not read")
+    assert read_run(folder) == read_run(folder / "results.json") == old
+    assert content_of(read_table(folder)) == content
+    copied = tmp_path / "copy.json"
+    copied.write_text(json.dumps(sealed({"experiment": "x"})))
+    with pytest.raises(UsageError, match=r"not a results\.json of validate"):
+        read_run(copied)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from validate.replay.find import find
+from validate.compare.exhibit import NumberTable
+from validate.pipeline.experiment.find import find
 from validate.study.study_page import Findings, write_study
 
 KINDS = {
@@ -27,8 +28,7 @@ def test_the_kind_is_the_declared_one(
     if not present:
         monkeypatch.setenv("VALIDATE_SHARED_DATA", str(tmp_path / "absent"))
     experiment = find(name, project_root)
-    told = Findings(
-        "Trade: a title", "One cell.", (), {"kind": "tradeoff"}, (("a",), ((1.0,),)), True
-    )
+    cells = NumberTable("cells", "", ("a",), ((1.0,),))
+    told = Findings("Trade: a title", "One cell.", (), {"kind": "tradeoff"}, cells, True)
     page = write_study(experiment, told, tmp_path / "study")
     assert json.loads((page.parent / "results.json").read_text("utf-8"))["kind"] == KINDS[name]

@@ -1,6 +1,10 @@
 """A statement over stored runs: which count, which of their checks, and what they say together."""
 
+import csv
 import json
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +13,12 @@ import pytest
 from commands import here, refused
 
 from validate.errors import UsageError
+from validate.report.export import parquet
+from validate.report.export.table_file import stored_table, write_long_table
 from validate.seals import sealed, unsealed
-from validate.study.predictions import predictions, stored_runs
-from validate.study.summary import Summary, summary
-from validate.study.summary_page import document
+from validate.study.stored_runs.predictions import predictions, stored_runs
+from validate.study.stored_runs.summary import Summary, summary
+from validate.study.stored_runs.summary_page import _ROWS, _against, _points, document
 
 
 def check(simulated: float, measured: float = 10.0, **more: Any) -> dict[str, Any]:
@@ -205,5 +211,79 @@ def test_the_command_prints_and_draws_all_of_it(tmp_path: Path) -> None:
     assert "Predicted against measured size" in (folder / "report.html").read_text("utf-8")
     assert {p.name for p in (folder / "figures").iterdir()} == {"against.png"}
     again = json.loads(here("summary", "--out", str(tmp_path), "--json")[1])
+    with (folder / "tables" / "predictions.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    points = [p for kind in again["measured"] for p in kind.pop("predictions")]
+    assert [float(r["E"]) for r in rows] == [p["error"] for p in points]
     assert again == unsealed(json.loads((folder / "results.json").read_text("utf-8")))
     assert [run["folder"] for run in again["runs"]] == ["a", "b", "c", "q"]
+
+
+@pytest.mark.parametrize("form", [True, False], ids=["parquet", "csv"])
+def test_a_stored_table_says_the_same_and_is_not_believed_where_it_is_edited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: bool
+) -> None:
+    if form:
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr(parquet, "available", lambda: form)
+    for name, by in (("a", 1.0), ("b", 1.1), ("c", 1.2)):
+        stored(tmp_path, name, check(10 * by), check(10.0, verdict="fitted"))
+    old = document(summary(tmp_path))
+    for folder in tmp_path.iterdir():
+        path = write_long_table(stored_table(folder), folder)
+        (folder / "results.json").write_text("not read")
+    assert document(summary(tmp_path)) == old
+    path.write_bytes(path.read_bytes()[:-9])
+    assert [bool(run.why) for run in stored_runs(tmp_path)].count(True) == 1
+
+
+def test_a_chart_of_a_thousand_experiments_names_the_first(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0))
+    (kind,) = summary(tmp_path).kinds
+    (point,) = kind.points
+    many = replace(kind, points=tuple(replace(point, experiment=f"e{i}") for i in range(1000)))
+    labels = [s.label for s in _against(1, many).series if s.style == "points"]
+    assert labels == [*(f"e{i}" for i in range(28)), "972 other experiments"]
+
+
+def test_a_chart_shows_prediction_against_measurement_with_both_bands(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(11.0))
+    (kind,) = summary(tmp_path).kinds
+    assert kind.stated is not None
+    drawn = {(s.label, s.style): s for s in _against(1, kind).series}
+    (point,) = kind.points
+    points = drawn[point.experiment, "points"]
+    by = 1e3 if kind.covered.unit == "m" else 1.0
+    assert points.x.tolist() == pytest.approx([by * point.measured])
+    assert points.y.tolist() == pytest.approx([by * point.simulated])
+    models = drawn["bias of the models", "line"]
+    assert models.y / models.x == pytest.approx(kind.stated.bias.value)
+    band = drawn["measured = predicted, ± 2 sd", "band"]
+    assert band.upper is not None
+    assert band.upper / band.x == pytest.approx(np.exp(2 * kind.stated.own))
+
+
+def test_a_page_shows_the_largest_errors_and_a_file_all(tmp_path: Path) -> None:
+    points = [check(10.0 + i / 100, name=f"force@{i + 1}mm") for i in range(_ROWS + 5)]
+    stored(tmp_path, "a", *points)
+    page, data = _points("predictions", summary(tmp_path).kinds)
+    assert (len(page.rows), len(data.rows)) == (_ROWS, _ROWS + 5)
+    assert {row[1] for row in data.rows} - {row[1] for row in page.rows} == {
+        f"force@{i}mm" for i in range(1, 6)
+    }
+
+
+def test_a_summary_loads_no_solver_and_no_kernel(tmp_path: Path) -> None:
+    """They take 110 MB, and nothing is run; pandas takes 42 MB."""
+    stored(tmp_path, "a", check(11.0))
+    write_long_table(stored_table(tmp_path / "a"), tmp_path / "a")
+    code = (
+        "import sys, validate.commands.summary, validate.report.exhibits\n"
+        "from pathlib import Path\n"
+        "from validate.study.stored_runs.summary import summary\n"
+        "assert summary(Path(sys.argv[1])).kinds\n"
+        "print([m for m in ('numba', 'skfem', 'shapely', 'pandas', 'dask') if m in sys.modules])"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -5,18 +5,14 @@ from types import SimpleNamespace as Made
 import numpy as np
 import pytest
 
-from validate.replay.ladder import PaperSetting, Turned
-from validate.study import stability_exhibits
-from validate.study.filter_exhibits import (
-    _pareto_chart,
-    _pareto_exhibit,
-    _ranking_exhibit,
-    ranking_head,
-)
-from validate.study.stability import points
-from validate.study.stability_exhibits import _cost, _map, _marks
-from validate.study.still_page import _cells
-from validate.study.still_page import _map as gain_map
+from validate.pipeline.ladder.ladder import PaperSetting, Turned
+from validate.report.views.records import table
+from validate.study.filters.exhibits import _pareto_chart, _pareto_exhibit, _ranking_exhibit
+from validate.study.stability import exhibits as stability_exhibits
+from validate.study.stability.exhibits import _COST, _map, _marks
+from validate.study.stability.still import _cells
+from validate.study.stability.still import _map as gain_map
+from validate.study.stability.study import points
 
 BASE = Turned(4e3, 0.45, 1e3, 1.0, 1e-3, 5)
 
@@ -24,14 +20,14 @@ BASE = Turned(4e3, 0.45, 1e3, 1.0, 1e-3, 5)
 def test_updates_of_a_loop_that_never_settles_are_none() -> None:
     limit = Made(gains=(1.0, 10.0, 100.0), updates=(0, 7, -1), predicted=50.0, tuned=10.0)
     found = Made(limits=((Made(load=0.5), limit),), experiment=Made(name="phantom"))
-    assert _cells(found)[1] == ((0.5, 1.0, 0), (0.5, 10.0, 7), (0.5, 100.0, None))
+    assert _cells(found).rows == ((0.5, 1.0, 0), (0.5, 10.0, 7), (0.5, 100.0, None))
     assert gain_map(found).panels[0].codes.tolist() == [[0, 0, 1]]
 
 
 def test_tables_of_a_front_are_numbered_from_one() -> None:
     empty = Made(rows=(), front=(), condition=())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("validate.study.filter_exhibits._under", lambda ranking: "")
+        patch.setattr("validate.study.filters.exhibits._under", lambda ranking: "")
         made = _pareto_exhibit(Made(rankings=[empty, empty], unit="m"))
     assert [t.name for t in made.tables] == ["pareto_1", "pareto_2"]
 
@@ -40,10 +36,12 @@ def test_tables_of_a_front_are_numbered_from_one() -> None:
 def test_a_lone_ranking_shows_more_places(
     monkeypatch: pytest.MonkeyPatch, conditions: int, shown: int
 ) -> None:
-    module = "validate.study.filter_exhibits."
+    module = "validate.study.filters.exhibits."
     monkeypatch.setattr(module + "_under", lambda ranking: "")
     monkeypatch.setattr(module + "_ranking_words", lambda study: ())
-    monkeypatch.setattr(module + "ranking_row", lambda row, by: (row,) * len(ranking_head("m")))
+    monkeypatch.setattr(
+        module + "table", lambda name, title, rows, columns: Made(title=title, rows=rows)
+    )
     rankings = [Made(rows=tuple(range(30)))] * conditions
     made = _ranking_exhibit(Made(rankings=rankings, unit="m", by="all.rmse"))
     assert [len(t.rows) for t in made.tables] == [shown] * conditions
@@ -56,7 +54,7 @@ def test_a_point_of_the_front_is_drawn_under_its_method(monkeypatch: pytest.Monk
 
     rows = (row("kf", 1e-3, 2e-3), row("ekf", 2e-3, 1e-3), row("kf", 4e-3, 3e-3),
             row("exact", 1e-3, 0.0), row("untimed", None, 1.0))  # fmt: skip
-    monkeypatch.setattr("validate.study.filter_exhibits._under", lambda ranking: "")
+    monkeypatch.setattr("validate.study.filters.exhibits._under", lambda ranking: "")
     chart = _pareto_chart(Made(by="rmse", unit="m"), Made(rows=rows, front=rows[:2]), 1)
     drawn = {s.label: (s.x.tolist(), s.y.tolist()) for s in chart.series}
     assert drawn == {
@@ -99,12 +97,16 @@ def test_a_map_has_a_row_a_variant_that_was_run(monkeypatch: pytest.MonkeyPatch)
     assert _map(study, "E") is None  # one row is no map
 
 
+def cost(result: Made) -> tuple[object, ...]:
+    return table("", "", [(BASE, result)], _COST).rows[0]
+
+
 def test_what_cells_cost_stands_in_the_order_of_its_headings() -> None:
     rounding = Made(static=1e-6, positions=2e-6, velocities=3e-6)
     r = Made(rounding=rounding, conditions={"K": 10.0, "J": 3.0}, locking=0.1, warning="locks")
-    assert _cost(r) == (10.0, None, 3.0, 0.1, 1e-6, 2e-6, 3e-6, "locks")
+    assert cost(r) == (10.0, None, 3.0, 0.1, 1e-6, 2e-6, 3e-6, "locks")
     bare = Made(rounding=None, conditions={}, locking=None, warning="")
-    assert _cost(bare) == (None,) * 8
+    assert cost(bare) == (None,) * 8
 
 
 def test_a_paper_lies_between_the_moduli_of_the_rows_by_its_logarithm() -> None:

@@ -8,21 +8,20 @@ import pytest
 from beside import experiment
 from touched import block
 
+from validate.engine.cell import Where
 from validate.errors import UsageError
 from validate.fem.system import build
-from validate.replay.experiment import Experiment
-from validate.replay.ladder import RUNGS, Trial
-from validate.replay.ladder_default import body_of, trial_of
-from validate.replay.ladder_touched import Divided
-from validate.solve.regions import AsyncRegions
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.ladder.default import body_of, trial_of
+from validate.pipeline.ladder.ladder import RUNGS, Trial
+from validate.pipeline.ladder.touched import Divided
+from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import StepTimes
-from validate.study.choose import Wanted, meeting, misses
-from validate.study.choose_facts import facts
-from validate.study.climb import Climb, require_judged
-from validate.study.job import Where
-from validate.study.trade import Trade, TradeRow
-from validate.study.trade_exhibits import trade_exhibits
-from validate.study.trade_regions import pays, regions_exhibit
+from validate.study.choose.climb import Climb, require_judged
+from validate.study.choose.facts import facts
+from validate.study.choose.study import Wanted, meeting, misses
+from validate.study.tradeoff.exhibits import pays, regions_exhibit, trade_exhibits
+from validate.study.tradeoff.study import Trade, TradeRow
 
 
 @pytest.fixture(scope="module")

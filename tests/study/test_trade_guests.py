@@ -9,15 +9,14 @@ import pytest
 from beside import beside, experiment
 
 from validate.errors import UsageError
+from validate.pipeline.run.job import Job
 from validate.recording.types import Recording, Source
-from validate.scene.box import grid
+from validate.scene.geometries.box import grid
+from validate.scene.geometries.remeshed import of_element
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
-from validate.scene.refine import of_element
 from validate.scene.scene import Scene
-from validate.study.job import Job
-from validate.study.trade_cell import TradeCell, keyed, run_cell
-from validate.study.trade_guests import with_guests_beside
+from validate.study.tradeoff.cell import TradeCell, keyed, run_cell, with_guests_beside
 
 FAKE = """
 import json, sys

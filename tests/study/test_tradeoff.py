@@ -11,45 +11,43 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from validate.cli import studying
-from validate.cli.main import run
-from validate.cli.screen import show
+from validate.commands import study as studying
+from validate.commands.main import run
+from validate.commands.screen import show
+from validate.engine.cell import Plan, Record, Where
+from validate.engine.finish import finish
 from validate.errors import ComparisonError, SceneError, UsageError
-from validate.estimate import displacement_filter
-from validate.fem.factor import factorise
+from validate.estimate.kalman import displacement_filter
+from validate.fem.linear_solvers.factor import factorise
 from validate.fem.system import build
-from validate.replay.experiment import Experiment
-from validate.replay.ladder import RUNGS, LawPair, Rival, Rung, Trial
-from validate.scene.box import box
+from validate.library import studies
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.ladder.ladder import RUNGS, LawPair, Rival, Rung, Trial
+from validate.pipeline.run.job import Job
+from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Drive, Load, Scene, Support
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.modal import Modal
-from validate.solve.newmark import Newmark
-from validate.solve.quasi_static import QuasiStatic
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.explicit.linear import ExplicitLinear
+from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
-from validate.study import (
-    climb,
-    coverage_plan,
-    gain,
-    precision,
-    stability_cell,
-    trade,
-    trade_cell,
-)
-from validate.study.choose import Wanted, choose, wanted
-from validate.study.choose_exhibits import choose_exhibits
-from validate.study.choose_facts import principal_strains
-from validate.study.engine import finish
-from validate.study.held import held_bytes
-from validate.study.job import Job, Plan, Where
-from validate.study.store import Record
-from validate.study.trade import Trade, TradeRow, front, trade_cells, traded
-from validate.study.trade_cell import Measured, TradeCell, run_cell
-from validate.study.trade_exhibits import trade_exhibits
-from validate.study.trade_page import cells_table, trade_document
+from validate.study.choose import climb
+from validate.study.choose.exhibits import choose_exhibits
+from validate.study.choose.facts import principal_strains
+from validate.study.choose.study import Wanted, choose, wanted
+from validate.study.coverage import plan as coverage_plan
+from validate.study.stability import cell as stability_cell
+from validate.study.stability import gain, precision
+from validate.study.tradeoff import cell as trade_cell
+from validate.study.tradeoff import study as trade
+from validate.study.tradeoff.cell import Measured, TradeCell, run_cell
+from validate.study.tradeoff.exhibits import trade_exhibits
+from validate.study.tradeoff.held import held_bytes
+from validate.study.tradeoff.page import cells_table, trade_document
+from validate.study.tradeoff.study import Trade, TradeRow, front, trade_cells, traded
 
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
@@ -152,8 +150,10 @@ def test_a_trade_is_told_in_numbers_that_are_finite(measured: Trade) -> None:
     made = trade_exhibits(measured)
     assert [e.anchor for e in made] == ["front", "shares", "costs", "convergence", "unscored"]
     told = trade_document(measured)
-    assert {row[-1] for row in cells_table(measured)} == {r.failed or None for r in measured.rows}
-    assert None in {row[-1] for row in cells_table(measured)}
+    assert {row[-1] for row in cells_table(measured).rows} == {
+        r.failed or None for r in measured.rows
+    }
+    assert None in {row[-1] for row in cells_table(measured).rows}
     assert len(told["cells"]) == len(measured.rows)
     choice = choose(climbing(measured, []), wanted("1mm", "1Hz"), False, lambda trade, row, dt: row)
     assert {e.anchor for e in choose_exhibits(choice)} > {"choice", "numbers", "ladder"}
@@ -328,8 +328,8 @@ def test_errors_of_forces_are_those_of_what_drives_the_scene(
 def commanded(measured: Trade, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command line's trade is the one above."""
     monkeypatch.setattr(studying, "find", lambda *_: measured.experiment)
-    monkeypatch.setattr(studying, "trade", lambda experiment, **rest: measured)
-    monkeypatch.setattr(studying, "Climb", lambda experiment, **rest: climbing(measured, []))
+    monkeypatch.setattr(studies, "trade", lambda experiment, **rest: measured)
+    monkeypatch.setattr(studies, "Climb", lambda experiment, **rest: climbing(measured, []))
 
 
 @pytest.mark.slow

@@ -10,25 +10,25 @@ from scipy.stats import multivariate_normal
 from script_modules import module_of
 from study_samples import experiment_file
 
+from validate.engine.cell import Where
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.kalman import Gaussian, kf_update
-from validate.fem.locate import barycentric_rows
+from validate.estimate.kalman.formulas import Gaussian, kf_update
+from validate.fem.assembly.locate import barycentric_rows
+from validate.pipeline.experiment.find import find, load_file
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.road import compare
 from validate.recording.types import Contours
-from validate.register.outlines import observe_outlines
-from validate.register.plane import cavity_sampler
-from validate.replay.find import find, load_file
-from validate.replay.options import Options
-from validate.replay.road import compare
-from validate.scene.box import box
-from validate.study.blocks import cut, nested, score_interval
-from validate.study.filter_bench import Bench
-from validate.study.filter_cell import folds_of, run_cell
-from validate.study.filter_exhibits import ranking_row, study_exhibits
-from validate.study.filter_plan import FilterCell, plan
-from validate.study.filters import study
-from validate.study.job import Where
-from validate.study.score import AHEAD, HELD_OUT, WITHHELD, FilterScores
-from validate.study.withheld import (
+from validate.register.outlines.outlines import observe_outlines
+from validate.register.outlines.plane import cavity_sampler
+from validate.scene.geometries.box import box
+from validate.study.filters.bench import Bench
+from validate.study.filters.blocks import cut, nested, score_interval
+from validate.study.filters.cell import folds_of, run_cell
+from validate.study.filters.exhibits import against_first, study_exhibits
+from validate.study.filters.plan import FilterCell, plan
+from validate.study.filters.score import AHEAD, HELD_OUT, WITHHELD, FilterScores
+from validate.study.filters.study import study
+from validate.study.filters.withheld import (
     Innovations,
     MarkerTracks,
     Segments,
@@ -340,7 +340,7 @@ def test_without_an_interval_a_place_is_neither_worse_nor_a_tie(tmp_path: Path) 
         pulled, methods=("kf", "plain"), seeds=1, out=tmp_path, where=Where(workers=0)
     )  # fmt: skip
     (ranking,) = found.rankings
-    words = [ranking_row(r, found.by)[8] for r in ranking.rows]
+    words = [against_first(r) for r in ranking.rows]
     assert words == ["best", "no interval", "no interval"]
     assert (found.best[0].ties, found.best[0].better) == (0, "plain")  # its twin's own model
     assert "place 2: plain is first" in found.best[0].doubts

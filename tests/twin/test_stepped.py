@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.scene.box import box
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 from validate.solve.types import Scheme
 from validate.twin.stepped import SteppedTwin
 from validate.twin.tracked import Camera, Origin

@@ -12,11 +12,11 @@ from validate.fem.system import build
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.register.markers import placed_markers
-from validate.scene.box import box
+from validate.register.markers.markers import placed_markers
+from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
-from validate.solve.fluid import NoFluid
+from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march
 from validate.solve.types import Outcome
 from validate.twin.tracked import (

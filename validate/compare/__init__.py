@@ -3,22 +3,66 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "residual": ("Residual", "residuals"),
-    "convergence": ("GridConvergence", "Numerical", "convergence"),
-    "score": ("Score", "scores_of"),
-    "inputs": ("Declared", "Joint"),
-    "verdict": ("Accept", "Check", "Sensitivity", "judge"),
-    "published": ("Figure", "Published"),
-    "effects": ("Effect", "Sensor"),
-    "metric": ("Metric",),
-    "two_fields": ("compare_fields",),
-    "force_error": ("force_pair", "force_scores"),
-    "boundary": ("outline_boundary",),
-    "shape_error": ("Boundaries", "boundary_scores"),
-    "overall": ("Overall", "judge_all"),
-    "expected": ("Expected",),
-    "result": ("MethodResult", "Result"),
-    "exhibit": ("Animation", "Chart", "Exhibit", "NodeMap", "NumberTable", "Picture", "Series"),
+    "residual": (
+        "Residual",
+        "residuals",
+    ),
+    "convergence": (
+        "GridConvergence",
+        "Numerical",
+        "convergence",
+    ),
+    "score": (
+        "Score",
+        "scores_of",
+    ),
+    "inputs": (
+        "Declared",
+        "Joint",
+    ),
+    "verdict": (
+        "Accept",
+        "Check",
+        "Sensitivity",
+        "judge",
+    ),
+    "published": (
+        "Figure",
+        "Published",
+    ),
+    "effects": (
+        "Effect",
+        "Sensor",
+    ),
+    "shapes.metric": ("Metric",),
+    "shapes.two_fields": ("compare_fields",),
+    "force_error": (
+        "force_pair",
+        "force_scores",
+    ),
+    "shapes.boundary": ("outline_boundary",),
+    "shapes.shape_error": (
+        "Boundaries",
+        "boundary_scores",
+    ),
+    "overall": (
+        "Overall",
+        "judge_all",
+        "Expected",
+    ),
+    "result": (
+        "MethodResult",
+        "Result",
+    ),
+    "exhibit": (
+        "Animation",
+        "Chart",
+        "Exhibit",
+        "NodeMap",
+        "NumberTable",
+        "Picture",
+        "Series",
+    ),
 }
 
 __all__ = names(_HOMES)

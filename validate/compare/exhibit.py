@@ -215,6 +215,31 @@ class RegimeMap:
 
 
 @dataclass(frozen=True)
+class Intervals:
+    """values (k,) ± halves (k,) each with its limit (k,), all in the unit of its line, NaN = none.
+
+    `texts` are the numbers as read, `answers` what follows from them.
+    """
+
+    name: str
+    title: str
+    labels: tuple[str, ...]
+    values: Floats
+    halves: Floats
+    limits: Floats
+    texts: tuple[str, ...]
+    answers: tuple[str, ...]
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        shape, fail = (len(self.labels),), ComparisonError
+        for name in ("values", "halves", "limits"):
+            found = checked(getattr(self, name), f"intervals '{self.name}' {name}", shape, nan=True,
+                            error=fail)  # fmt: skip
+            object.__setattr__(self, name, found)
+
+
+@dataclass(frozen=True)
 class Picture:
     """pixels (h, w, 3) sRGB with what it shows (caption) and the same in words (alt).
 
@@ -249,7 +274,7 @@ class Animation:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A part of a report: its sentences, then pictures, tables, charts, heats, regimes, maps.
+    """A part of a report: its sentences, then pictures, tables, charts, heats, intervals, maps.
 
     `data` are tables for files only: the numbers behind what is shown, SI with a column of units.
     """
@@ -261,6 +286,7 @@ class Exhibit:
     charts: tuple[Chart, ...] = ()
     maps: tuple[NodeMap, ...] = ()
     heats: tuple[Heat, ...] = ()
+    intervals: tuple[Intervals, ...] = ()
     regimes: tuple[RegimeMap, ...] = ()
     pictures: tuple[Picture | Animation, ...] = ()
     data: tuple[NumberTable, ...] = ()

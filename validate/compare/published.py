@@ -14,6 +14,10 @@ Claim = Literal["reproduced", "not reproduced", "not reproducible as printed", "
 PublishedVerdict = Claim | Literal["moved", "not computed", "other data"]
 Values = Mapping[str, Mapping[str, float]]  # scores by owner (a method, "told", ...) and name
 _WIDEST = 0.1  # of a reference's scale; a wider tolerance decides nothing
+#: Reasons why a printed number is no result that a run could reproduce.
+INPUT = "an input, taken as printed"
+CITED = "cited from other work, not a result of the paper"
+MACHINE = "another machine: ours is in the environment section of the report"
 
 
 @dataclass(frozen=True)
@@ -178,3 +182,25 @@ class Figure:
             return self.of(values)
         owner, _, score = self.of.partition(":")
         return values[owner][score]
+
+
+def setting(
+    name: str, theirs: float, ours: float, unit: str, source: str, reason: str = INPUT
+) -> Figure:
+    """Return the row of a printed number of the set-up, with the one that the experiment uses."""
+    return Figure(
+        name, lambda _: ours, theirs, None, unit, "not comparable", reason, source, ours,
+        1e-12 * max(1.0, abs(ours)), setting=True,
+    )  # fmt: skip
+
+
+def uncompared(name: str, theirs: float | None, unit: str, source: str, reason: str) -> Figure:
+    """Return the row of a printed number or picture with which no value of ours is compared."""
+    return Figure(
+        name, None, theirs, None, unit, "not comparable", reason, source, setting=True
+    )  # fmt: skip
+
+
+def drawn(name: str, score: str, unit: str, source: str, reason: str) -> Figure:
+    """Return the row of a curve or picture without a printed number, with a score of ours."""
+    return Figure(name, score, None, None, unit, "not comparable", reason, source)

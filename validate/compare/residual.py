@@ -5,16 +5,21 @@ are differences of residuals against the same measurement, and so are the sensit
 mesh and to the inputs.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import ComparisonError
 from validate.register.observation import Deviation, Role, Selection
-from validate.register.registered import Registered
-from validate.solve.types import Run
+
+if TYPE_CHECKING:
+    from validate.register.registered import Registered
+    from validate.solve.types import Run
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,12 @@ class Residual:
         values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
         if values.size == 0:
             raise ComparisonError(f"{self.name}: 0 matched points, nothing was compared")
-        object.__setattr__(self, "values", values)
+        # In one order: sums of a stored residual are those of a fresh one, digit by digit.
+        for name, array in (("values", values), ("reference", self.reference)):
+            if array is not None:
+                own = np.array(array, order="C")
+                own.setflags(write=False)
+                object.__setattr__(self, name, own)
 
     @property
     def name(self) -> str:

@@ -1,26 +1,105 @@
 """The whole comparison of an experiment: what the report shows and the exit code rests on."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from validate.compare.effects import Effect
 from validate.compare.exhibit import Exhibit
-from validate.compare.expected import Expected, MovedVerdict, moved
-from validate.compare.inputs import Declared, Joint
-from validate.compare.overall import Overall, judge_all
+from validate.compare.overall import Expected, MovedVerdict, Overall, judge_all, moved
 from validate.compare.published import Published
 from validate.compare.residual import Residual
+from validate.compare.row import RowBlock
 from validate.compare.score import Score
-from validate.compare.streams import StreamUse, stream_uses
 from validate.compare.verdict import Check
-from validate.identify.budget import IdentifiedValue
+from validate.compare.view import View
+from validate.display import brief
 from validate.parameters import Changed, Parameter
-from validate.recording.types import Recording
-from validate.register.registered import Registered
-from validate.scene.meshless import AnyScene
-from validate.solve.types import Run
+from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Stream
+
+if TYPE_CHECKING:
+    from validate.compare.effects import Effect
+    from validate.compare.inputs import Declared, Joint
+    from validate.identify.budget import IdentifiedValue
+    from validate.recording.types import Recording
+    from validate.register.registered import Registered
+    from validate.scene.meshless import AnyScene
+    from validate.solve.types import Run
+
+
+# --- Which streams of the recordings an experiment uses, and why the others are not.
+
+_KINDS: tuple[tuple[type[Stream], str], ...] = (
+    (Markers, "markers"),
+    (Signal, "signal"),
+    (Contours, "outlines"),
+    (Frames, "images"),
+)
+_ROLES = {
+    "drives": "drives the simulation",
+    "calibrates": "used to identify",
+    "validates": "compared with what is simulated",
+}
+
+
+@dataclass(frozen=True)
+class StreamUse:
+    """A stream of a recording: whether the experiment uses it, and what for or why not."""
+
+    recording: str
+    topic: str
+    kind: str
+    used: bool
+    why: str
+
+
+def stream_uses(
+    recordings: Sequence[Recording], methods: Sequence[Sequence[Registered]]
+) -> tuple[StreamUse, ...]:
+    """Every stream of every recording, read or not; `methods` hold the registrations of each."""
+    return tuple(
+        use
+        for i, recording in enumerate(recordings)
+        for use in _uses(recording, [seen[i] for seen in methods if i < len(seen)])
+    )
+
+
+def _uses(recording: Recording, registered: Sequence[Registered]) -> Iterator[StreamUse]:
+    roles = {o.name: _ROLES[o.role] for seen in registered for o in seen.observations}
+    found_in = {c.images: k for k, c in recording.contours.items() if c.images and k in roles}
+    for topic, stream in recording.streams.items():
+        use = _use(topic, stream, roles, found_in)
+        why = use or _why_not(stream, recording, roles)
+        yield StreamUse(recording.name, topic, _kind(stream), bool(use), why)
+    for topic, why in recording.unread.items():
+        yield StreamUse(recording.name, topic, "not read", False, why)
+
+
+def _kind(stream: Stream) -> str:
+    return next(name for kind, name in _KINDS if isinstance(stream, kind))
+
+
+def _use(topic: str, stream: Stream, roles: Mapping[str, str], found_in: Mapping[str, str]) -> str:
+    """What a stream is used for; empty where it is not."""
+    if topic in found_in:
+        return f"source of the outlines '{found_in[topic]}'"
+    made = isinstance(stream, Contours) and stream.images
+    end = f"; extracted from the images '{made}', not as recorded" if made else ""
+    return f"{roles[topic]}{end}" if topic in roles else ""
+
+
+def _why_not(stream: Stream, recording: Recording, roles: Mapping[str, str]) -> str:
+    if not isinstance(stream, Frames):
+        return "no observation of the experiment uses it"
+    others = [f"'{topic}'" for topic in recording.contours if topic in roles]
+    if others:
+        return f"no outline is extracted from them: {', '.join(others)} are compared as recorded"
+    return "no outline is extracted from them"
+
+
+# -------------------------------------------------------------------------------------------------
 
 Kind = Literal["measured", "twin", "same law, finer mesh", "same model", "reference"]
 KINDS: Mapping[Kind, str] = MappingProxyType(
@@ -59,6 +138,8 @@ class MethodResult:
     def __post_init__(self) -> None:
         object.__setattr__(self, "residuals", MappingProxyType(dict(self.residuals)))
 
+    __repr__ = brief
+
     @property
     def called(self) -> str:
         """The label, with what was chosen on the judging twin."""
@@ -82,6 +163,7 @@ class Result:
     `warnings` doubt what was given. `changed` parameters are not as the experiment declares them.
     `specimens` are those of the recordings, one name each. `expected` are the verdicts that the
     experiment is known to have. `locking` warns of elements that are too stiff, a line a cause.
+    `rows` are an experiment's own numbers for the long table, `views` what it shows of that table.
     `identified_values` carry their budgets; `identified` are numbers that identification found
     besides.
     """
@@ -106,11 +188,15 @@ class Result:
     inputs: tuple[Declared, ...] = ()
     joint: tuple[Joint, ...] = ()
     exhibits: tuple[Exhibit, ...] = ()
+    rows: tuple[RowBlock, ...] = ()
+    views: tuple[View, ...] = ()
     changed: tuple[Changed, ...] = ()
     specimens: tuple[str, ...] = ()
     expected: tuple[Expected, ...] = ()
     locking: tuple[str, ...] = ()
     identified_values: tuple[IdentifiedValue, ...] = ()
+
+    __repr__ = brief
 
     @property
     def registered(self) -> tuple[Registered, ...]:

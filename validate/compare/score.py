@@ -1,13 +1,18 @@
 """Scores: a residual's statistics, each with unit, count and definition; never averaged RMSEs."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.compare.residual import Residual
-from validate.solve.types import Run
+
+if TYPE_CHECKING:
+    from validate.compare.residual import Residual
+    from validate.solve.types import Run
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,7 @@ def run_scores(run: Run) -> tuple[Score, ...]:
     rows: list[tuple[str, float, str, int, str]] = [
         ("setup", run.setup_s, "s", 1, "mesh, assembly, factorisation and response columns"),
     ]
-    if run.step_s is not None:
+    if run.step_s is not None and len(run.t):  # a refusal has no rate
         n = run.step_s.n
         rows += [
             ("step.p50", run.step_s.p50, "s", n, "median time of one step"),

@@ -34,9 +34,9 @@ from numpy.polynomial.hermite_e import hermegauss
 from scipy.special import chdtri, chndtr, chndtrinc, ndtr
 
 from validate.arrays import Floats, rms
+from validate.compare.bias import Size, kind_of, size_of
 from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
-from validate.compare.sizes import Size, kind_of, size_of
 from validate.errors import ComparisonError
 
 NO_EVIDENCE = ("fitted", "same model")

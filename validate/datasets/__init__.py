@@ -5,7 +5,7 @@ from validate.exports import lazily, names
 _HOMES = {
     "registry": ("DataFile", "DataSet", "data_sets", "named"),
     "bring": ("bring",),
-    "home": ("cache_folder", "found", "searched", "sought"),
+    "home": ("cache_folder", "data_path", "searched", "sought"),
 }
 
 __all__ = names(_HOMES)

@@ -11,7 +11,7 @@ from validate.places import cache
 SHARED = "VALIDATE_SHARED_DATA"
 
 
-def found(
+def data_path(
     folder: str, name: str | None, beside: Path, own: str | None = None, by: str = ""
 ) -> Path:
     """A file of a data set, or its folder where `name` is None.
@@ -31,7 +31,7 @@ def found(
 
 
 def sought(folder: str, name: str | None, beside: Path) -> Path | None:
-    """As `found`, of what an experiment can do without: None where it is not here.
+    """As `data_path`, of what an experiment can do without: None where it is not here.
 
     The places are looked through in order; what lies in the cache counts where its hash is the
     registered one.

@@ -6,8 +6,8 @@ _HOMES = {
     "filters": ("FILTERS", "Filter"),
     "measurements": ("Measurements", "measurements"),
     "consistency": ("Consistency", "nees_consistency", "nis_consistency"),
-    "kf_fem": ("KfFem",),
-    "filterpy_guest": ("FilterpyGuest",),
+    "kalman.kf_fem": ("KfFem",),
+    "filterpy.filters": ("FilterpyGuest",),
 }
 
 __all__ = names(_HOMES)

@@ -28,8 +28,8 @@ from scipy.linalg import cho_solve, cholesky
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
 from validate.estimate.consistency import chi_square_quantile
-from validate.estimate.covariance import Claim, Recursion, noise
-from validate.estimate.kalman import (
+from validate.estimate.kalman.covariance import Claim, Recursion, noise
+from validate.estimate.kalman.formulas import (
     Gain,
     Gated,
     Gaussian,
@@ -41,6 +41,21 @@ from validate.estimate.kalman import (
 )
 from validate.estimate.measurements import Measurements
 from validate.parameters import quantity
+
+# --- Which settings of a filter say how noisy its model and its measurements are.
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """Names of a filter's settings: of the `process`, of a `measurement` and at the `start`; ""
+    where it has none."""
+
+    process: str = ""
+    measurement: str = "R"
+    start: str = ""
+
+
+# -------------------------------------------------------------------------------------------------
 
 
 def gate_setting() -> Any:

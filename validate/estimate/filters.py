@@ -1,22 +1,26 @@
-"""Every filter there is. A new one is one file beside this and its name here."""
+"""Every filter: the package's own, those of plug-ins and those that a script adds.
+
+A new one of the package is one file beside this and its name here.
+"""
 
 from typing import ClassVar, Protocol
 
 from validate.arrays import Floats
-from validate.estimate.batch import Batch
-from validate.estimate.ensemble_kf import EnsembleKf
-from validate.estimate.filterpy_guest import FilterpyGuest
-from validate.estimate.kf_fem import KfFem
-from validate.estimate.load_scale import LoadScale
+from validate.estimate.care import NoiseSettings
+from validate.estimate.ensemble.ensemble_kf import EnsembleKf
+from validate.estimate.ensemble.roukf import Roukf
+from validate.estimate.extended.node_ekf import NodeEKF
+from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.kalman.batch import Batch
+from validate.estimate.kalman.kf_fem import KfFem
+from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import Measurements
-from validate.estimate.modal_kf import ModalKf
-from validate.estimate.node_ekf import NodeEKF
-from validate.estimate.noise_settings import NoiseSettings
-from validate.estimate.reduced_ekf import ReducedEKF
-from validate.estimate.reduced_kf import ReducedKf
-from validate.estimate.roukf import Roukf
+from validate.estimate.reduced.load_scale import LoadScale
+from validate.estimate.reduced.reduced_ekf import ReducedEKF
+from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.fem.system import System
-from validate.solve.handles import Handles
+from validate.plugins import Registry, settings_faults
+from validate.solve.handles import Handles, handles_faults
 from validate.solve.types import Stepper
 
 
@@ -43,7 +47,7 @@ class Filter(Protocol):
     def prepare(self, system: System, measurements: Measurements) -> FilterStepper: ...
 
 
-FILTERS: tuple[type[Filter], ...] = (
+_OWN: tuple[type[Filter], ...] = (
     KfFem,
     ModalKf,
     ReducedKf,
@@ -54,5 +58,9 @@ FILTERS: tuple[type[Filter], ...] = (
     Roukf,
     EnsembleKf,
 )
-LINEAR_FILTERS = tuple(f for f in FILTERS if "linear" in f.handles.law)
-EXPLICIT_FILTERS = tuple(f for f in FILTERS if set(f.handles.law) != {"linear"})
+FILTERS: Registry[type[Filter]] = Registry(
+    "filters",
+    _OWN,
+    lambda filter_: filter_.__name__,
+    lambda part: settings_faults(part, "noise_settings", "prepare") or handles_faults(part),
+)

@@ -9,9 +9,9 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
-from validate.register.clock import interpolated
-from validate.register.markers import MarkerObservation
-from validate.register.outlines import OutlineObservation
+from validate.register.clocks import interpolated
+from validate.register.markers.markers import MarkerObservation
+from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registered import Registered
 from validate.scene.mesh import Mesh
 

@@ -23,7 +23,7 @@ from scipy.linalg import cho_solve, solve_triangular
 
 from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.estimate.kalman import Gain, Innovation
+from validate.estimate.kalman.formulas import Gain, Innovation
 from validate.parameters import quantity
 
 _WIDE = 48  # columns of W from which fewer are looked for

@@ -4,11 +4,11 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "system": ("Responses", "System", "build", "responses"),
-    "assemble": ("mass", "stiffness"),
-    "laws": ("Law", "law_of"),
+    "assembly.assemble": ("mass", "stiffness"),
+    "laws.law": ("Law", "law_of"),
     "critical": ("CriticalStep", "critical_step"),
     "modes": ("Modes", "modes_of"),
-    "locate": ("Rows",),
+    "assembly.locate": ("Rows",),
 }
 
 __all__ = names(_HOMES)

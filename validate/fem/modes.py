@@ -9,8 +9,7 @@ from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.once import once
-from validate.fem.system import System
+from validate.fem.system import System, once
 
 _CLUSTER = 1e-3  # relative distance of frequencies that are taken as one cluster
 _COUPLED = 1e-8  # of the damping: rounding leaves 1e-12, other materials' damping far more

@@ -5,8 +5,8 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import Mesh
+from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
-from validate.scene.select import nodes_of
 
 _FREE = 1e-14  # square of the rows, of the largest, under a motion that nothing holds
 _SHOWN = 0.3  # share of a motion's largest component from which it is named

@@ -5,8 +5,10 @@ A linear scene with drives and cavity pressures is the sum of fixed fields: u = 
 condensed inverse of paper 000, eqs 18-20, for just the inputs that the scene has).
 """
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +17,16 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assemble import lumped, mass, stiffness, stiffness_damping
+from validate.fem.assembly.assemble import lumped, mass, stiffness, stiffness_damping
+from validate.fem.assembly.assemble import mass as mass_matrix
+from validate.fem.assembly.loads import hung_masses, load_columns
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
-from validate.fem.factor import Factor, factorise
-from validate.fem.fill import require_assembly
-from validate.fem.frontal import Fronts
-from validate.fem.loads import hung_masses, load_columns
+from validate.fem.linear_solvers.factor import Factor, factorise, require_assembly
+from validate.fem.linear_solvers.frontal import Fronts
 from validate.fem.rigid import require_held
 from validate.scene.mesh import Mesh
+from validate.scene.places import Place, nodes_of
 from validate.scene.scene import Drive, Load, Scene
-from validate.scene.select import Place, nodes_of
 
 
 @dataclass(frozen=True)
@@ -250,3 +252,45 @@ def _unknowns(scene: Scene, facets: Place, components: tuple[int, ...]) -> Ints:
     nodes = nodes_of(scene.mesh, facets)
     unknowns: Ints = (nodes[:, None] * scene.mesh.dimension + np.array(components)).ravel()
     return unknowns
+
+
+# --- What is made once from a system and asked for again: kept with it, like its cached
+# properties.
+
+V = TypeVar("V")
+
+
+def once(system: System, key: Hashable, make: Callable[[], V]) -> V:
+    """`make()` at the first call with this key, the same object afterwards; a copied or changed
+    system starts anew. `key` names all that `make` depends on besides the system."""
+    kept: dict[Hashable, V] = system.__dict__.setdefault("_once", {})
+    if key not in kept:
+        kept[key] = make()
+    return kept[key]
+
+
+# --- Masses and dampings of a system as a scheme takes them: two switches, each with its own
+# price.
+
+MassName = Literal["consistent", "lumped"]
+DampingTerms = Literal["full", "mass"]
+
+
+def mass_of(system: System, mass: MassName) -> sparse.csr_array:
+    """M (N, N) kg as the setting names it."""
+    if mass == "consistent":
+        return system.M
+    return sparse.csr_array(sparse.diags_array(system.masses))
+
+
+def damping_of(system: System, mass: MassName, terms: DampingTerms) -> sparse.csr_array:
+    """C (N, N) N s/m: alpha M of the mass in use, with `terms` "full" plus beta K.
+
+    Without beta K lumped masses leave C diagonal: paper 002's price of explicit steps.
+    """
+    if (mass, terms) == ("consistent", "full"):
+        return system.C
+    C = mass_matrix(system.scene, damping=True)
+    if mass == "lumped":
+        C = sparse.csr_array(sparse.diags_array(lumped(system.scene, C)))
+    return C if terms == "mass" else sparse.csr_array(C + stiffness_damping(system.scene))

@@ -3,17 +3,47 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "identification": ("Identification", "InTurn", "Profiled", "identify"),
-    "least_squares": ("Fit", "fit"),
-    "profile": ("Side", "side"),
-    "space": ("Range", "Space"),
+    "identification": (
+        "Identification",
+        "InTurn",
+        "Profiled",
+        "identify",
+    ),
+    "least_squares": (
+        "Fit",
+        "fit",
+    ),
+    "profile": (
+        "Side",
+        "side",
+        "Interval",
+        "mesh_share",
+        "profile_interval",
+    ),
+    "space": (
+        "Range",
+        "Space",
+    ),
     "whiten": ("whitened",),
-    "interval": ("Interval", "mesh_share", "profile_interval"),
-    "law": ("LawFit", "fit_scale"),
+    "law": (
+        "LawFit",
+        "fit_scale",
+    ),
     "budget": ("IdentifiedValue",),
-    "scaled_curve": ("ScaledFit", "UnitCurve", "fit_scaled"),
-    "residual_pattern": ("Pattern", "pattern"),
-    "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),
+    "scaled_curve": (
+        "ScaledFit",
+        "UnitCurve",
+        "fit_scaled",
+    ),
+    "residual_pattern": (
+        "Pattern",
+        "pattern",
+    ),
+    "modulus": (
+        "ModulusFit",
+        "gent_correction",
+        "identify_modulus",
+    ),
 }
 
 __all__ = names(_HOMES)

@@ -13,13 +13,13 @@ from itertools import product
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.closed_form import linear_fit, linear_side
 from validate.identify.least_squares import Fit, Residual, fit
 from validate.identify.profile import RISE, Side, side
+from validate.identify.scaled_curve import linear_fit, linear_side
 from validate.identify.space import Space
 
 FACTOR = 2.0  # between the ends of an interval: wider is not identified
@@ -207,7 +207,7 @@ def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1
 
 def misfit(best: Fit) -> float:
     """Chi-square per degree of freedom where that is hardly chance; else 1."""
-    if best.freedom < 1 or best.chi_square <= float(chi2.ppf(_FITS, best.freedom)):
+    if best.freedom < 1 or best.chi_square <= float(chdtri(best.freedom, 1 - _FITS)):
         return 1.0
     return best.chi_square / best.freedom
 

@@ -22,7 +22,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
 from validate.recording.types import Recording, Signal
-from validate.register.clock import SAME, interpolated
+from validate.register.clocks import SAME, interpolated
 
 TestKind = Literal["compression", "tension"]
 WINDOW = (0.005, 0.05)

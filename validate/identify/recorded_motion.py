@@ -17,7 +17,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.ringing import Ringing, ringing, spectrum
 from validate.recording.types import Contours, Markers, Recording, Signal
-from validate.register.outline_geometry import EVERY_TEN, along_normals, outline_places
+from validate.register.outlines.distances import EVERY_TEN, along_normals, outline_places
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics

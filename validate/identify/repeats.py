@@ -13,10 +13,10 @@ import numpy as np
 
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RecordingError, UsageError
+from validate.identify.budget import Votes, by_specimen
 from validate.identify.modulus import MIN_SAMPLES, Log, TestKind, load_noise, loading, zero_of
-from validate.identify.votes import Votes, by_specimen
-from validate.recording.clocks import clock_of
-from validate.recording.formats.text_rows import ASSUMED
+from validate.recording.clocks.clock_check import clock_of
+from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.scatter import REPEATS, SHARE
 from validate.recording.types import Record, Recording, Signal, Source
 

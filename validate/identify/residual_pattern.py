@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from validate.arrays import Floats, rms
 from validate.identify.budget import dependence
@@ -69,7 +69,7 @@ def pattern(
     noise = max(sqrt(float(rough @ rough) / freedom), sd)
     least = 1e-9 * float(np.abs(residual).max(initial=0.0)) or 1e-300
     ratio = float(amounts @ amounts) / len(amounts) / (times * max(noise, least) ** 2)
-    chance = float(fisher.sf(ratio, len(amounts), max(freedom / times, 1.0)))
+    chance = float(fdtrc(len(amounts), max(freedom / times, 1.0), ratio))
     return Pattern(smooth, chance, bool(_bend(x, smooth) > 0))
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from validate.arrays import Floats
 from validate.errors import UsageError
@@ -70,5 +69,15 @@ class Space:
                 f"--seeds {count}: expected at least one start; ten or more for a reliable result"
             )
         p = len(self.ranges)
-        drawn = qmc.LatinHypercube(p, rng=seed).random(count - 1) if count > 1 else np.empty((0, p))
-        return np.vstack([np.full((1, p), 0.5), drawn])
+        return np.vstack([np.full((1, p), 0.5), _latin_hypercube(count - 1, p, seed)])
+
+
+def _latin_hypercube(n: int, p: int, seed: int) -> Floats:
+    """Points (n, p), one in each n-th of every axis; those of `scipy.stats.qmc`, whose import costs
+    more than most fits."""
+    draw = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    within = draw.uniform(size=(n, p))
+    parts = np.tile(np.arange(1, n + 1), (p, 1))
+    for row in parts:
+        draw.shuffle(row)
+    return np.asarray((parts.T - within) / max(n, 1))

@@ -11,8 +11,8 @@ _HOMES = {
     "readers": ("READERS", "read_recording"),
     "mcap.write": ("write_recording",),
     "preflight": ("Inspection", "inspect_recording"),
-    "alignment": ("Offset", "offset_by_correlation", "shift"),
-    "events": ("offset_by_event",),
+    "clocks.alignment": ("Offset", "offset_by_correlation", "shift"),
+    "clocks.events": ("offset_by_event",),
 }
 
 __all__ = names(_HOMES)

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
-from validate.recording.formats.poses import ROTATION, TRANSLATION
+from validate.recording.motion_capture.poses import ROTATION, TRANSLATION
 from validate.recording.types import Recording
 
 _PROPER = 1e-3  # off an orthogonal matrix

@@ -1,11 +1,21 @@
-"""Streams of several recordings in one."""
+"""Files of one test with clocks of their own become one recording on the clock of the first.
+
+The streams of a further file share one clock, so one offset moves all of them. Whether that clock
+also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1),
+over the distance of the halves' middles.
+"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.alignment import moved
-from validate.recording.types import Record, Recording, Source, by_kind
+from validate.recording.clocks.alignment import Offset, moved, offset_near, shift
+from validate.recording.types import Record, Recording, Signal, Source, by_kind
+
+# --- Streams of several recordings in one.
 
 PROVENANCE = "provenance"
 
@@ -56,3 +66,116 @@ def _origins(recordings: Sequence[Recording]) -> Mapping[str, str]:
         f"{i + 1}": f"{r.name}: {', '.join(r.streams)}; {r.source.path} sha256 {r.source.sha256}"
         for i, r in enumerate(recordings)
     }
+
+
+# -------------------------------------------------------------------------------------------------
+
+_TURNS = 12
+_SETTLED = 0.05  # standard deviations of the drift
+DOUBTFUL = 3.0  # standard deviations beyond which a drift is taken for one
+
+
+@dataclass(frozen=True)
+class ClockDrift:
+    """By how much the second clock must be stretched: `rate` and `sd` in s/s, about `middle` s of
+    its own; `span` s is how long it ran."""
+
+    rate: float
+    sd: float
+    middle: float
+    span: float
+
+    @property
+    def seen(self) -> bool:
+        return abs(self.rate) > DOUBTFUL * self.sd
+
+    @property
+    def apart(self) -> float:
+        """Seconds by which the clocks run apart over the recording."""
+        return abs(self.rate) * self.span
+
+
+def drift_of(reference: Signal, stream: Signal, offset: Offset) -> ClockDrift:
+    """Turned to and fro until a stretched stream has none left, as a half's offset counts most
+    where its signal is steep. Raises `RecordingError` where a half does not follow the reference
+    alone, and where the turns do not settle."""
+    middle, span = float(stream.t[0] + stream.t[-1]) / 2, float(np.ptp(stream.t))
+    found = ClockDrift(0.0, 0.0, middle, span)
+    for _ in range(_TURNS):
+        more, sd = _left(reference, stretched_signal(stream, found), offset.seconds, middle)
+        found = ClockDrift(found.rate + more, sd, middle, span)
+        if abs(more) < _SETTLED * sd:
+            return found
+    raise RecordingError(f"the drift does not converge within {_TURNS} iterations")
+
+
+def _left(reference: Signal, stream: Signal, start: float, middle: float) -> tuple[float, float]:
+    """Rate and sd (s/s) by which the halves' offsets still run apart."""
+    halves = [stream.t < middle, stream.t >= middle]
+    parts = [replace(stream, t=stream.t[half], y=stream.y[half]) for half in halves]
+    found = [offset_near(reference, part, start) for part in parts]
+    between = float(parts[1].t.mean() - parts[0].t.mean())
+    return (found[1][0] - found[0][0]) / between, float(
+        np.hypot(found[0][1], found[1][1])
+    ) / between
+
+
+def with_drift(offset: Offset, drift: ClockDrift | None) -> Offset:
+    """The offset with what an uncorrected drift makes of it: a ramp of that height, root 12."""
+    if drift is None or not drift.seen:
+        return offset
+    return replace(offset, sd=float(np.hypot(offset.sd, drift.apart / np.sqrt(12))))
+
+
+def stretched_signal(signal: Signal, drift: ClockDrift) -> Signal:
+    return replace(signal, t=signal.t + drift.rate * (signal.t - drift.middle))
+
+
+def stretched(recording: Recording, drift: ClockDrift) -> Recording:
+    """The recording with its times t + rate (t - middle)."""
+    streams = {
+        topic: replace(s, t=s.t + drift.rate * (s.t - drift.middle))
+        for topic, s in recording.streams.items()
+    }
+    return replace(recording, **by_kind(streams))
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A further recording: its offset from the first, both counted from their own zeros, and the
+    drift of its clock that is taken out, None for none."""
+
+    recording: Recording
+    offset: Offset
+    drift: ClockDrift | None
+
+
+def together(reference: Recording, others: Sequence[Moved], name: str) -> Recording:
+    """One recording; every stream of the others keeps its offset as a record.
+
+    Raises `RecordingError` for topics that two of them have, and for a stream moved before.
+    """
+    straight = [m.recording if m.drift is None else stretched(m.recording, m.drift) for m in others]
+    found = merge([reference, *(replace(r, t0_ns=reference.t0_ns) for r in straight)], name)
+    for one in others:
+        for topic in one.recording.streams:
+            found = shift(found, topic, one.offset)
+    return replace(found, metadata={**found.metadata, **_drift_records(others)})
+
+
+def _drift_records(others: Sequence[Moved]) -> dict[str, dict[str, str]]:
+    found = {f"clock_drift/{one.recording.name}": one.drift for one in others if one.drift}
+    return {
+        name: {"rate": repr(drift.rate), "sd": repr(drift.sd), "about_s": repr(drift.middle)}
+        for name, drift in found.items()
+    }
+
+
+def require_other_topics(recordings: Sequence[Recording]) -> None:
+    """Raises `RecordingError` for topics that two of the recordings have."""
+    counts = Counter(topic for r in recordings for topic in r.streams)
+    both = sorted(topic for topic, n in counts.items() if n > 1)
+    if both:
+        raise RecordingError(
+            f"more than one file has {both}: import one of them again under another topic (--topic)"
+        )

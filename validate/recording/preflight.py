@@ -16,11 +16,9 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.chain import chain_faults
-from validate.recording.clocks import GAP_FACTOR, clock_of
-from validate.recording.formats.poses import ROTATION
-from validate.recording.formats.text_rows import ASSUMED, cut_lines
+from validate.recording.clocks.alignment import RECORD as CLOCK_OFFSET
+from validate.recording.clocks.clock_check import GAP_FACTOR, clock_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP, read_recording
@@ -37,6 +35,8 @@ from validate.recording.mcap.schemas import (
 from validate.recording.mcap.seen import AllSeen, ChannelSeen
 from validate.recording.mcap.streams import our_channels
 from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.motion_capture.poses import ROTATION
+from validate.recording.motion_capture.text_rows import ASSUMED, cut_lines
 from validate.recording.reader import Options, Reader, require_known, source_of
 from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
@@ -159,13 +159,14 @@ def _unread_topic(name: str, why: str) -> Topic:
     return Topic(name, f"not read: {why}", "", "", "", 0, None, None, "", "", None)
 
 
-def inspect_recording(path: Path) -> Inspection:
+def inspect_recording(path: Path | str) -> Inspection:
     """Inspect any MCAP file; raises `RecordingError` for one that is damaged or no MCAP.
 
     A file that stops short is inspected as far as it is whole.
 
     The error counts the chunks and messages that can be read before the damage.
     """
+    path = Path(path)
     seen = AllSeen()
     with opened(path) as stream:
         verified = _verified(stream, path, seen)

@@ -1,10 +1,11 @@
 """What a reader of one format is, and what all of them need.
 
-A new format is one file with its `Reader`, and a line in `readers.READERS`.
+A new format of the package is one file with its `Reader`, and a line in `readers`.
 """
 
 import difflib
 import hashlib
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
@@ -19,8 +20,29 @@ Options = Mapping[str, str]  # what a file does not say itself: `--map KEY=VALUE
 
 
 @dataclass(frozen=True)
+class MapOption:
+    """One key of `--map KEY=VALUE`: what the user says that a file may not contain.
+
+    Capitals in a name stand for any text (`axes.STREAM`). `unit` is that of the value ("" for
+    text), `default` says what holds where the key is not given ("" where nothing does).
+    """
+
+    name: str
+    doc: str
+    unit: str = ""
+    default: str = ""
+
+    def accepts(self, key: str) -> bool:
+        return re.fullmatch(re.sub("[A-Z]+", ".+", re.escape(self.name)), key) is not None
+
+
+@dataclass(frozen=True)
 class Reader:
     """One format; `name` is the KIND of `validate import --as KIND`, `sign` what it is known by.
+
+    Its specification (name, `extensions`, sign, `options`) is what `--help`, error messages and the
+    documentation say of it. `general`: any file of its kind may be one, so that it is asked after
+    all readers that know their own.
 
     `recognises` looks at a path and its first bytes and raises nothing. `read` gives a `Recording`
     or raises one `ValidateError` of one line: for a path that cannot be read, a file that is empty,
@@ -29,7 +51,8 @@ class Reader:
     `holds` lists the contents of a file of which the user must say more before it can be read.
 
     Both are guarded here, for all formats alike: only files of at most `largest` bytes and folders
-    are opened (a pipe would wait for ever), and what is wrong in a file names the file.
+    are opened (a pipe would wait for ever), only `options` are passed on, and what is wrong in a
+    file names the file.
     """
 
     name: str
@@ -39,17 +62,21 @@ class Reader:
     sign: str
     largest: int = LARGEST
     holds: Callable[[Path], Mapping[str, str]] | None = None
+    options: tuple[MapOption, ...] = ()
+    extensions: tuple[str, ...] = ()
+    general: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "read", _guarded(self.read, self.largest))
+        object.__setattr__(self, "read", _guarded(self.read, self.largest, self.options))
 
 
 def _guarded(
-    read: Callable[[Path, Options], Recording], largest: int
+    read: Callable[[Path, Options], Recording], largest: int, known: tuple[MapOption, ...]
 ) -> Callable[[Path, Options], Recording]:
     @wraps(read)
     def guarded(path: Path, options: Options) -> Recording:
         require_readable(path, largest)
+        require_known(options, known)
         try:
             return read(path, options)
         except RecordingError as error:
@@ -87,11 +114,12 @@ def source_of(path: Path, integrity: str) -> Source:
     return Source(path.name, digest, size, integrity)
 
 
-def require_known(options: Iterable[str], known: Collection[str]) -> None:
+def require_known(options: Iterable[str], known: Collection[MapOption]) -> None:
     """Raises `UsageError` naming the nearest known key for an option that is not `known`."""
+    names = [option.name for option in known]
     for key in options:
-        if key not in known:
-            listed = f"{did_you_mean(key, known)}known: {', '.join(known) or 'none'}"
+        if not any(option.accepts(key) for option in known):
+            listed = f"{did_you_mean(key, names)}known: {', '.join(names) or 'none'}"
             raise UsageError(f"--map {key}=...: no such key; {listed}")
 
 

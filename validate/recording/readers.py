@@ -1,59 +1,78 @@
-"""Every format that becomes a recording."""
+"""Readers of recordings: the package's own, those of plug-ins and those that a script adds."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from validate.errors import RecordingError, UsageError
+from validate.errors import RecordingError, UsageError, ValidateError
 from validate.parameters import nearest_names
+from validate.plugins import Registry
 from validate.recording.chain import require_chain
-from validate.recording.exports.instron import INSTRON
-from validate.recording.exports.xlsx import SHEETS, XLSX
-from validate.recording.formats.c3d import C3D
-from validate.recording.formats.dicom import DICOM
 from validate.recording.formats.matlab import MATLAB
-from validate.recording.formats.metaimage import METAIMAGE
-from validate.recording.formats.ndi import NDI
-from validate.recording.formats.nrrd import NRRD
-from validate.recording.formats.optitrack import OPTITRACK
-from validate.recording.formats.point_table import POINTS
-from validate.recording.formats.qualisys import QUALISYS
-from validate.recording.formats.qualisys_analog import QUALISYS_ANALOG
 from validate.recording.formats.rosbag import ROSBAG
 from validate.recording.formats.slicer import FCSV, MARKUPS
-from validate.recording.formats.trc import TRC
 from validate.recording.formats.unread import known_unread
-from validate.recording.formats.vicon import VICON
-from validate.recording.formats.video import VIDEO
+from validate.recording.images.dicom import DICOM
 from validate.recording.images.image_stack import IMAGE_STACK
+from validate.recording.images.metaimage import METAIMAGE
+from validate.recording.images.nrrd import NRRD
 from validate.recording.images.png_stack import PNG_STACK
+from validate.recording.images.video import VIDEO
 from validate.recording.mcap import read as mcap
 from validate.recording.mcap.read import MCAP
-from validate.recording.reader import Reader, head
+from validate.recording.motion_capture.c3d import C3D
+from validate.recording.motion_capture.ndi import NDI
+from validate.recording.motion_capture.optitrack import OPTITRACK
+from validate.recording.motion_capture.qualisys import QUALISYS, QUALISYS_ANALOG
+from validate.recording.motion_capture.trc import TRC
+from validate.recording.motion_capture.vicon import VICON
+from validate.recording.reader import Options, Reader, head
+from validate.recording.tables.point_table import POINTS
+from validate.recording.tables.testing_machine import INSTRON
+from validate.recording.tables.workbook import SHEETS, XLSX
 from validate.recording.types import Recording
 
-# Any text may be a testing machine's: its reader is asked after all that know their own.
-READERS: tuple[Reader, ...] = (
+_OWN: tuple[Reader, ...] = (
     MCAP, ROSBAG, C3D, TRC, VICON, QUALISYS, QUALISYS_ANALOG, OPTITRACK, NDI, DICOM, METAIMAGE,
     NRRD, FCSV, MARKUPS, MATLAB, XLSX, SHEETS, VIDEO, PNG_STACK, IMAGE_STACK, POINTS, INSTRON,
 )  # fmt: skip
 
 
+def _faults(part: object) -> str:
+    return "" if isinstance(part, Reader) else f"{part!r}: expected a Reader"
+
+
+READERS: Registry[Reader] = Registry("readers", _OWN, lambda reader: reader.name, _faults)
+
+
+def in_order() -> tuple[Reader, ...]:
+    """All readers in the order in which they are asked: first those that know their own files, the
+    package's before those of plug-ins."""
+    return tuple(sorted(READERS, key=lambda reader: reader.general))
+
+
+def recognises(reader: Reader, path: Path) -> bool:
+    """Whether a reader recognises a file; a plug-in that fails there does not, with a warning."""
+    return READERS.answer(reader, lambda r: bool(r.recognises(path)), False)
+
+
 def told_apart(path: Path) -> str:
     """What a file is whose format shows, and the command that takes it; empty where none shows (any
     text may be a testing machine's)."""
-    reader = next((r for r in READERS if r is not INSTRON and r.recognises(path)), None)
+    reader = next((r for r in in_order() if r is not INSTRON and recognises(r, path)), None)
     if reader is None:
         return ""
     takes = "new NAME --from {}" if reader is MCAP else "import {} -o " + f"{path.stem}.mcap"
     return f"{path.name} is {reader.doc}: validate {takes.format(path.name)}"
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path | str) -> Recording:
     """The recording in an MCAP file (`mcap.read.read_recording`), its frames without contradiction;
     a file of another format is called by its name in the error, with the command that takes it."""
+    file = Path(path)
     try:
-        recording = mcap.read_recording(path)
+        recording = mcap.read_recording(file)
     except RecordingError as error:
-        raise no_mcap(path, error) from None
+        raise no_mcap(file, error) from None
     require_chain(recording)
     return recording
 
@@ -75,7 +94,32 @@ def named(kind: str) -> Reader:
     found = {r.name: r for r in READERS}
     if kind not in found:
         raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, set(found))}")
-    return found[kind]
+    return _shielded(found[kind])
+
+
+def _shielded(reader: Reader) -> Reader:
+    """The reader. Recordings by a plug-in name it in their provenance, and what it raises against
+    its contract is one error that names it."""
+    if reader in READERS.own:
+        return reader
+
+    def read(path: Path, options: Options) -> Recording:
+        try:
+            return _stamped(reader.read(path, options), reader)
+        except ValidateError:
+            raise
+        except Exception as error:  # code of others: whatever it does
+            raise RecordingError(
+                f"{path.name}: {READERS.whose(reader)} failed ({type(error).__name__}: {error}); "
+                "ask its authors, or name another format with --as"
+            ) from error
+
+    return replace(reader, read=read)
+
+
+def _stamped(recording: Recording, reader: Reader) -> Recording:
+    record = {**recording.metadata.get("provenance", {}), "read by": READERS.whose(reader)}
+    return replace(recording, metadata={**recording.metadata, "provenance": record})
 
 
 def recognised(path: Path) -> Reader:
@@ -83,11 +127,11 @@ def recognised(path: Path) -> Reader:
     do where it is of a kind that is known but not read, and where there is no such file."""
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
-    for reader in READERS:
-        if reader in (POINTS, INSTRON) and (said := known_unread(path)):
+    for reader in in_order():
+        if reader.general and (said := known_unread(path)):
             raise UsageError(said)
-        if reader.recognises(path):
-            return reader
+        if recognises(reader, path):
+            return _shielded(reader)
     raise UsageError(f"{path}: {_unknown(path)}")
 
 

@@ -8,13 +8,56 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats, checked
-from validate.errors import RecordingError
+from validate.arrays import Floats, checked, rebuilt
+from validate.display import Screen, brief
+from validate.errors import RecordingError, UsageError
+from validate.installation import install_command
+
+if TYPE_CHECKING:
+    from xarray import DataArray, DataTree
+
+
+# --- Streams of a recording as labelled arrays of xarray.
+
+
+def labelled(
+    name: str,
+    values: NDArray[Any],
+    dimensions: tuple[str, ...],
+    t: NDArray[Any],
+    attributes: Mapping[str, Any],
+    **labels: tuple[str, ...],
+) -> "DataArray":
+    """Return values with named dimensions, times t (s) along the first one, labels along others.
+
+    Raises `UsageError` where xarray is not installed.
+    """
+    try:
+        from xarray import DataArray
+    except ImportError:
+        raise UsageError(
+            f"labelled arrays need xarray, which is not installed: {install_command('tables')}"
+        ) from None
+    coordinates: dict[str, Any] = {name: list(label) for name, label in labels.items()}
+    coordinates["time"] = ((dimensions[0],), t, {"units": "s"})
+    return DataArray(values, coordinates, dimensions, name, dict(attributes))
+
+
+def tree_of(streams: Mapping[str, "DataArray"], name: str, facts: Mapping[str, Any]) -> "DataTree":
+    """Return the arrays of `labelled` as a tree, each in a node of its topic."""
+    from xarray import DataTree
+
+    tree = DataTree.from_dict({topic: array.to_dataset() for topic, array in streams.items()})
+    tree.name, tree.attrs = name, dict(facts)
+    return tree
+
+
+# -------------------------------------------------------------------------------------------------
 
 Record = Mapping[str, str]
 T = TypeVar("T")
@@ -64,6 +107,18 @@ class Markers:
         _set(self, "x", x)
         _set(self, "sd", _spread(self.sd, "markers"))
 
+    __repr__, __reduce__ = brief, rebuilt
+
+    def to_xarray(self) -> "DataArray":
+        """Return the positions (time, marker, axis) in m, NaN where not seen.
+
+        Attributes: `units`, `frame`, `sd`. Raises `UsageError` where xarray is not installed.
+        """
+        axes = ("x", "y", "z")[: self.x.shape[2]]
+        attributes = {"units": "m", "frame": self.frame, "sd": self.sd}
+        dimensions = ("time", "marker", "axis")
+        return labelled("x", self.x, dimensions, self.t, attributes, marker=self.names, axis=axes)
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -81,6 +136,16 @@ class Signal:
         if not self.unit:
             raise RecordingError("signal: no unit declared")
         _set(self, "sd", _spread(self.sd, "signal"))
+
+    __repr__, __reduce__ = brief, rebuilt
+
+    def to_xarray(self) -> "DataArray":
+        """Return the numbers (time, column) in their unit.
+
+        Attributes: `units`, `frame`, `sd`. Raises `UsageError` where xarray is not installed.
+        """
+        attributes = {"units": self.unit, "frame": self.frame, "sd": self.sd}
+        return labelled("y", self.y, ("time", "column"), self.t, attributes)
 
 
 @dataclass(frozen=True)
@@ -118,6 +183,18 @@ class Contours:
         _set(self, "outlines", outlines)
         _set(self, "sd", _spread(self.sd, "contours"))
         _set(self, "pose", checked(self.pose, "contours pose", (4, 4), error=RecordingError))
+
+    __repr__, __reduce__ = brief, rebuilt
+
+    def to_xarray(self) -> "DataArray":
+        """Return the points of all outlines (point, axis) in image m, each with its `time`.
+
+        Attributes: `units`, `frame`, `sd`. Raises `UsageError` where xarray is not installed.
+        """
+        attributes = {"units": "m", "frame": self.frame, "sd": self.sd}
+        t = np.repeat(self.t, [len(outline) for outline in self.outlines])
+        points = np.concatenate(self.outlines)
+        return labelled("points", points, ("point", "axis"), t, attributes, axis=("x", "y"))
 
 
 def _told_apart(each: Floats, count: int) -> Floats:
@@ -166,6 +243,17 @@ class Frames:
             raise RecordingError(f"frames: {self.m_per_px} m per pixel, expected two numbers > 0")
         _set(self, "m_per_px", (float(scale[0]), float(scale[1])))
         _set(self, "pose", checked(self.pose, "frames pose", (4, 4), error=RecordingError))
+
+    __repr__, __reduce__ = brief, rebuilt
+
+    def to_xarray(self) -> "DataArray":
+        """Return the images (time, row, column), uint8.
+
+        Attributes: `units`, `frame`, `m_per_px`. Raises `UsageError` where xarray is not installed.
+        """
+        attributes = {"units": "1", "frame": self.frame, "m_per_px": self.m_per_px}
+        images = np.stack(self.images)
+        return labelled("images", images, ("time", "row", "column"), self.t, attributes)
 
 
 Stream = Markers | Signal | Contours | Frames
@@ -233,6 +321,34 @@ class Recording:
         if twice:
             raise RecordingError(f"{self.name}: topics used twice: {twice}; rename one")
 
+    __reduce__ = rebuilt
+
+    def __repr__(self) -> str:
+        return self._screen.text
+
+    def _repr_html_(self) -> str:
+        return self._screen.html
+
+    @property
+    def _screen(self) -> Screen:
+        source = self.source
+        title = f"{self.name}: {len(self.streams)} streams of {source.path}, {source.integrity}"
+        rows = tuple((topic, *_row(stream)) for topic, stream in self.streams.items())
+        head = ("stream", "content", "samples", "time / s", "unit", "frame")
+        records = (f"records: {', '.join(self.metadata)}",) if self.metadata else ()
+        return Screen(title, (), head, rows, records)
+
+    def to_xarray(self) -> "DataTree":
+        """Return a tree with each stream at its topic, since every stream has its own times.
+
+        `tree["markers/x"]` is (time, marker, axis) in m, `tree["force/y"]` (time, column) in the
+        unit of the signal; outlines are `points`, images `images`. Raises `UsageError` where
+        xarray is not installed.
+        """
+        source = self.source
+        facts = {"source": source.path, "sha256": source.sha256, "t0_ns": self.t0_ns}
+        return tree_of({t: s.to_xarray() for t, s in self.streams.items()}, self.name, facts)
+
     @property
     def streams(self) -> Mapping[str, Stream]:
         """The streams of all kinds by topic."""
@@ -260,6 +376,20 @@ class Recording:
     def record(self, name: str) -> Record:
         """The metadata record of that name; raises `RecordingError` when absent."""
         return _present(self.metadata, name, f"{self.name}: no record")
+
+
+def _row(stream: Stream) -> tuple[str, str, str, str, str]:
+    """Content, number of samples, times in s, unit and frame."""
+    what, unit = type(stream).__name__.lower(), "m"
+    if isinstance(stream, Markers):
+        what = f"{len(stream.names)} markers"
+    elif isinstance(stream, Signal):
+        what, unit = f"signal of {stream.y.shape[1]}", stream.unit
+    elif isinstance(stream, Frames):
+        height, width = stream.images[0].shape
+        what, unit = f"images of {width} x {height}", "1"
+    span = f"{stream.t[0]:.4g} to {stream.t[-1]:.4g}"
+    return what, str(len(stream.t)), span, unit, stream.frame
 
 
 def _present(streams: Mapping[str, T], topic: str, missing: str) -> T:

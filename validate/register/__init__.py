@@ -7,13 +7,13 @@ millimetres in messages. Fit on the rest state once, then freeze.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "quality": ("Registration", "register_points"),
-    "transform": ("Similarity", "fit_rigid", "fit_similarity"),
-    "two_step": ("fit_two_step",),
+    "markers.quality": ("Registration", "register_points"),
+    "markers.transform": ("Similarity", "fit_rigid", "fit_similarity"),
+    "markers.two_step": ("fit_two_step",),
     "registered": ("Registered",),
     "observation": ("Deviation", "Observation", "Selection"),
-    "markers": ("MarkerObservation", "observe_markers"),
-    "outlines": ("OutlineObservation", "observe_outlines"),
+    "markers.markers": ("MarkerObservation", "observe_markers"),
+    "outlines.outlines": ("OutlineObservation", "observe_outlines"),
     "sensing": ("ForceSensing", "LengthSensing", "PoseShift", "PressureSensing", "Sensing"),
     "signals": ("SignalObservation",),
 }

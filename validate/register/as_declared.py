@@ -13,13 +13,28 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.recording.types import Recording
-from validate.register.fitting import MarkerFit
-from validate.register.markers import placed_markers
+from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.markers import placed_markers
 from validate.register.observation import Observation
 from validate.register.registered import Registered
 from validate.register.signals import SignalObservation, driving, validating
 from validate.scene.contact import RigidContact
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Pressure, Scene, Weight
+
+# --- A recording that is followed over time: one driving signal, and its markers as recorded.
+
+
+def follow_signal(
+    recording: Recording, mesh: Mesh, signal: str, unit: str, how: MarkerFit = MarkerFit()
+) -> Registered:
+    """Steps through `signal` after t = 0, where everything is at rest, with the tracked markers
+    placed by the recording's own records."""
+    drive = driving(recording, signal, unit, after_rest=True)
+    return Registered((drive, placed_markers(recording, mesh, how=how)))
+
+
+# -------------------------------------------------------------------------------------------------
 
 _UNITS: Mapping[type, str] = {
     Drive: "m", Load: "N", Weight: "m/s^2", Pressure: "Pa", RigidContact: "m"

@@ -12,7 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
-from validate.fem.locate import Rows
+from validate.fem.assembly.locate import Rows
 from validate.register.draws import AnyDraw
 
 Role = Literal["drives", "calibrates", "validates"]

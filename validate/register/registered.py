@@ -8,7 +8,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.register.observation import EVERYTHING, Observation, Selection, nearest_sample
-from validate.register.outlines import OutlineObservation
+from validate.register.outlines.outlines import OutlineObservation
 from validate.register.signals import SignalObservation
 
 O = TypeVar("O")

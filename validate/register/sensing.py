@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.parameters import known, quantity
-from validate.register.markers import MarkerObservation
+from validate.plugins import Registry, settings_faults
+from validate.register.markers.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 
 _LEAST = 1e-6  # of a gain: below it a sensor reads nothing
@@ -50,6 +51,8 @@ class Sensing:
 
 @dataclass(frozen=True)
 class ForceSensing(Sensing):
+    """Gain, delay (s) and bias (N) of a load cell; raises as `Sensing`."""
+
     bias: float | None = quantity(0.0, "N", "reading at zero")
 
     @property
@@ -59,6 +62,8 @@ class ForceSensing(Sensing):
 
 @dataclass(frozen=True)
 class PressureSensing(Sensing):
+    """Gain, delay (s) and bias (Pa) of a pressure sensor; raises as `Sensing`."""
+
     bias: float | None = quantity(0.0, "Pa", "reading at zero")
 
     @property
@@ -68,6 +73,8 @@ class PressureSensing(Sensing):
 
 @dataclass(frozen=True)
 class LengthSensing(Sensing):
+    """Gain, delay (s) and bias (m) of a displacement sensor; raises as `Sensing`."""
+
     bias: float | None = quantity(0.0, "m", "reading at zero")
 
     @property
@@ -109,6 +116,14 @@ class PoseShift:
         late = np.stack([_late(seen.t, column, delay) for column in flat.T], axis=1)
         moved = (late.reshape(seen.x.shape) - centre) @ R.T + centre + by
         return replace(seen, x=moved)
+
+
+SENSORS: Registry[type[Sensing] | type[PoseShift]] = Registry(
+    "sensors",
+    (ForceSensing, PressureSensing, LengthSensing, PoseShift),
+    lambda sensing: sensing.__name__,
+    lambda part: settings_faults(part, "of"),
+)
 
 
 def _late(t: Floats, y: Floats, delay: float) -> Floats:

@@ -7,10 +7,10 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError, RegistrationError
-from validate.fem.locate import Rows
+from validate.fem.assembly.locate import Rows
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
-from validate.register.clock import clock_sd, slopes, with_clock
+from validate.register.clocks import clock_sd, slopes, with_clock
 from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.observation import (
     Deviation,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.fem.locate import Rows
+from validate.fem.assembly.locate import Rows
 from validate.register.draws import AnyDraw, from_rest
 from validate.register.observation import Deviation, Role, Selection, Simulated
 

@@ -2,7 +2,7 @@
 
 Arrays stay SI; `numbers` alone turns them into what people read (mm, N, Pa). Each section of the
 page is a function of the result that returns None where it does not apply. matplotlib draws in the
-files named after what they show, pyvista in `renders` and `render_maps` only, jinja2 fills the page
+files named after what they show, pyvista in `renders` only, jinja2 fills the page
 in `html` only.
 """
 
@@ -10,7 +10,11 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "write": ("write_report",),
-    "store": ("document", "schema"),
+    "stored.store": ("document", "schema"),
+    "stored.tables": ("open_store",),
+    "export.fields": ("open_fields",),
+    "views.standard": ("VIEWS", "View"),
+    "long_table": ("LongRow", "RowBlock"),
 }
 
 __all__ = names(_HOMES)

@@ -1,18 +1,43 @@
-"""An exhibit drawn: its charts, heats, regimes and maps as pictures; its files."""
+"""An exhibit drawn: its charts, heats, regimes and maps as pictures; its files.
+
+Every part of a report is drawn and encoded by itself, so that workers can draw parts side by side.
+"""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 from validate.compare.exhibit import Animation, Exhibit, NodeMap, Picture
-from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.file_names import safe_name
-from validate.report import charts, gl, heat, regime_map
-from validate.report.encode import gif, png
-from validate.report.maps import Range, drawn, legible, ranges
-from validate.report.tables import write_chart, write_table
+from validate.files import safe_name
+from validate.report.charts import chart as charts
+from validate.report.charts import heat, intervals, regime_map
+from validate.report.charts.encode import encoded
+from validate.report.charts.style import HasMethods
+from validate.report.export.tables import write_chart, write_table
+from validate.report.scenes import gl
+from validate.report.scenes.maps import Range, drawn, legible, ranges
+
+Part = Exhibit | Callable[[Any], Exhibit | None]  # a section makes its exhibit of the result
+S = TypeVar("S")
+I = TypeVar("I")
+T = TypeVar("T")
+
+
+class Beside(Protocol):
+    """Begins to apply a function of a module to what is `shared` and each item; what it returns
+    waits for the values, in the order of the items."""
+
+    def __call__(
+        self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
+    ) -> Callable[[], list[Any]]: ...
+
+
+def in_turn(function: Callable[[S, I], T], shared: S, items: Sequence[I]) -> Callable[[], list[T]]:
+    """As `Beside`, in this process once the values are asked for."""
+    return lambda: [function(shared, item) for item in items]
 
 
 @dataclass(frozen=True)
@@ -33,45 +58,71 @@ class DrawnExhibit:
         return bool(self.exhibit.words or self.exhibit.tables or self.pictures)
 
 
-def draw_all(result: Result, found: Iterable[Exhibit]) -> tuple[DrawnExhibit, ...]:
-    """The exhibits drawn, their maps in common colours.
+def draw_all(result: HasMethods, found: Iterable[Part]) -> tuple[DrawnExhibit, ...]:
+    """As `drawing`, in this process."""
+    return drawing(result, found)()
+
+
+def drawing(
+    result: HasMethods, parts: Iterable[Part], beside: Beside = in_turn
+) -> Callable[[], tuple[DrawnExhibit, ...]]:
+    """Begins to draw exhibits, or what sections make of the result; what it returns waits for
+    them. Maps of one scale have common colours.
 
     Raises `ComparisonError` naming what stands twice: names become files and anchors.
     """
-    exhibits = tuple(found)
-    _require_distinct(exhibits)
-    clear = iter(legible(m for e in exhibits for m in e.maps))
-    exhibits = tuple(replace(e, maps=tuple(next(clear) for _ in e.maps)) for e in exhibits)
-    scales = ranges(m for e in exhibits for m in e.maps)
-    return tuple(DrawnExhibit(e, _drawings(result, e, scales)) for e in exhibits)
+    every = tuple(parts)
+    _require_distinct([p for p in every if isinstance(p, Exhibit)])
+    begun = beside(_part, (result, gl.known()), every)
+
+    def finished() -> tuple[DrawnExhibit, ...]:
+        made = [one for one in begun() if one is not None]
+        exhibits = [one.exhibit for one in made]
+        _require_distinct(exhibits)
+        clear = legible(m for e in exhibits for m in e.maps)
+        scales = ranges(clear)
+        of_maps = [(m, scales[m.scale or m.name]) for m in clear]
+        maps = iter(beside(_map, gl.known(), of_maps)())
+        return tuple(
+            replace(one, drawings=(*one.drawings, *(next(maps) for _ in one.exhibit.maps)))
+            for one in made
+        )
+
+    return finished
 
 
-def _drawings(result: Result, exhibit: Exhibit, scales: dict[str, Range]) -> tuple[Picture, ...]:
-    return (
+def _part(of: tuple[HasMethods, tuple[str, ...]], part: Part) -> DrawnExhibit | None:
+    """A part with all that it draws but its maps, its pictures encoded; None where a section shows
+    nothing. Its maps wait for those of other parts, which may share their colours."""
+    result, known = of
+    gl.learn(known)
+    exhibit = part if isinstance(part, Exhibit) else part(result)
+    if exhibit is None:
+        return None
+    drawings = (
         *(charts.picture(result, c) for c in exhibit.charts),
         *map(heat.picture, exhibit.heats),
         *map(regime_map.picture, exhibit.regimes),
-        *(_map(m, scales[m.scale or m.name]) for m in exhibit.maps),
     )
+    first = (*map(intervals.picture, exhibit.intervals), *exhibit.pictures)
+    brought = tuple(encoded(p) for p in first)
+    return DrawnExhibit(replace(exhibit, pictures=brought), tuple(encoded(p) for p in drawings))
 
 
-def _map(shown: NodeMap, span: Range) -> Picture:
-    if shown.mesh.dimension != 3 or not gl.available():
-        return drawn(shown, span)
-    from validate.report.render_maps import rendered  # vtk reads its window class when imported
+def _map(known: tuple[str, ...], shown: tuple[NodeMap, Range]) -> Picture:
+    gl.learn(known)
+    if shown[0].mesh.dimension != 3 or not gl.available():
+        return encoded(drawn(*shown))
+    from validate.report.scenes.renders import rendered  # vtk reads its window class when imported
 
-    return rendered(shown, span)
+    return encoded(rendered(*shown))
 
 
-def _require_distinct(found: tuple[Exhibit, ...]) -> None:
-    kinds = {
-        "report items with the anchor": [e.anchor for e in found],
-        "tables": [t.name for e in found for t in (*e.tables, *e.data) if t.name],
-        "charts": [c.name for e in found for c in e.charts],
-        "heats": [h.name for e in found for h in e.heats],
-        "maps": [m.name for e in found for m in e.maps],
-        "regime maps": [m.name for e in found for m in e.regimes],
-    }
+def _require_distinct(found: Sequence[Exhibit]) -> None:
+    kinds = {"report items with the anchor": [e.anchor for e in found]}
+    kinds["tables"] = [t.name for e in found for t in (*e.tables, *e.data) if t.name]
+    for kind in ("charts", "heats", "intervals", "maps", "regimes"):
+        kinds[kind] = [one.name for e in found for one in getattr(e, kind)]
     for kind, names in kinds.items():
         name, count = next(iter(Counter(names).most_common(1)), ("", 0))
         if count > 1:
@@ -85,8 +136,6 @@ def write_files(shown: DrawnExhibit, folder: Path) -> None:
         write_table(table, tables)
     for chart in exhibit.charts:
         write_chart(chart, tables)
-    for picture in shown.pictures:
-        if isinstance(picture, Animation):
-            (figures / f"{safe_name(picture.name)}.gif").write_bytes(gif(picture))
-        else:
-            (figures / f"{safe_name(picture.name)}.png").write_bytes(png(picture))
+    for picture in map(encoded, shown.pictures):
+        kind = "gif" if isinstance(picture, Animation) else "png"
+        (figures / f"{safe_name(picture.name)}.{kind}").write_bytes(picture.file)

@@ -3,13 +3,13 @@
 from collections.abc import Iterable
 from importlib.resources import files
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
 from validate.compare.exhibit import Picture
 from validate.compare.result import Result
-from validate.report.encode import uri
+from validate.report.charts.encode import uri
 from validate.report.exhibits import DrawnExhibit
-from validate.report.tables import across, caption, shown, word_columns
+from validate.report.export.tables import across, caption, shown, word_columns
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
 
@@ -21,8 +21,28 @@ def page(
 
     `band` is the colour class and the word before the result's sentence.
     """
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-                              lstrip_blocks=True)  # fmt: skip
+    colour, word = band
+    return _template("report.html").render(
+        result=result, exhibits=[e for e in exhibits if e.shown], created=created, colour=colour,
+        word=word,
+    )  # fmt: skip
+
+
+def fragment(exhibits: Iterable[DrawnExhibit]) -> str:
+    """Some exhibits alone as one HTML text that needs no other file and no script."""
+    return _template("fragment.html").render(exhibits=[e for e in exhibits if e.shown])
+
+
+def sections(exhibits: Iterable[DrawnExhibit]) -> str:
+    """Some exhibits in HTML for a page that has a head and a style of its own."""
+    return _template("sections.html").render(exhibits=[e for e in exhibits if e.shown])
+
+
+def _template(name: str) -> Template:
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        loader=FunctionLoader(lambda n: files("validate.report").joinpath(n).read_text("utf-8")),
+    )  # fmt: skip
     environment.filters.update(
         uri=uri,
         across=across,
@@ -32,12 +52,7 @@ def page(
         breakable=_breakable,
         least_width=least_width,
     )
-    source = files("validate.report").joinpath("report.html").read_text(encoding="utf-8")
-    colour, word = band
-    return environment.from_string(source).render(
-        result=result, exhibits=[e for e in exhibits if e.shown], created=created, colour=colour,
-        word=word,
-    )  # fmt: skip
+    return environment.get_template(name)
 
 
 def least_width(picture: Picture) -> int:

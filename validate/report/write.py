@@ -1,15 +1,29 @@
 """The report folder, written beside its place and moved there when complete."""
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from validate.compare.result import Result
-from validate.report.folder import MARK, STUDIES, replace_folder
-from validate.report.history import carried, write_lines
-from validate.report.made import Made
-from validate.report.plain import Json
-from validate.report.store import document, write_json, write_runs
-from validate.report.verdicts import band
+from validate.engine.finish import CELLS
+from validate.errors import RecordingError
+from validate.files import json_value
+from validate.report.export.fields import write_fields
+from validate.report.export.table_file import write_long_table
+from validate.report.long_table import LongTable, long_table, traces_of
+from validate.report.samples import samples
+from validate.report.sections.verdicts import band
+from validate.report.stored.folder import MARK, STUDIES, replace_folder
+from validate.report.stored.history import carried, write_lines
+from validate.report.stored.made import Made
+from validate.report.stored.plain import Json, write_json
+from validate.report.stored.store import document
+from validate.seals import read_sealed
+
+if TYPE_CHECKING:  # what draws is imported when something is drawn
+    from validate.report.exhibits import Beside
 
 Progress = Callable[[str], None]
 
@@ -22,13 +36,14 @@ def write_report(
     made: Made | None = None,
     progress: Progress | None = None,
     vtu: bool = False,
+    beside: "Beside | None" = None,
 ) -> Path:
     """Replaces `folder` by the report of `result`; returns the path of its report.html.
 
-    `created` is a UTC time, ISO-8601; `made` says what made the result; `vtu` adds `paraview/`. The
-    old folder stays until the new one is complete; after any failure nothing of the new one is
-    left; folders of studies in it are kept, and a line of the run that was there, unless all that
-    made it is equal. Raises
+    `created` is a UTC time, ISO-8601; `made` says what made the result; `vtu` adds `paraview/`;
+    `beside` draws parts side by side. The old folder stays until the new one is complete; after
+    any failure nothing of the new one is left; folders of studies in it are kept, and a line of the
+    run that was there, unless all that made it is equal. Raises
     `UsageError` when `folder` holds something other than a report, or cannot be written;
     `ComparisonError` when two parts of the exhibits share a name.
     """
@@ -38,38 +53,76 @@ def write_report(
 
     def fill(fresh: Path) -> None:
         write_lines(lines, fresh)
-        _fill(result, fresh, content, by, told)
+        table = table_of(result, content, folder.name)
+        _fill(result, table, fresh, content, by, told, beside)
+        write_long_table(table, fresh)
         if vtu:
-            from validate.report.paraview import write_series
+            from validate.report.export.paraview import write_series
 
             write_series(result, fresh / "paraview", told)
 
-    folder = replace_folder(folder, fill, (STUDIES,))
+    folder = replace_folder(folder, fill, (STUDIES, CELLS))
     return folder / "report.html"
+
+
+def table_of(result: Result, content: Json, run: str) -> LongTable:
+    """The long table of a result and the content of its results.json."""
+    points = {m.name: m.residuals for m in result.methods}
+    table = long_table(content, run, points, (*samples(result), *result.rows))
+    return replace(table, rows=(*table.rows, *traces_of(content, run)))
+
+
+def kept_report(result: Result, folder: Path, made: Made, *, vtu: bool = False) -> str:
+    """When the report in `folder` was created, where writing it again would change nothing; ""
+    where it would, or where none is there."""
+    try:
+        stored = read_sealed(folder / MARK)
+    except RecordingError:
+        return ""
+    if not (folder / "report.html").is_file() or (vtu and not (folder / "paraview").is_dir()):
+        return ""
+    created = str(stored.get("created", ""))
+    now = json_value(json.dumps(document(result, created, made), allow_nan=False))
+    return created if {**now, "made": _by(now)} == {**stored, "made": _by(stored)} else ""
+
+
+def _by(content: Json) -> Json:
+    """What made a run, without the words of the command."""
+    return {k: v for k, v in content["made"].items() if k != "command"}
 
 
 def _silent(_: str) -> None:
     pass
 
 
-def _fill(result: Result, folder: Path, content: Json, made: Made, progress: Progress) -> None:
+def _fill(
+    result: Result,
+    table: LongTable,
+    folder: Path,
+    content: Json,
+    made: Made,
+    progress: Progress,
+    beside: "Beside | None",
+) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
-    from validate.report.exhibits import draw_all, write_files
+    from validate.report.exhibits import drawing, in_turn, write_files
     from validate.report.html import page
-    from validate.report.provenance import how
-    from validate.report.replay_mcap import write_replay
-    from validate.report.sections import exhibits
+    from validate.report.replay.mcap import write_replay
+    from validate.report.sections.provenance import how
+    from validate.report.sections.sections import parts
 
     for name in ("tables", "figures", "runs"):
         (folder / name).mkdir()
+    shown = drawing(result, (*parts(result, table), how(result, made)), beside or in_turn)
     progress("runs")
     write_json(content, folder / MARK)
-    write_runs(result, folder / "runs")
+    write_fields(result, folder / "runs")
     progress("replay")
     write_replay(result, folder / "replay.mcap")
-    shown = draw_all(result, (*exhibits(result, progress), how(result, made)))
-    for exhibit in shown:
+    progress("figures")
+    drawn = shown()
+    for exhibit in drawn:
         write_files(exhibit, folder)
     progress("page")
-    text = page(result, shown, content["created"], band(result))
+    text = page(result, drawn, content["created"], band(result))
     (folder / "report.html").write_text(text, "utf-8")

@@ -3,10 +3,19 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "mesh": ("Mesh", "quadratic"),
-    "filled": ("filled",),
-    "foreign_mesh": ("ForeignBody", "read_foreign"),
-    "mesh_file": ("read_mesh", "write_mesh"),
+    "mesh": (
+        "Mesh",
+        "quadratic",
+    ),
+    "geometries.filled": ("filled",),
+    "mesh_files.foreign_mesh": (
+        "ForeignBody",
+        "read_foreign",
+    ),
+    "mesh_files.mesh_file": (
+        "read_mesh",
+        "write_mesh",
+    ),
     "scene": (
         "Cavity",
         "Drive",
@@ -21,19 +30,44 @@ _HOMES = {
         "Support",
         "Weight",
     ),
-    "material": ("Material", "Region"),
+    "material": (
+        "Material",
+        "Region",
+        "Prony",
+    ),
     "laws": ("Coefficients",),
-    "prony": ("Prony",),
-    "rubber": ("mooney_rivlin", "ogden", "yeoh"),
-    "material_point": ("MaterialPoint",),
-    "rigid_body": ("RigidBody",),
-    "box": ("grid",),
-    "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
-    "cylinder": ("quarter_cylinder",),
-    "inclusion": ("Block", "Capsule", "block_with_inclusion"),
-    "refine": ("refined",),
+    "rubber": (
+        "mooney_rivlin",
+        "ogden",
+        "yeoh",
+    ),
+    "meshless": (
+        "MaterialPoint",
+        "RigidBody",
+    ),
+    "geometries.box": ("grid",),
+    "contact": (
+        "RigidContact",
+        "RigidCylinder",
+        "RigidPlane",
+        "RigidPunch",
+        "RigidSphere",
+    ),
+    "geometries.cylinder": ("quarter_cylinder",),
+    "geometries.inclusion": (
+        "Block",
+        "Capsule",
+        "block_with_inclusion",
+    ),
+    "geometries.remeshed": ("refined",),
     "tracked": ("Prescribed",),
-    "select": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
+    "places": (
+        "InBox",
+        "Labelled",
+        "Nearest",
+        "OnPlane",
+        "Site",
+    ),
 }
 
 __all__ = names(_HOMES)

@@ -6,13 +6,16 @@ over is given here as the field writes it. C10 of Mooney-Rivlin and Yeoh and mu_
 coefficients. The forms are in `fem`, written out in docs/laws.md.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity
+from validate.plugins import Registry
 
 VolumetricName = Literal["split", "coupled"]
 StabilityRule = Literal["required", "open"]
@@ -22,7 +25,10 @@ StabilityRule = Literal["required", "open"]
 class LawKind:
     """`coefficients`: fields of `Coefficients` that it knows; `volumetric`: its forms.
 
-    `ranged`: it is checked, and used, between the stretches that the coefficients state.
+    `ranged`: it is checked, and used, between the stretches that the coefficients state. A law of a
+    plug-in also has `at_point`, which makes its `fem.laws.Law` of (mu Pa, kappa Pa, coefficients);
+    those of the package are made in `fem.laws.law`. `holds` is the class of its coefficients, a
+    frozen dataclass below `Coefficients` (None: that class itself).
     """
 
     name: str
@@ -30,15 +36,29 @@ class LawKind:
     coefficients: tuple[str, ...] = ()
     volumetric: tuple[VolumetricName, ...] = ("split", "coupled")
     ranged: bool = True
+    at_point: "Callable[[float, float, Coefficients], Any] | None" = None
+    holds: "type[Coefficients] | None" = None
 
 
-LAWS: tuple[LawKind, ...] = (
+def _faults(part: object) -> str:
+    """What keeps an object from being the law of a plug-in."""
+    if not isinstance(part, LawKind):
+        return f"{part!r}: expected a LawKind"
+    if part.at_point is None:
+        return f"law '{part.name}' has no at_point, which makes the law at a point"
+    known = {f.name for f in fields(part.holds or Coefficients)}
+    odd = [name for name in part.coefficients if name not in known]
+    return f"law '{part.name}': '{odd[0]}' is no field of its coefficients" if odd else ""
+
+
+_OWN: tuple[LawKind, ...] = (
     LawKind("svk", "St. Venant-Kirchhoff", volumetric=(), ranged=False),
     LawKind("neo_hooke", "neo-Hooke", ranged=False),
     LawKind("mooney_rivlin", "Mooney-Rivlin", ("C01",)),
     LawKind("yeoh", "Yeoh", ("C20", "C30")),
     LawKind("ogden", "Ogden", ("ogden_mu", "ogden_alpha")),
 )
+LAWS: Registry[LawKind] = Registry("laws", _OWN, lambda kind: kind.name, _faults)
 
 
 @dataclass(frozen=True)
@@ -48,7 +68,7 @@ class Coefficients:
     `ogden_mu` are those of the terms after the first. `volumetric` "split" is an isochoric part of
     J^(-1/3) F and kappa/4 (J^2 - 1 - 2 ln J), "coupled" the whole of F, - mu ln J and ln^2 J.
     An "open" `stability` is for fits, which must be able to pass through unstable coefficients
-    (`scene.stability.lost_stability` says which): a simulation requires it.
+    (`lost_stability` says which): a simulation requires it.
     """
 
     C01: float = quantity(0.0, "Pa", "Mooney-Rivlin: of I2 - 3")
@@ -87,27 +107,43 @@ class Coefficients:
         """Those that this law knows, the others as at default."""
         kind = law_kind(law)
         keep = (*kind.coefficients, *(("stretches", "stability") if kind.ranged else ()))
-        known = {name: getattr(self, name) for name in keep}
+        known = {name: getattr(self, name) for name in keep if hasattr(self, name)}
         if self.volumetric in kind.volumetric:
             known["volumetric"] = self.volumetric
-        return Coefficients(**known)
+        return (kind.holds or Coefficients)(**known)
 
     def require_known(self, law: str) -> None:
         """Raises `SceneError` for a coefficient that the law would not use."""
-        known = self.known_to(law)
-        if known == self:
+        unknown = self._unknown_to(law)
+        if not unknown:
             return
-        name = next(f.name for f in fields(self) if getattr(self, f.name) != getattr(known, f.name))
-        users = [k.name for k in LAWS if self.known_to(k.name) == self]
+        name = unknown[0]
+        users = [k.name for k in LAWS if not self._unknown_to(k.name)]
         instead = f"; take law {' or '.join(users)}" if users else ""
         raise SceneError(
             f"law '{law}' does not know {name} = {getattr(self, name)}: leave it out{instead}"
         )
 
+    def _unknown_to(self, law: str) -> list[str]:
+        """Names of the coefficients that this law would not use."""
+        known = self.known_to(law)
+        return [
+            f.name for f in fields(self)
+            if getattr(self, f.name) != getattr(known, f.name, f.default)
+        ]  # fmt: skip
+
 
 def law_kind(law: str) -> LawKind:
     """The law of this name; the linear one knows nothing."""
-    return next((k for k in LAWS if k.name == law), LawKind(law, law, (), (), ranged=False))
+    linear = LawKind("linear", "linear", (), (), ranged=False)
+    return next((k for k in (linear, *LAWS.own) if k.name == law), None) or next(
+        (k for k in LAWS.further if k.name == law), LawKind(law, law, (), (), ranged=False)
+    )
+
+
+def further_laws() -> tuple[str, ...]:
+    """Names of the laws that are not the package's own."""
+    return tuple(kind.name for kind in LAWS.further)
 
 
 def ogden_terms(c: Coefficients, shear_modulus: float) -> tuple[tuple[float, float], ...]:
@@ -116,3 +152,99 @@ def ogden_terms(c: Coefficients, shear_modulus: float) -> tuple[tuple[float, flo
     taken = sum(m * a for m, a in zip(rest, alpha[1:], strict=True))
     first = (2 * shear_modulus - taken) / alpha[0]
     return tuple(zip((first, *rest), alpha, strict=True))
+
+
+# --- Whether a law's coefficients keep its energy positive, over the stretches that it is meant
+# for.
+#
+# The isochoric energy of an incompressible body, as a function of the logarithms of its
+# stretches, must be convex (Hill 1970; Drucker's criterion of commercial codes) along uniaxial,
+# equibiaxial and planar stretch. From the state of rest on, that makes the energy positive, the
+# stress rise with the stretch and the larger stress go with the larger stretch (Baker & Ericksen
+# 1954).
+
+_POINTS = 801  # in the logarithm of the stretch, to either side
+# Of the logarithm of the stretch: those of the first two directions.
+_MODES = {"uniaxial": (1.0, -0.5), "equibiaxial": (1.0, 1.0), "planar": (1.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Where a law loses positive energy: the stretch nearest to 1, in which mode, and the stiffness
+    Pa there."""
+
+    stretch: float
+    mode: str
+    stiffness: float
+
+
+def lost_stability(law: str, c: Coefficients, mu: float) -> Lost | None:
+    """Where stiffness is lost between the coefficients' `stretches`; None: nowhere. mu Pa."""
+    low, high = (np.log(s) for s in c.stretches)
+    logs = np.concatenate([np.linspace(0, end, _POINTS) for end in (low, high)])
+    lost = []
+    for mode, (first, second) in _MODES.items():
+        strains = np.multiply.outer([first, second, -first - second], logs)
+        inside = ((strains >= low - 1e-12) & (strains <= high + 1e-12)).all(axis=0)
+        stiffness = _least_stiffness(law, c, mu, first * logs, second * logs)
+        bad = np.flatnonzero(inside & ~(stiffness > 0))
+        if len(bad):
+            worst = bad[np.argmin(np.abs(logs[bad]))]
+            lost.append(Lost(float(np.exp(logs[worst])), mode, float(stiffness[worst])))
+    return min(lost, key=lambda one: abs(np.log(one.stretch)), default=None)
+
+
+def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
+    """Raises `SceneError` at the stretch nearest to 1 where stiffness is lost, and says in which
+    stretch; mu, kappa Pa."""
+    lost = lost_stability(law, c, mu)
+    if lost:
+        raise SceneError(
+            f"law '{law}' with {_words(law, c, mu)} loses positive energy at stretch "
+            f"{lost.stretch:.4g} ({lost.mode}): stiffness {lost.stiffness:.3g} Pa there; use "
+            "other coefficients, or give with `stretches` the range in which it is used"
+        )
+    if c.volumetric == "coupled":
+        _require_stiff_volume(law, c, mu, kappa)
+
+
+def coupled_lambda(c: Coefficients, mu: float, kappa: float) -> float:
+    """Factor Pa of ln^2 J/2 in the coupled form: Lame's lambda less what the shear terms bring."""
+    return kappa - 2 * mu / 3 - 4 * c.C01 - 8 * c.C20
+
+
+def _require_stiff_volume(law: str, c: Coefficients, mu: float, kappa: float) -> None:
+    factor = coupled_lambda(c, mu, kappa)
+    if factor < 0 and c.known_to("neo_hooke") != c:
+        raise SceneError(
+            f"law '{law}' with {_words(law, c, mu)} loses positive energy in volume: the "
+            f"coupled form needs lambda - 4 C01 - 8 C20 >= 0, it is {factor:.4g} Pa; use "
+            "volumetric 'split' or a Poisson ratio nearer to .5"
+        )
+
+
+def _words(law: str, c: Coefficients, mu: float) -> str:
+    if law == "ogden":
+        return "mu, alpha = " + ", ".join(f"{m:.4g} Pa, {a:g}" for m, a in ogden_terms(c, mu))
+    terms = {"C10": mu / 2 - c.C01, "C01": c.C01, "C20": c.C20, "C30": c.C30}
+    return ", ".join(f"{k} = {v:.4g} Pa" for k, v in terms.items() if v or k == "C10")
+
+
+def _least_stiffness(law: str, c: Coefficients, mu: float, a: Floats, b: Floats) -> Floats:
+    """Least eigenvalue Pa of the energy's second derivatives by the logarithms a, b (n,)."""
+    if law == "ogden":
+        terms = [m / alpha * _power_sum(a, b, alpha)[2] for m, alpha in ogden_terms(c, mu)]
+        return np.asarray(np.linalg.eigvalsh(np.sum(terms, axis=0))[:, 0])
+    (s1, g1, D1), (_, _, D2) = (_power_sum(a, b, alpha) for alpha in (2.0, -2.0))
+    C10, x = mu / 2 - c.C01, (s1 - 3)[:, None, None]
+    slope, curve = C10 + 2 * c.C20 * x + 3 * c.C30 * x**2, 2 * c.C20 + 6 * c.C30 * x
+    H = slope * D1 + curve * g1[:, :, None] * g1[:, None, :] + c.C01 * D2
+    return np.asarray(np.linalg.eigvalsh(H)[:, 0])
+
+
+def _power_sum(a: Floats, b: Floats, alpha: float) -> tuple[Floats, Floats, Floats]:
+    """e^(alpha a) + e^(alpha b) + e^(-alpha (a + b)) (n,), its slopes (n, 2) and second derivatives
+    (n, 2, 2)."""
+    x, y, z = np.exp(alpha * a), np.exp(alpha * b), np.exp(-alpha * (a + b))
+    second = np.stack([np.stack([x + z, z], -1), np.stack([z, y + z], -1)], -2)
+    return x + y + z, alpha * np.stack([x - z, y - z], -1), alpha**2 * second

@@ -8,9 +8,46 @@ import numpy as np
 from validate.arrays import Ints
 from validate.errors import SceneError
 from validate.parameters import part, quantity, take_units
-from validate.scene.laws import Coefficients, law_kind
-from validate.scene.prony import Prony
-from validate.scene.stability import require_stable
+from validate.scene.laws import Coefficients, further_laws, law_kind, require_stable
+
+# --- Viscoelasticity as a Prony series: how the isochoric stress of a law relaxes.
+
+
+@dataclass(frozen=True)
+class Prony:
+    """G(t) = G (1 + sum g_i exp(-t/tau_i)): the material's E and law are the relaxed ones.
+
+    Codes whose series is of the instantaneous modulus, G_0 (1 - sum h_i (1 - exp(-t/tau_i))), print
+    h_i = g_i/(1 + sum g), and E_0 = (1 + sum g) E of an incompressible body. `statics` says which
+    limit schemes without time stand for; those with time walk through both.
+    """
+
+    g: tuple[float, ...] = quantity((), "1", "moduli of the branches over the relaxed one")
+    tau: tuple[float, ...] = quantity((), "s", "relaxation times of the branches")
+    statics: Literal["relaxed", "instantaneous"] = quantity(
+        "relaxed", "1", "limit that statics use: long-term or instantaneous"
+    )
+
+    def __post_init__(self) -> None:
+        numbers = np.array([*self.g, *self.tau])
+        if len(self.g) != len(self.tau):
+            raise SceneError(
+                f"Prony series of {len(self.g)} moduli and {len(self.tau)} times: expected one "
+                "of each for every branch"
+            )
+        if not (np.isfinite(numbers).all() and (numbers > 0).all()):
+            raise SceneError(
+                f"Prony series g = {self.g}, tau = {self.tau} s: expected positive numbers, "
+                "otherwise a branch creates energy"
+            )
+
+    @property
+    def instant(self) -> float:
+        """Instantaneous over relaxed modulus."""
+        return 1 + sum(self.g)
+
+
+# -------------------------------------------------------------------------------------------------
 
 #: Bulk modulus over shear modulus of the penalty beside unknown pressures at nu = 0.5.
 _PENALTY = 1000.0
@@ -20,23 +57,23 @@ LawName = Literal["linear", "svk", "neo_hooke", "mooney_rivlin", "yeoh", "ogden"
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws`).
+    """Isotropic elasticity: E Pa, nu -, and the law at large strain (`scene.laws`, `fem.laws.law`).
 
     A declaration may leave E and nu open (None). Every law has these at small strain, which is all
-    that the linear schemes use;
-    `coefficients` are what the law has beyond them; with a `prony` series it is the relaxed law,
-    whose isochoric stress comes late. At nu = 0.5 mixed cells and static schemes keep the volume
-    exactly (`fem.incompressible`), others refuse it. Dynamic schemes need rho kg/m^3; Rayleigh
-    damping is C = mass_damping M + stiffness_damping K, in 1/s and s (the alpha_0 and alpha_1 of
-    paper 001, eq 7). Raises `SceneError` for values out of range, coefficients that the law does
-    not know, and those that lose positive energy, with the stretch.
+    that the linear schemes use; `coefficients` are what the law has beyond them; with a `prony`
+    series it is the relaxed law, whose isochoric stress comes late. At nu = 0.5 mixed cells and
+    static schemes keep the volume exactly (`fem.assembly.incompressible`), others refuse it.
+    Dynamic schemes need rho kg/m^3; Rayleigh damping is C = mass_damping M + stiffness_damping K,
+    in 1/s and s (the alpha_0 and alpha_1 of paper 001, eq 7). Raises `SceneError` for values out of
+    range, coefficients that the law does not know, and those that lose positive energy, with the
+    stretch.
     """
 
     E: float = quantity(MISSING, "Pa", "Young's modulus at small strain", opened=True)
     nu: float = quantity(
         MISSING, "1", "Poisson ratio at small strain; 0.5 needs mixed cells", opened=True
     )
-    law: LawName = quantity("linear", "1", "linear, or the law at large strain")
+    law: LawName = quantity("linear", "1", "linear, or the law at large strain", more=further_laws)
     rho: float | None = quantity(None, "kg/m^3", "density")
     mass_damping: float = quantity(0.0, "1/s", "Rayleigh's alpha")
     stiffness_damping: float = quantity(0.0, "s", "Rayleigh's beta")

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats, Ints, checked, checked_indices
+from validate.display import brief
 from validate.errors import SceneError
 from validate.memory import require_memory
 from validate.scene.shape_functions import (
@@ -78,6 +79,8 @@ class Mesh:
     kind: Kind
     facets: Mapping[str, Ints] = field(default_factory=dict)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         d, (per_cell, per_facet) = DIMENSION[self.kind], _NODES[self.kind]
         nodes = checked(self.nodes, "mesh nodes [m]", (None, d), error=SceneError)
@@ -114,7 +117,7 @@ class Mesh:
         """The vertices of simplices (s, d + 1) that fill the mesh: bricks split, for drawing.
 
         Neighbouring hexahedra meet along the same diagonals only in meshes of one orientation, as
-        `scene.box.grid` makes them.
+        `scene.geometries.box.grid` makes them.
         """
         if not self.bricks:
             return self.corners

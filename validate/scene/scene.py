@@ -1,7 +1,8 @@
 """The scene: a body, what it is made of, how it is held and driven, and the fluid in it.
 
-Declared, it is the parameter tree of an experiment: its body is a geometry (`scene.geometry`), its
-places are words (`scene.named_place`). What is simulated is `resolved` on a mesh of the body.
+Declared, it is the parameter tree of an experiment: its body is a geometry
+(`scene.geometries.specification`), its places are words (`scene.places`). What is simulated is
+`resolved` on a mesh of the body.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,18 +13,46 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from validate.arrays import Floats, checked
+from validate.display import brief
 from validate.errors import SceneError
 from validate.parameters import known, quantity, take_units
-from validate.scene.contact import RigidContact, require_clear
-from validate.scene.indenter import standing
+from validate.scene.contact import RigidContact, require_clear, standing
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
-from validate.scene.named_place import axis_of, box_of, place_of
-from validate.scene.select import Place, kind_of, nodes_of
-from validate.scene.slippery import resting_points
+from validate.scene.places import Place, axis_of, box_of, kind_of, nodes_of, place_of
 from validate.scene.tool import Needle, require_usable
 from validate.scene.tracked import Prescribed
 from validate.units import SYMBOLIC
+
+# --- What keeps a body on a slippery plate from sliding off and turning, and presses nothing.
+
+_OFF = 0.25  # of the place's width: how far off its middle the node is that stays
+_FAR = 0.4  # of the farthest: how far from the middle the other node is at least
+
+
+def resting_points(x: Floats, one: int, other: int, place: str) -> tuple[Floats, Floats]:
+    """The node next to the middle of a place's nodes x (k, 3) m, which stays along the axes `one`
+    and `other`; a second one, beside it along `one`, stays only along `other`.
+
+    A second one that lies aslant would turn a body that widens. Raises `SceneError` without a node
+    near the middle: the body would widen about another point.
+    """
+    centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    middle = x[np.linalg.norm(x - centre, axis=1).argmin()]
+    off, width = float(np.linalg.norm(middle - centre)), float(np.ptp(x, axis=0).max())
+    if off > _OFF * width:
+        raise SceneError(
+            f"{place}: no node within {1e3 * _OFF * width:.3g} mm of its middle (the nearest "
+            f"is {1e3 * off:.3g} mm away), but a body that rests there needs one; use a finer "
+            "mesh, of a mesh file --set body.halvings=1"
+        )
+    along, across = np.abs((x - middle)[:, one]), np.abs((x - middle)[:, other])
+    far = np.flatnonzero(along >= _FAR * along.max())
+    beside = x[far[(across[far] / along[far]).argmin()]]
+    return middle, beside
+
+
+# -------------------------------------------------------------------------------------------------
 
 Dilatation = Literal["pointwise", "nodal_mean", "mixed", "by_element"]
 PlaneState = Literal["strain", "stress"]
@@ -278,14 +307,14 @@ class Scene:
     """What is simulated. Parts that are absent cost nothing.
 
     The `body` is a mesh, or a geometry from which `resolved` makes it; a function of the recording
-    and the parameters where the mesh follows from them.
-    `copies`: planes of symmetry leave this many equal parts, of which the mesh is one; the force
-    of a drive is that on the whole body. `dilatation`: the volume change is that of every point, in
-    the mean of the cells around each node (tet4), or "mixed", projected in every cell
-    (`fem.mean_dilatation`); the latter two do not lock near nu = .5. Declared, "by_element" is the
-    one of them that the mesh's cells may have. `plane` and `thickness` m are
-    those of a 2-D mesh; at 1 m all forces are per metre. `force_unit`: N, or that of a recording
-    whose unit nobody stated; moduli are then in it per m^2, and no force is in N.
+    and the parameters where the mesh follows from them. `copies`: planes of symmetry leave this
+    many equal parts, of which the mesh is one; the force of a drive is that on the whole body.
+    `dilatation`: the volume change is that of every point, in the mean of the cells around each
+    node (tet4), or "mixed", projected in every cell (`fem.assembly.mean_dilatation`); the latter
+    two do not lock near nu = .5. Declared, "by_element" is the one of them that the mesh's cells
+    may have. `plane` and `thickness` m are those of a 2-D mesh; at 1 m all forces are per metre.
+    `force_unit`: N, or that of a recording whose unit nobody stated; moduli are then in it per m^2,
+    and no force is in N.
     """
 
     body: Any
@@ -308,6 +337,8 @@ class Scene:
     tracked: tuple[Prescribed, ...] = ()
     force_unit: str = quantity("N", "1", "N, or that of a recording whose unit is unknown")
     tools: tuple[Needle, ...] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         take_units(self)

@@ -7,8 +7,7 @@ import numpy as np
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
 from validate.scene.mesh import Mesh
-from validate.scene.named_place import axis_of
-from validate.scene.select import Place, kind_of, nodes_of
+from validate.scene.places import Place, axis_of, kind_of, nodes_of
 
 _UNIT = 1e-9
 

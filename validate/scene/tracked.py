@@ -8,7 +8,7 @@ import numpy as np
 from validate.arrays import Floats, checked
 from validate.errors import SceneError
 from validate.parameters import quantity
-from validate.scene.select import Place
+from validate.scene.places import Place
 
 _AXES = "xyz"
 _NOTHING = 1e-9  # singular value, of the largest, that points do not determine

@@ -12,12 +12,11 @@ from scipy.linalg import eigh
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.matrices import damping_of, mass_of
-from validate.fem.system import System
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.newmark import Newmark
-from validate.solve.newmark_rule import rule_of
-from validate.solve.step_maps import explicit_maps, newmark_maps, spectral_radii
+from validate.fem.system import System, damping_of, mass_of
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.explicit.linear import ExplicitLinear
+from validate.solve.stepping import explicit_maps, newmark_maps, spectral_radii
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
 _COUPLED = 1e-8  # of the damping, as in `fem.modes`

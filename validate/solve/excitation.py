@@ -8,11 +8,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.factor import factorise
-from validate.fem.matrices import DampingTerms, MassName, damping_of, mass_of
-from validate.fem.system import System
+from validate.fem.linear_solvers.factor import factorise
+from validate.fem.system import DampingTerms, MassName, System, damping_of, mass_of
 from validate.scene.scene import Drive
-from validate.solve.newmark_rule import Rule
+from validate.solve.dynamic.newmark_rule import Rule
 
 StartName = Literal["equilibrium", "zero"]
 DriveRates = Literal["difference", "rule", "given"]

@@ -2,23 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol, cast
+from typing import Any, ClassVar, Literal, Protocol, cast
 
 from validate.errors import SceneError
-from validate.scene.laws import LAWS
+from validate.scene.laws import LAWS, further_laws
 from validate.scene.material import LawName
-from validate.scene.material_point import MaterialPoint
-from validate.scene.meshless import AnyScene
+from validate.scene.meshless import AnyScene, MaterialPoint
 from validate.scene.scene import Scene
 
 ContactName = Literal["foundations", "membranes", "rigid", "needle"]
-LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS))
+LARGE = cast(tuple[LawName, ...], tuple(kind.name for kind in LAWS.own))
 GLUED: tuple[ContactName, ...] = ("foundations", "membranes")
 
 
 @dataclass(frozen=True)
 class Handles:
-    """`law`: the laws it solves; `contact`: what may be glued to facets, or touch
+    """`law`: the package's laws that it solves; `contact`: what may be glued to facets, or touch
     them ("rigid", "needle").
 
     `inertia` says that it marches in time with masses; the others which parts a scene may have.
@@ -38,6 +37,17 @@ class Handles:
 
     def covers(self, scene: AnyScene) -> bool:
         return not _refused(self, scene)
+
+    def solves(self, law: str) -> bool:
+        """Whether it takes the law. What solves every law at large strain solves those of plug-ins,
+        too."""
+        return law in self.law or (set(LARGE) <= set(self.law) and law in further_laws())
+
+
+def handles_faults(part: Any) -> str:
+    """What keeps a class from declaring what it handles; "" for nothing."""
+    handles = getattr(part, "handles", None)
+    return "" if isinstance(handles, Handles) else f"{part.__name__}.handles: expected Handles(...)"
 
 
 LINEAR_DYNAMICS = Handles(("linear",), inertia=True, cavities=False, contact=GLUED)
@@ -74,7 +84,7 @@ def require_handled(scene: AnyScene, settings: Handling) -> None:
     refused = _refused(settings.handles, scene)
     if refused:
         what, why = refused
-        name, others = type(settings).__name__, " or ".join(INSTEAD[what])
+        name, others = type(settings).__name__, " or ".join(INSTEAD.get(what, INSTEAD[LARGE[0]]))
         raise SceneError(f"{name} {why}; use {others}")
 
 
@@ -85,10 +95,10 @@ def _refused(handles: Handles, scene: AnyScene) -> tuple[str, str] | None:
     law, point = scene.material.law, isinstance(scene, MaterialPoint)
     if not isinstance(scene, MaterialPoint):  # the first that is not handled, or the body's own
         laws = (law, *(r.material.law for r in scene.regions))
-        law = next((x for x in laws if x not in handles.law), law)
+        law = next((x for x in laws if not handles.solves(x)), law)
     if handles.mesh == point:
         return ("point", "needs a mesh") if point else ("mesh", "solves only a material point")
-    if law not in handles.law:
+    if not handles.solves(law):
         return law, f"cannot solve the law '{law}', only {', '.join(handles.law)}"
     if any(m.prony.g for m in scene.materials) and not handles.viscous:
         return "viscous", "does not support a Prony series"

@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.locate import barycentric_rows
+from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene

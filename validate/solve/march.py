@@ -8,7 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
-from validate.fem.locate import Rows, probe_rows
+from validate.fem.assembly.locate import Rows, probe_rows
 from validate.fem.system import build
 from validate.scene.meshless import AnyScene
 from validate.scene.scene import Load, Pressure, Scene, Weight

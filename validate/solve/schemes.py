@@ -1,4 +1,6 @@
-"""Every scheme there is. A new one is one file beside this and its name here.
+"""Every scheme: the package's own, those of plug-ins and those that a script adds.
+
+A new one of the package is one file beside this and its name here.
 
 What a scheme declares in its class (`handles`, `steppings`, `candidates`) is all that the stability
 study, the ladders and `choose` know of it.
@@ -6,38 +8,38 @@ study, the ladders and `choose` know of it.
 
 from collections.abc import Callable
 
+from validate.plugins import Registry, settings_faults
 from validate.scene.mesh import Kind
 from validate.solve.candidates import RUNGS, Asked, Rival
-from validate.solve.central import CentralDifference
-from validate.solve.contact import ContactNewton
-from validate.solve.explicit_linear import ExplicitLinear
-from validate.solve.fluid import ElasticPressure, ExactPressure, NoFluid
-from validate.solve.from_equilibrium import FromEquilibrium
-from validate.solve.guests.guest import Guest
-from validate.solve.guests.let_go import GuestLetGo
-from validate.solve.handles import Handles
-from validate.solve.haptic_loop import HapticLoop
-from validate.solve.harmonic import Harmonic
-from validate.solve.implicit import NewtonDynamics
-from validate.solve.let_go import LetGo
-from validate.solve.modal import Modal
-from validate.solve.needle import NeedleLoop
-from validate.solve.newmark import Newmark
-from validate.solve.newton import StaticNewton
-from validate.solve.pressure_loop import PressureLoop
-from validate.solve.proportional import Proportional
-from validate.solve.pulse import PulsePressure
-from validate.solve.quasi_static import QuasiStatic
-from validate.solve.regions import AsyncRegions
-from validate.solve.rigid_motion import RigidMotion
+from validate.solve.dynamic.from_equilibrium import FromEquilibrium
+from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.let_go import LetGo
+from validate.solve.dynamic.modal import Modal
+from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.viscous_modes import ViscousModes
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.explicit.linear import ExplicitLinear
+from validate.solve.external.let_go import GuestLetGo
+from validate.solve.external.scheme import Guest
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, NoFluid
+from validate.solve.fluid.pressure_loop import PressureLoop
+from validate.solve.fluid.pulse import PulsePressure
+from validate.solve.handles import Handles, handles_faults
+from validate.solve.haptic.loop import HapticLoop
+from validate.solve.haptic.needle import NeedleLoop
+from validate.solve.regions.krylov import TouchedKrylov
+from validate.solve.regions.scheme import AsyncRegions
+from validate.solve.static.contact import ContactNewton
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.proportional import Proportional
+from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.static.stretch_test import StretchTest
+from validate.solve.static.tabulated import Tabulated
+from validate.solve.static.without_mechanics import Harmonic, RigidMotion
 from validate.solve.stepping import Stepping
-from validate.solve.stretch_test import StretchTest
-from validate.solve.tabulated import Tabulated
-from validate.solve.touched_krylov import TouchedKrylov
 from validate.solve.types import SceneSolver, Scheme
-from validate.solve.viscous_modes import ViscousModes
 
-SCHEMES: tuple[type[Scheme], ...] = (
+_OWN: tuple[type[Scheme], ...] = (
     NoFluid,
     ExactPressure,
     PressureLoop,
@@ -59,16 +61,21 @@ SCHEMES: tuple[type[Scheme], ...] = (
     TouchedKrylov,
 )
 
+SCHEMES: Registry[type[Scheme]] = Registry(
+    "schemes",
+    _OWN,
+    lambda scheme: scheme.__name__,
+    lambda part: settings_faults(part, "prepare") or handles_faults(part),
+    lambda part: not hasattr(part, "solve"),
+)
+
 # What solves a whole scene at once.
-SOLVERS: tuple[type[SceneSolver], ...] = (
-    StretchTest,
-    RigidMotion,
-    Proportional,
-    ViscousModes,
-    LetGo,
-    Harmonic,
-    Guest,
-    GuestLetGo,
+SOLVERS: Registry[type[SceneSolver]] = Registry(
+    "schemes",
+    (StretchTest, RigidMotion, Proportional, ViscousModes, LetGo, Harmonic, Guest, GuestLetGo),
+    lambda solver: solver.__name__,
+    lambda part: settings_faults(part) or handles_faults(part),
+    lambda part: hasattr(part, "solve"),
 )
 
 
@@ -79,7 +86,12 @@ def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
 
 def steppings() -> tuple[Stepping, ...]:
     """The step maps that schemes declare, in order: what stability studies map."""
-    return tuple(s for scheme in SCHEMES for s in getattr(scheme, "steppings", tuple)())
+    none: tuple[Stepping, ...] = ()
+
+    def declared(scheme: type[Scheme]) -> tuple[Stepping, ...]:
+        return tuple(getattr(scheme, "steppings", tuple)())
+
+    return tuple(s for scheme in SCHEMES for s in SCHEMES.answer(scheme, declared, none))
 
 
 def steppings_for(kind: Kind) -> tuple[Stepping, ...]:
@@ -89,24 +101,10 @@ def steppings_for(kind: Kind) -> tuple[Stepping, ...]:
 
 def candidates(asked: Asked) -> tuple[Rival, ...]:
     """The candidates that schemes declare for such a body, by their rung: what ladders climb."""
-    none = _no_candidates
-    found = [c for scheme in SCHEMES for c in getattr(scheme, "candidates", none)(asked)]
+    none: tuple[Rival, ...] = ()
+
+    def declared(scheme: type[Scheme]) -> tuple[Rival, ...]:
+        return tuple(scheme.candidates(asked)) if hasattr(scheme, "candidates") else none
+
+    found = [c for scheme in SCHEMES for c in SCHEMES.answer(scheme, declared, none)]
     return tuple(sorted(found, key=lambda c: RUNGS.index(c.rung)))
-
-
-def _no_candidates(asked: Asked) -> tuple[Rival, ...]:
-    return ()
-
-
-# Linear schemes of drives and cavities, and those of drives and loads.
-LINEAR = schemes_that(lambda h: "linear" in h.law and h.cavities and "needle" not in h.contact)
-INERTIAL = schemes_that(lambda h: h.law == ("linear",) and h.loads)
-
-# Dynamics at large strain of drives and loads, without cavities.
-LARGE_INERTIAL = schemes_that(lambda h: "linear" not in h.law and h.inertia and h.loads)
-
-# Bodies that touch rigid ones.
-TOUCHING = schemes_that(lambda h: "rigid" in h.contact)
-
-# Bodies that a needle touches, whose path is given.
-NEEDLES = schemes_that(lambda h: "needle" in h.contact)

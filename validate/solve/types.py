@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from validate.arrays import Floats, Ints, checked
+from validate.display import brief
 from validate.fem.system import System
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
@@ -198,6 +199,8 @@ class Run:
         if self.sd is not None:
             object.__setattr__(self, "sd", checked(self.sd, "run sd [m]", self.u.shape))
         object.__setattr__(self, "traces", MappingProxyType(dict(self.traces)))
+
+    __repr__ = brief
 
     @property
     def finished(self) -> bool:

@@ -3,13 +3,10 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "engine": ("Finished", "finish"),
-    "job": ("Job", "Plan", "Where"),
-    "store": ("Record",),
-    "filters": ("FilterStudy",),
-    "identify": ("IdentifyStudy", "identification"),
-    "trade": ("ParetoFront", "Trade", "TradeRow"),
-    "choose": ("Choice", "Wanted", "wanted"),
+    "filters.study": ("FilterStudy",),
+    "identify.study": ("IdentifyStudy", "identification"),
+    "tradeoff.study": ("ParetoFront", "Trade", "TradeRow"),
+    "choose.study": ("Choice", "Wanted", "wanted"),
 }
 
 __all__ = names(_HOMES)

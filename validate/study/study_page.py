@@ -1,30 +1,26 @@
 """A finished study as its folder: results.json, tables, figures and a page; cells stay."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from validate.compare.exhibit import Exhibit
-from validate.compare.result import Result
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.engine.finish import CELLS
 from validate.parameters import Parameter
-from validate.replay.experiment import Experiment
-from validate.report.folder import MARK, replace_folder
-from validate.report.history import carried, write_lines
-from validate.report.made import Made
-from validate.report.plain import Json
-from validate.report.store import document, write_json
-from validate.report.tables import write_csv
-from validate.study.engine import CELLS
-
-Row = tuple[Any, ...]
-CellsTable = tuple[tuple[str, ...], tuple[Row, ...]]
+from validate.pipeline.experiment.experiment import Experiment
+from validate.report.export.tables import write_csv
+from validate.report.stored.folder import replace_folder
+from validate.report.stored.history import carried, write_lines
+from validate.report.stored.made import Made
+from validate.report.stored.store import document
+from validate.study.loose_page import fill_page, without_runs
 
 
 @dataclass(frozen=True)
 class Findings:
     """What a study tells: `title`, one `sentence`, exhibits, its part of results.json (SI, nothing
-    that is not finite), head and rows of tables/cells.csv.
+    that is not finite), and every cell: tables/cells.csv.
 
     `passed`: whether its own claims hold (None: it makes none), in the words of `band`: a colour
     and a text. `seed` is the first of a filter study's.
@@ -34,7 +30,7 @@ class Findings:
     sentence: str
     exhibits: tuple[Exhibit, ...]
     document: dict[str, Any]
-    cells: CellsTable
+    cells: NumberTable
     quick: bool
     parameters: tuple[Parameter, ...] = ()
     passed: bool | None = None
@@ -51,23 +47,12 @@ def write_study(
     `replace_folder` and `draw_all` do.
     """
     twin = told.seed is not None
-    result = Result(
-        name=experiment.name,
-        title=told.title,
-        source=experiment.source,
-        sentence=told.sentence,
-        parameters=told.parameters,
-        methods=(),
-        recordings=(),
-        rest=(),
-        effects=(),
-        published=(),
-        quick=told.quick,
-        kind=experiment.declared_kind,
-        seed=told.seed,
-        twin_notice=experiment.twin_notice if twin else "",
+    result = replace(
+        without_runs(experiment.name, told.title, experiment.source, told.sentence),
+        parameters=told.parameters, quick=told.quick, kind=experiment.declared_kind,
+        seed=told.seed, twin_notice=experiment.twin_notice if twin else "",
         exhibits=told.exhibits,
-    )
+    )  # fmt: skip
     by, created = made or Made(), datetime.now(UTC).isoformat(timespec="seconds")
     content = {**document(result, created, by), "study": told.document}
     if told.passed is not None:
@@ -75,24 +60,11 @@ def write_study(
     lines = carried(folder, content)
 
     def fill(fresh: Path) -> None:
+        from validate.report.sections.provenance import how, parameters
+
         write_lines(lines, fresh)
-        _fill(told, result, content, by, fresh)
+        shown = (*result.exhibits, parameters(result), how(result, by))
+        fill_page(replace(result, exhibits=shown), content, created, told.band, fresh)
+        write_csv(fresh / "tables" / "cells.csv", told.cells.headings, told.cells.rows)
 
     return replace_folder(folder, fill, (CELLS,)) / "report.html"
-
-
-def _fill(told: Findings, result: Result, content: Json, made: Made, folder: Path) -> None:
-    # What draws is imported when something is drawn: matplotlib takes half a second.
-    from validate.report.exhibits import draw_all, write_files
-    from validate.report.html import page
-    from validate.report.provenance import how, parameters
-
-    for name in ("tables", "figures"):
-        (folder / name).mkdir()
-    write_json(content, folder / MARK)
-    write_csv(folder / "tables" / "cells.csv", *told.cells)
-    drawn = draw_all(result, (*result.exhibits, parameters(result), how(result, made)))
-    for exhibit in drawn:
-        write_files(exhibit, folder)
-    text = page(result, drawn, content["created"], told.band)
-    (folder / "report.html").write_text(text, encoding="utf-8")

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats
-from validate.fem.locate import barycentric_rows
+from validate.fem.assembly.locate import barycentric_rows
+from validate.parameters import quantity
 from validate.recording.types import Contours, Markers, Signal
-from validate.register.plane import SurfaceSampler, section
+from validate.register.outlines.plane import SurfaceSampler, section
 from validate.scene.mesh import Mesh
 
 
@@ -109,6 +110,15 @@ class Pen:
         x = x + self.sd_tip * rng.standard_normal(x.shape)
         x = x + self.sd_hand * rng.standard_normal(x.shape)
         return Markers(t, tuple(layout), x @ self.rotation.T + np.array(self.shift), self.sd, "pen")
+
+
+@dataclass(frozen=True)
+class LoadCell:
+    """Noise and sampling of a recorded force."""
+
+    seed: int = quantity(4, "1", "seed of the noise")
+    noise: float = quantity(5e-3, "N", "standard deviation of the force")
+    every: int = quantity(10, "1", "ticks between two samples of the force")
 
 
 def signal(

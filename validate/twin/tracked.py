@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import RecordingError, UsageError
-from validate.recording.alignment import RECORD
+from validate.recording.clocks.alignment import RECORD
 from validate.recording.types import Markers, Record, Recording, Source
 from validate.scene.scene import Scene
 from validate.solve.types import Run

@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity
-from validate.recording.images.raster import coverage
+from validate.recording.outlines.raster import coverage
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,30 @@
 """What a file does not say itself, as users say it: `--map KEY=VALUE`."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from validate.errors import UsageError
-from validate.recording.reader import Options
+from validate.recording.reader import MapOption, Options
 from validate.units import in_si, split
+
+UNIT = MapOption("unit", "unit of lengths", "a length", "as the file declares")
+SD = MapOption("sd", "standard deviation of a coordinate", "m", "0: not stated")
+RATE = MapOption("rate", "samples a second", "Hz", "as the file declares")
+M_PER_PX = MapOption("m_per_px", "side of a pixel; also --m-per-px", "m", "as the file declares")
+WHITE = MapOption("white", "level of a 16-bit image that becomes 255", "1", "the largest level")
+TOPIC = MapOption("topic", "name of the image stream", default="images")
+LENS_FILE = MapOption("lens", "file of the camera calibration that straightens the images")
+
+
+def frame(default: str) -> MapOption:
+    """Name of the coordinate frame."""
+    return MapOption("frame", "name of the coordinate frame", default=default)
+
+
+def asked(option: MapOption) -> MapOption:
+    """An option that no file of the format declares."""
+    return replace(option, default="")
 
 
 def length(options: Options, key: str, example: str, *, zero: bool = False) -> float:

@@ -9,7 +9,7 @@ from validate.errors import RecordingError
 from validate.files import ANY_SIZE, member, members, open_file, read_text
 from validate.recording.formats.apart import decoded
 from validate.recording.formats.rosbag_arrays import ROS1
-from validate.recording.mcap.read import read_all
+from validate.recording.mcap.read import OPTIONS, read_all
 from validate.recording.reader import Options, Reader, head, source_of
 from validate.recording.types import Recording, Source
 
@@ -40,7 +40,7 @@ def read_bag(path: Path, options: Options) -> Recording:
         open_file(file, ANY_SIZE).close()
         if file.suffix != ".mcap":
             _require_whole(file)
-    found = decoded("rosbag_arrays", path, extra="ros2")
+    found = decoded("validate.recording.formats.rosbag_arrays", path, extra="ros2")
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         whole = Path(folder) / (path.name or "bag")  # errors name it
         found["mcap"].tofile(whole)
@@ -113,4 +113,6 @@ ROSBAG = Reader(
     read_bag,
     "it is SQLite with messages and topics, a folder with metadata of rosbag2, or begins with "
     "#ROSBAG",
+    options=OPTIONS,
+    extensions=(".db3", ".bag"),
 )

@@ -1,6 +1,7 @@
 """Landmarks of 3D Slicer: FCSV, and markups as JSON (.mrk.json). Points at one instant, in mm."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,11 @@ import numpy as np
 
 from validate.errors import RecordingError
 from validate.files import json_value
-from validate.recording.exports.encoding import whole_file
-from validate.recording.formats.options import length, spread
+from validate.recording.formats.options import SD, UNIT, frame, length, spread
 from validate.recording.formats.recorded import distinct, recorded
-from validate.recording.formats.text_rows import TextRow, TextRows, text_rows
-from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.motion_capture.text_rows import TextRow, TextRows, text_rows
+from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.tables.encoding import whole_file
 from validate.recording.types import Markers, Recording
 
 TOPIC = "landmarks"
@@ -24,7 +25,11 @@ _COLUMNS = ("id", "x", "y", "z", "ow", "ox", "oy", "oz", "vis", "sel", "lock", "
 _STATUS = len(_COLUMNS)  # a column after the named ones, in newer files
 _DEFINED = ("", "2")
 _LARGEST = 64 * 2**20  # bytes of a JSON file
-_OPTIONS = ("sd", "frame", "unit")
+_OPTIONS = (
+    SD,
+    replace(UNIT, default="mm, or as the file declares"),
+    frame("RAS or LPS, as declared"),
+)
 _Point = tuple[str, Sequence[float]]
 
 
@@ -35,7 +40,6 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     stated), `unit` in place of Slicer's mm, `frame` in place of the file's. Raises
     `RecordingError` for a file of voxel indices (IJK), one that is no FCSV, or damaged.
     """
-    require_known(options, _OPTIONS)
     held = text_rows(path)
     if not held.rows or not held.rows[0].cell(0).encode().startswith((_FCSV, _OLD)):
         raise RecordingError(f"{path.name}: not FCSV: its first line is not '{_FCSV.decode()}'")
@@ -86,7 +90,6 @@ def _three(what: str, values: Any) -> Sequence[float]:
 
 def read_markups(path: Path, options: Options) -> Recording:
     """Control points of all lists of the file as landmarks (1, k, 3) m; as `read_fcsv`."""
-    require_known(options, _OPTIONS)
     lists = _lists(path)
     systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
     units = {unit for m in lists for unit in _units(m)}
@@ -155,6 +158,8 @@ FCSV = Reader(
     lambda p: head(p, len(_FCSV)).startswith((_FCSV, _OLD)),
     read_fcsv,
     "its first line says so",
+    options=_OPTIONS,
+    extensions=(".fcsv",),
 )
 MARKUPS = Reader(
     "markups",
@@ -162,4 +167,6 @@ MARKUPS = Reader(
     lambda p: b'"@schema"' in (start := head(p)) and b"markups" in start,
     read_markups,
     "JSON with the schema of markups",
+    options=_OPTIONS,
+    extensions=(".mrk.json", ".json"),
 )

@@ -9,17 +9,25 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.apart import decoded
-from validate.recording.formats.options import above_zero, length
+from validate.recording.formats.options import (
+    LENS_FILE,
+    M_PER_PX,
+    RATE,
+    TOPIC,
+    WHITE,
+    above_zero,
+    frame,
+    length,
+)
 from validate.recording.formats.recorded import recorded
-from validate.recording.images.lens import LENS, straightened
-from validate.recording.images.levels import shallow
+from validate.recording.images.image import shallow
+from validate.recording.images.lens import straightened
 from validate.recording.images.numbered import OTHERS, pictures
 from validate.recording.images.png_stack import by_size, offered
-from validate.recording.reader import Options, Reader, head, require_known, source_of
+from validate.recording.reader import Options, Reader, head, source_of
 from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si
 
-_OPTIONS = ("m_per_px", "rate", "topic", "frame", "white", LENS)
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _SECONDS = 60
 
@@ -33,7 +41,6 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     without scale or times, `RecordingError` for damage. Images of several sizes are streams of
     their own.
     """
-    require_known(options, _OPTIONS)
     found = decoded("validate.recording.images.stack_arrays", path, None, _SECONDS)
     deep = [found[f"image.{i}"] for i in range(sum(k.startswith("image.") for k in found))]
     if not deep:
@@ -109,4 +116,6 @@ IMAGE_STACK = Reader(
     _recognises,
     read_image_stack,
     "a folder that holds JPEG, TIFF or BMP files, or a TIFF's first bytes",
+    options=(M_PER_PX, RATE, TOPIC, frame("image"), WHITE, LENS_FILE),
+    extensions=(".jpg", ".tif", ".bmp", ".png"),
 )

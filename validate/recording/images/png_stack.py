@@ -8,12 +8,12 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.files import read_bytes
-from validate.recording.clocks import clock_of
-from validate.recording.formats.options import above_zero
+from validate.recording.clocks.clock_check import clock_of
+from validate.recording.formats.options import LENS_FILE, M_PER_PX, RATE, TOPIC, above_zero, asked
 from validate.recording.images.image import Pixels, decode_png
-from validate.recording.images.lens import LENS, straightened
+from validate.recording.images.lens import straightened
 from validate.recording.images.numbered import OTHERS, numbered, pictures
-from validate.recording.reader import Options, Reader, head, require_known
+from validate.recording.reader import Options, Reader, head
 from validate.recording.scales import odd_pixel
 from validate.recording.types import Frames, Recording, Source
 from validate.units import in_si, split
@@ -38,7 +38,6 @@ _PRINTERS = (
     600,
     1200,
 )  # dots an inch
-_OPTIONS = ("m_per_px", "rate", "topic", LENS)
 
 
 def read_png_stack(folder: Path, options: Options) -> Recording:
@@ -50,7 +49,6 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     `RecordingError`: no files, equal numbers, damaged images, over `MAX_STACK`. Images of several
     sizes are streams of their own.
     """
-    require_known(options, _OPTIONS)
     if not {"m_per_px", "rate"} <= options.keys():
         said = offered(_dots(folder)) if folder.is_dir() and "m_per_px" not in options else ""
         raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
@@ -153,4 +151,6 @@ PNG_STACK = Reader(
     _recognises,
     read_png_stack,
     "a folder that holds PNG files and no other images",
+    options=(asked(M_PER_PX), asked(RATE), TOPIC, LENS_FILE),
+    extensions=(".png",),
 )

@@ -13,9 +13,9 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks import clock_of
+from validate.recording.clocks.clock_check import clock_of
 from validate.recording.formats.options import length
-from validate.recording.images.levels import shallow
+from validate.recording.images.image import shallow
 from validate.recording.mcap.decoders import Plain, decoder_of
 from validate.recording.mcap.known_messages import MessagePart, parts_of, stamp_ns
 from validate.recording.mcap.records import Channel, Message, Schema

@@ -8,11 +8,13 @@ of 0 means "none": the file is read, and its integrity is called not provable. A
 messages it wants on the way, so that a file is inspected in the same pass.
 """
 
+import hashlib
 import os
 import zlib
 from array import array
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Set
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -39,9 +41,75 @@ from validate.recording.mcap.records import (
     records_in,
     statistics_messages,
 )
-from validate.recording.mcap.sums import Sums
 from validate.recording.mcap.verified import Cut, Span, Verified
 from validate.recording.types import Source
+
+# --- SHA-256 and CRC-32 of bytes that come one after another, taken by a thread beside the
+# reading.
+#
+# Both cost more than half of what a bare reader takes, and let other threads run. A few blocks
+# wait at most, so memory stays bounded; a file below one block is summed at once, without a
+# thread.
+
+_HASHED_AT_ONCE, _AHEAD = 2**20, 4  # bytes handed over at once, and how many blocks may wait
+
+
+class Sums:
+    """The SHA-256 of all bytes, and the CRC-32 of those since the last `restart`."""
+
+    def __init__(self) -> None:
+        self._sha = hashlib.sha256()
+        self._crc = 0
+        self._waiting: list[bytes] = []
+        self._size = 0
+        self._thread: ThreadPoolExecutor | None = None
+        self._handed: deque[Future[None]] = deque()
+
+    def update(self, data: bytes) -> None:
+        """Adds bytes behind the others."""
+        self._waiting.append(data)
+        self._size += len(data)
+        if self._size >= _HASHED_AT_ONCE:
+            self._hand_over()
+
+    def crc(self) -> int:
+        """Of all bytes since the last restart."""
+        self._settle()
+        return self._crc
+
+    def restart(self) -> None:
+        """The CRC counts from here on."""
+        self._settle()
+        self._crc = 0
+
+    def hexdigest(self) -> str:
+        """The SHA-256 of all bytes; nothing can be added afterwards."""
+        self._settle()
+        if self._thread is not None:
+            self._thread.shutdown()
+        return self._sha.hexdigest()
+
+    def _settle(self) -> None:
+        while self._handed:
+            self._handed.popleft().result()
+        self._take(self._waiting)
+        self._waiting, self._size = [], 0
+
+    def _hand_over(self) -> None:
+        if len(self._handed) >= _AHEAD:
+            self._handed.popleft().result()
+        if self._thread is None:
+            self._thread = ThreadPoolExecutor(1, "sums")
+        self._handed.append(self._thread.submit(self._take, self._waiting))
+        self._waiting, self._size = [], 0
+
+    def _take(self, parts: list[bytes]) -> None:
+        for part in parts:
+            self._sha.update(part)
+            self._crc = zlib.crc32(part, self._crc)
+
+
+# -------------------------------------------------------------------------------------------------
 
 MAX_MESSAGES = 10_000_000
 _BLOCK = 2**20  # bytes hashed at once

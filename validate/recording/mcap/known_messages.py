@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.poses import ROTATION, TRANSLATION, rotations
-from validate.recording.images.picture import decode_picture
-from validate.recording.images.raw import RawImage, grey
+from validate.recording.images.packed import RawImage, decode_picture, grey
 from validate.recording.mcap.decoders import Plain, binary
+from validate.recording.motion_capture.poses import ROTATION, TRANSLATION, rotations
 
 NOT_STATED = "not stated"
 MAX_POINTS = 100_000  # of one cloud

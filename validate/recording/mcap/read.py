@@ -15,9 +15,9 @@ from pathlib import Path
 
 from validate.errors import RecordingError
 from validate.files import ANY_SIZE
-from validate.recording.alignment import moved
-from validate.recording.clocks import clock_of
-from validate.recording.formats.options import metres
+from validate.recording.clocks.alignment import moved
+from validate.recording.clocks.clock_check import clock_of
+from validate.recording.formats.options import M_PER_PX, UNIT, WHITE, metres
 from validate.recording.mcap.foreign import ForeignStreams, found_streams, gatherers
 from validate.recording.mcap.foreign import fill as fill_foreign
 from validate.recording.mcap.integrity import verify
@@ -25,7 +25,7 @@ from validate.recording.mcap.metadata import by_name, name_of, own_records
 from validate.recording.mcap.records import MAGIC
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.verified import Verified, messages_of, opened
-from validate.recording.reader import Options, Reader, head
+from validate.recording.reader import MapOption, Options, Reader, head
 from validate.recording.scales import in_unit
 from validate.recording.types import Clock, Recording, by_kind
 
@@ -142,6 +142,13 @@ def _together(
     )  # fmt: skip
 
 
+OPTIONS = (
+    M_PER_PX,
+    WHITE,
+    replace(UNIT, doc="unit of markers and outlines that are wrongly declared in m", default="m"),
+    MapOption("TOPIC.FIELD", "unit of a number in messages of any type: makes it a stream"),
+)
+
 MCAP = Reader(
     "mcap",
     "an MCAP file",
@@ -149,4 +156,6 @@ MCAP = Reader(
     read_all,
     "its first 8 bytes are MCAP's",
     largest=ANY_SIZE,  # read piece by piece
+    options=OPTIONS,
+    extensions=(".mcap",),
 )

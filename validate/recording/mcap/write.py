@@ -47,7 +47,7 @@ class _Written:
     message: Callable[[int, int], Json]
 
 
-def write_recording(recording: Recording, path: Path) -> None:
+def write_recording(recording: Recording, path: Path | str) -> None:
     """Write `recording` to `path`, replacing what is there only when all is written.
 
     Raises `RecordingError`: no streams, a topic or metadata name used twice, times that are no
@@ -56,7 +56,7 @@ def write_recording(recording: Recording, path: Path) -> None:
     if not recording.streams:
         raise RecordingError(f"{recording.name}: no streams to write")
     parts = [w for topic, s in recording.streams.items() for w in _parts(topic, s, recording.t0_ns)]
-    write_channels(path, [p.channel for p in parts], _messages(parts), all_records(recording))
+    write_channels(Path(path), [p.channel for p in parts], _messages(parts), all_records(recording))
 
 
 def _parts(topic: str, stream: Stream, t0_ns: int) -> list[_Written]:

@@ -1,0 +1,13 @@
+"""Write the tables of formats and of `--map` keys in docs/formats.md, as the readers specify them.
+
+python docs/format_tables.py
+"""
+
+from pathlib import Path
+
+from validate.recording.specification import with_tables
+
+PAGE = Path(__file__).with_name("formats.md")
+
+if __name__ == "__main__":
+    PAGE.write_text(with_tables(PAGE.read_text("utf-8")), "utf-8")

@@ -1,0 +1,48 @@
+"""Studies from a script: the cells and the folder of the command."""
+
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+from commands import here
+
+import validate
+from validate.errors import UsageError
+
+pytestmark = pytest.mark.xdist_group("library")
+Q = "methods.kf.settings.Q=1e-12,1e-10"
+
+
+def test_a_study_is_the_one_of_the_command(pulled: Path, reports: Path) -> None:
+    found = validate.study("filters", pulled, quick=True, sweep=[Q], seeds=[3, 7], out=reports)
+    command = ("study", "filters", str(pulled), "--quick", "--sweep", Q, "--seeds", "3,7")
+    code, out, _ = here(*command, "--out", str(reports), "--json")
+    assert code == 0
+    document = json.loads(out)
+    ours, theirs = dict(found.found), dict(document["study"])
+    assert theirs.pop("reused") == 4  # the function computed them
+    assert (ours.pop("reused"), ours.pop("seconds") > 0, theirs.pop("seconds") > 0) == (
+        0,
+        True,
+        True,
+    )
+    assert ours == theirs
+    assert found.sentence == document["sentence"]
+    assert found.content["made"]["command"] == document["made"]["command"].replace(" --json", "")
+    frame = found.to_pandas()
+    assert len(frame) == len(found.cells()) - 1 > 1
+    assert pickle.loads(pickle.dumps(found)) == found
+    assert len(repr(found).splitlines()) <= 24
+    assert list(found.plot)
+    with pytest.raises(UsageError, match="a study or a comparison, not a run"):
+        validate.open_run(found.folder)
+
+
+def test_what_a_study_does_not_take_is_refused(pulled: Path) -> None:
+    with pytest.raises(UsageError, match="unknown study 'filter'; nearest: filters"):
+        validate.study("filter", pulled)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="study 'stability' has no option 'seeds'"):
+        validate.study("stability", pulled, seeds=3)
+    with pytest.raises(UsageError, match="give error"):
+        validate.study("choose", pulled, error="1mm")

@@ -1,0 +1,179 @@
+"""`validate compare`: stored runs side by side, on one screen."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from validate.commands.arguments import complain
+from validate.commands.display import relative, say
+from validate.commands.screen import LINES, sentences
+from validate.errors import UsageError
+from validate.library.comparison import scores_of_runs
+from validate.report.stored.folder import try_results
+from validate.report.views.layout import laid, width, wrapped
+from validate.report.views.numbers import shown_unit, significant, text
+from validate.study.stored_runs.compare_page import write_comparison
+from validate.study.stored_runs.stored import Pair, Row, SideBySide, pairs
+
+_LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
+_ROUNDING = 1e-9  # relative: the same computation in another order
+_PARAMETERS = 8  # rows of parameters that differ
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What of a comparison is shown: patterns of methods and scores, an order, all of it."""
+
+    methods: tuple[str, ...] = ()
+    scores: tuple[str, ...] = ()
+    sort: str = "change"
+    everything: bool = False
+
+
+def compare(paths: tuple[Path, ...], wanted: Shown, out: Path | None, *, as_json: bool) -> None:
+    """Prints stored runs side by side and draws a page; raises when nothing can be compared."""
+    found = scores_of_runs(paths, wanted.methods, wanted.scores, wanted.sort)
+    if as_json:
+        print(json.dumps(document(found), allow_nan=False, ensure_ascii=False, indent=1))
+    else:
+        _show(found, everything=wanted.everything)
+    if out or not as_json:
+        page = _drawn(found, paths, wanted, out)
+        if page and not as_json:
+            say(f"charts and all scores: {relative(page)}")
+
+
+def _drawn(
+    found: SideBySide, paths: tuple[Path, ...], wanted: Shown, out: Path | None
+) -> Path | None:
+    """The page below `out`, else beside the first run; none, and a line, where that is closed."""
+    beside = paths[0].resolve()
+    beside = (beside if beside.is_dir() else beside.parent).parent
+    folder = (out or beside) / _name(found, paths, wanted)
+    try:
+        try_results(folder, ())
+    except UsageError as error:
+        if out:
+            raise
+        complain(f"no charts: {error}")
+        return None
+    return write_comparison(found, document(found), folder)
+
+
+def _name(found: SideBySide, paths: tuple[Path, ...], wanted: Shown) -> str:
+    """One folder for one comparison: of these runs, filtered and sorted so."""
+    first = found.runs[0].name.partition("+")[0]
+    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
+    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
+    return f"compare-{first[:60]}-{mark}"
+
+
+def _show(found: SideBySide, *, everything: bool) -> None:
+    """The largest change first, then pairs of methods and parameters, on one screen."""
+    columns = width(sys.stdout)
+    warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
+    head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
+    parameters = _parameters(found, columns, everything=everything)
+    shown, more, unseen = pairs(found, every=everything)
+    room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
+    lines, rows, drawn = _pairs(shown, columns, room)
+    for line in (*head, *lines, *parameters):
+        say(line)
+    more += len(shown) - drawn
+    left = sum(len(p.rows) for p in shown) - rows
+    counts = {"scores": left, "pairs of methods": more, "scores without a pair": unseen}
+    if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
+        say(f"left out: {what}; --all, --method, --score or --json show them")
+
+
+def _headline(found: SideBySide) -> str:
+    """How many scores of how many runs, and which one changed most between two of them."""
+    count = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
+    errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
+    changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
+    if not changed:
+        return f"{count}; no error changed."
+    _, change, row = max(changed, key=lambda c: c[0])
+    name = f"{row.method}: {row.score}" if row.method else row.score
+    return f"{count}; largest change: {name}, {100 * change:+.3g} %."
+
+
+def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[str], int, int]:
+    """Lines of the pairs, at most so many; how many rows and pairs they hold."""
+    count = len(shown) if most is None else min(len(shown), max(1, most // (_LEAST + 3)))
+    lines: list[str] = []
+    rows = 0
+    for i, pair in enumerate(shown[:count]):
+        title = wrapped(f"One: {pair.one}; other: {pair.other}", columns, "  ")
+        room = None if most is None else (most - len(lines)) // (count - i) - len(title) - 1
+        found, held = _fitting(pair, columns, room)
+        lines += [*title, *found, ""]
+        rows += held
+    return lines, rows, count
+
+
+def _fitting(pair: Pair, columns: int, room: int | None) -> tuple[list[str], int]:
+    """The first rows of a pair that have room, at least one; and how many."""
+    head, rows = _table(pair)
+    count = len(rows) if room is None else min(len(rows), max(1, room - 1))
+    lines = laid(head, rows[:count], columns)
+    while room is not None and len(lines) > room and count > 1:
+        count -= 1
+        lines = laid(head, rows[:count], columns)
+    return lines, count
+
+
+def _table(pair: Pair) -> tuple[list[str], list[list[str]]]:
+    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
+    if any(r.method for r in pair.rows):
+        head = ["method", *head]
+        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
+    return head, rows
+
+
+def _row(row: Row) -> list[str]:
+    one, other = row.values
+    difference, change = row.differences[1] or 0.0, row.changes[1]
+    sign = "+" if difference > 0 else ""
+    apart = f"{significant(100 * change)} %" if change else text(difference, row.unit)
+    shown = "rounding" if change and abs(change) < _ROUNDING else f"{sign}{apart}"
+    return [row.score, text(one, row.unit), text(other, row.unit), shown, shown_unit(row.unit)]
+
+
+def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[str]:
+    if not found.parameters:
+        return ["No parameter differs."]
+    rows = [[path, *values] for path, values in found.parameters.items()]
+    names = [f"{r.name} {r.created}" for r in found.runs]
+    count = len(rows) if everything else _PARAMETERS
+    lines = laid(["path", *names], rows[:count], columns)
+    if not everything:
+        while len(lines) > 2 * _PARAMETERS and count > 1:
+            count -= 1
+            lines = laid(["path", *names], rows[:count], columns)
+    more = [f"{len(rows) - count} more: see --all"] if len(rows) > count else []
+    return ["Parameters that differ", *lines, *more]
+
+
+def document(found: SideBySide) -> dict[str, Any]:
+    """The comparison as one JSON document, SI."""
+    return {
+        "runs": [
+            {"name": r.name, "experiment": r.experiment, "created": r.created,
+             "recordings": list(r.recordings), "quick": r.quick}
+            for r in found.runs
+        ],
+        "columns": list(found.columns),
+        "scores": [
+            {"method": r.method or None, "score": r.score, "unit": r.unit,
+             "values": list(r.values), "differences": list(r.differences),
+             "changes": list(r.changes)}
+            for r in found.rows
+        ],
+        "parameters": {path: list(values) for path, values in found.parameters.items()},
+        "warnings": list(found.warnings),
+    }  # fmt: skip

@@ -1,0 +1,47 @@
+"""`validate study coverage`: how often our own verdicts are wrong; runs, writes, prints."""
+
+from validate.commands.arguments import FAILED, OK, pairs
+from validate.commands.screen import Passage, rows, sentences
+from validate.commands.study import StudyOptions, answer, noted, printed
+from validate.library import studies
+from validate.study.coverage import page as coverage_page
+from validate.study.coverage.exhibits import HEAD, interval, percent
+from validate.study.coverage.study import Coverage
+
+
+def covering(
+    name: str, common: StudyOptions, *, draws: int | None, noise: float, values: tuple[str, ...]
+) -> int:
+    """Judges drawn recordings of a perfect model; 0 where every check holds."""
+    with noted():
+        done = studies.coverage_of_verdicts(
+            common.experiment(name), common.settings, draws=draws, noise=noise,
+            values=pairs(values, "--set"),
+        )  # fmt: skip
+    if not printed(done.page, common):
+        answer(_passages(done.found), done.found.done, done.page, common.detail)
+    return OK if done.found.passed else FAILED
+
+
+def _passages(found: Coverage) -> list[Passage]:
+    """Whether the verdicts are right as often as they say, then every quantity."""
+    cells = [
+        [f"{q.method}: {q.stated.name}", percent(q.share), interval(q.share), q.finding.word]
+        for q in found.quantities
+    ]
+    cells += [
+        [f"{t.method}: all {t.checks} (Holm)", percent(t.share), interval(t.share),
+         "holds" if t.holds else "too narrow"]
+        for t in found.together
+    ]  # fmt: skip
+    quick = "QUICK: fewer draws; " if found.quick else ""
+    notes = [
+        f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
+        for q in found.quantities if q.finding.words
+    ]  # fmt: skip
+    title = "Verdicts on a perfect model"
+    return [
+        sentences([f"{quick}{coverage_page.sentence(found)}"], None),
+        Passage(title, rows(["", *HEAD, "finding"], cells), 4),
+        sentences(notes, keep=2, most=6),
+    ]

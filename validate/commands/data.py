@@ -1,0 +1,97 @@
+"""`validate data`: recordings made by others by name, and how they come here."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from validate.commands.display import relative, say, table
+from validate.commands.progress import progress
+from validate.datasets.home import cache_folder, searched, whole
+from validate.datasets.registry import DataSet, data_sets, named
+from validate.errors import RecordingError
+
+
+def show(as_json: bool) -> None:
+    """Prints every data set, and where it is here."""
+    if as_json:
+        print(json.dumps([_document(s) for s in data_sets()], ensure_ascii=False, indent=2))
+        return
+    rows = [[s.name, s.title, s.licence, _size(s), _state(s)] for s in data_sets()]
+    table("", ["name", "what", "licence", "files", "here"], rows)
+    say("\n`validate data get NAME` downloads one; the licence of each applies.")
+
+
+def get(name: str) -> None:
+    """Brings a data set into the cache, unless it is here already; says what to cite."""
+    data_set = named(name)
+    if here := _where(data_set):
+        say(f"{data_set.name} is already here: {relative(here / data_set.folder)}", indent="  ")
+    elif data_set.brought:
+        _bring(data_set)
+    else:
+        raise RecordingError(f"{data_set.name} cannot be downloaded: {_made(data_set)}")
+    say(f"licence {data_set.licence}; cite: {data_set.citation} {data_set.page}", indent="  ")
+
+
+def _bring(data_set: DataSet) -> None:
+    from validate.datasets.bring import bring
+
+    with progress(data_set.name) as told:
+        came = bring(data_set, told)
+    place = relative(cache_folder() / data_set.folder)
+    kept = len(data_set.brought) - len(came)
+    say(
+        f"{place}: {len(came)} files downloaded, {kept} already present; every hash is correct",
+        indent="  ",
+    )
+    if data_set.made:
+        say(f"{len(data_set.files) - len(data_set.brought)} files are not downloadable: "
+            f"{_made(data_set)}",
+            indent="  ")  # fmt: skip
+
+
+def _made(data_set: DataSet) -> str:
+    return (
+        f"{data_set.made} ({data_set.page}); put such files into {data_set.folder}/ in the "
+        "folder that VALIDATE_SHARED_DATA names"
+    )
+
+
+def _counts(data_set: DataSet) -> dict[Path, int]:
+    """How many of its files are whole, by the folders that are looked through."""
+    beside = Path.cwd() / "experiments"
+    return {
+        place: sum(whole(place / data_set.folder / f.name, f) for f in data_set.files)
+        for place in searched(beside)
+    }
+
+
+def _where(data_set: DataSet) -> Path | None:
+    whole_in = (p for p, n in _counts(data_set).items() if n == len(data_set.files))
+    return next(whole_in, None)
+
+
+def _state(data_set: DataSet) -> str:
+    place, count = max(_counts(data_set).items(), key=lambda found: found[1])
+    if not count:
+        return "no" if data_set.brought else "no; not downloadable"
+    return relative(place) if count == len(data_set.files) else f"{count} in {relative(place)}"
+
+
+def _size(data_set: DataSet) -> str:
+    return f"{len(data_set.files)}, {sum(f.size for f in data_set.files) / 1e6:.2g} MB"
+
+
+def _document(data_set: DataSet) -> dict[str, Any]:
+    here = _where(data_set)
+    files = [
+        {"name": f.name, "address": data_set.address(f) if f.source else None,
+         "sha256": f.sha256, "bytes": f.size}
+        for f in data_set.files
+    ]  # fmt: skip
+    return {
+        "name": data_set.name, "folder": data_set.folder, "title": data_set.title,
+        "repository": data_set.repository, "commit": data_set.commit,
+        "licence": data_set.licence, "citation": data_set.citation,
+        "made": data_set.made or None, "here": str(here) if here else None, "files": files,
+    }  # fmt: skip

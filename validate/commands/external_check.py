@@ -1,0 +1,88 @@
+"""`validate guest check`: what a program of others can do, and how far off it is; `guest job`: what
+it is given, as a folder to keep."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from validate.commands.arguments import FAILED, OK
+from validate.commands.display import say, table
+from validate.errors import UsageError
+from validate.parameters import nearest_names
+from validate.pipeline.bodies.own_body import meshed, own_body
+from validate.pipeline.experiment.find import find
+from validate.solve.external.job import write_job
+from validate.solve.external.scheme import Guest
+from validate.solve.external.suite import OffBy, check_guest
+
+_STATES = {"finished": "yes", "refused": "no"}
+_TOLERANCE = 1e-6  # asked of a guest's equations
+
+
+def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
+    """Runs the small scenes; fails where a run went wrong, or none was finished.
+
+    How far off a guest may be is its user's to say: no error fails.
+    """
+    guest = Guest(command, seconds=seconds, memory=memory)
+    found = [row for rows in check_guest(guest) for row in rows]
+    if as_json:
+        print(
+            json.dumps(
+                [asdict(row) for row in found], ensure_ascii=False, indent=2, allow_nan=False
+            )
+        )
+    else:
+        _print(found)
+    states = {row.state for row in found}
+    return OK if "finished" in states and states <= set(_STATES) else FAILED
+
+
+def job(
+    name: str,
+    folder: Path,
+    method: str | None,
+    times: int,
+    experiments: tuple[Path, ...],
+    *,
+    inertia: bool,
+    force: bool,
+) -> None:
+    """Writes what a guest is given of one method's scene to an empty `folder`; `force`: to any."""
+    if folder.exists() and any(folder.iterdir()) and not force:
+        raise UsageError(
+            f"-o {folder}: this folder is not empty; name another one, or write there with --force"
+        )
+    own = own_body(find(name, Path.cwd(), experiments))
+    experiment, key = own.experiment, method or own.experiment.accepted[0]
+    if key not in experiment.methods:
+        raise UsageError(f"no method '{key}'; {nearest_names(key, set(experiment.methods))}")
+    options = experiment.methods[key].scene
+    scene = meshed(experiment.build(own.recording, own.parameters, options))
+    seen = experiment.place(own.recording, own.parameters, scene)
+    kept = np.arange(len(seen.t))
+    if not inertia:
+        kept = np.unique(np.linspace(0, len(kept) - 1, times).round().astype(int))
+    folder.mkdir(parents=True, exist_ok=True)
+    made = write_job(folder, scene, seen.t[kept], seen.inputs[kept], inertia, _TOLERANCE)
+    mesh = made.document["mesh"]
+    what = f"{mesh['cells']} {mesh['kind']}, {len(kept)} times"
+    say(f"{folder}: job.json and mesh.vtu of {key}: {what}", indent="  ")
+
+
+def _print(found: Sequence[OffBy]) -> None:
+    head = ["scene", "solved", "quantity", "error", "exact", "unit"]
+    table("", head, [_row(row) for row in found])
+    for row in found:
+        if row.why:
+            say(f"{row.scene}: {row.why}", indent="  ")
+
+
+def _row(row: OffBy) -> list[str]:
+    milli, unit = (1e3, "mm") if row.unit == "m" else (1.0, row.unit)
+    error = "-" if row.error is None else f"{milli * row.error:.3g}"
+    can = _STATES.get(row.state, row.state)
+    return [row.scene, can, row.quantity, error, f"{milli * row.exact:.4g}", unit]

@@ -1,0 +1,53 @@
+"""`validate list`: every experiment by name, without running its file."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+from validate.catalogue import Card, card, experiment_files, name_of, shipped
+from validate.commands.display import relative, say
+from validate.commands.screen import rows
+from validate.datasets.home import searched, whole
+from validate.datasets.registry import data_sets
+
+
+def show(named: tuple[Path, ...], as_json: bool) -> None:
+    """Print name, title and needs of every experiment; a line for each file that is none."""
+    files = experiment_files(Path.cwd(), named)
+    cards = [card(path) for path in files.values()]
+    if as_json:
+        print(json.dumps([asdict(c) for c in cards], ensure_ascii=False, indent=2))
+        return
+    here = {c.needs: _is_here(c.needs) for c in cards if c.needs}
+    cells = [[c.name, c.title, _needs(c, here)] for c in cards if not c.note]
+    for line in rows(["name", "what", "needs"], cells, soft=1):
+        print(line)
+    if not all(here.values()):
+        print("*: not here yet; `validate data get NAME` fetches it")
+    for c in cards:
+        for text in (c.note, _hides(files[c.name])):
+            if text:
+                say(f"{relative(files[c.name])}: {text}", indent="  ")
+
+
+def _needs(found: Card, here: Mapping[str, bool]) -> str:
+    if not found.needs:
+        return "-"
+    return found.needs if here[found.needs] else f"{found.needs} *"
+
+
+def _is_here(name: str) -> bool:
+    """Whether the files of a data set are in a folder that experiments search."""
+    found = next((s for s in data_sets() if s.name == name), None)
+    if found is None:
+        return False
+    places = searched(Path.cwd() / "experiments")
+    return any(all(whole(p / found.folder / f.name, f) for f in found.files) for p in places)
+
+
+def _hides(file: Path) -> str:
+    """What a file of the user's stands for, when the package has one of that name."""
+    theirs = experiment_files(shipped())
+    other = theirs.get(name_of(file), file).resolve() != file.resolve()
+    return "this file replaces the shipped experiment of this name" if other else ""

@@ -1,0 +1,195 @@
+"""`validate outline`: outlines found in a recording's images, or drawn by others, as a stream."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validate.commands.arguments import complain
+from validate.commands.display import say
+from validate.commands.progress import progress
+from validate.errors import RecordingError, UsageError
+from validate.files import safe_name
+from validate.places import try_file
+from validate.recording.mcap.write import write_recording
+from validate.recording.outlines.followed import EXPERTS, FollowedOutline, Hint, followed
+from validate.recording.outlines.foreign_outline import foreign_outlines
+from validate.recording.outlines.outline import RivalRegion
+from validate.recording.readers import read_recording
+from validate.recording.types import Contours, Frames, Recording
+from validate.report.charts.encode import png
+from validate.report.scenes.outline_images import PlaceSaid, outlines_over
+from validate.report.sections.observed import Held
+from validate.units import in_si, split
+
+_SHOWN = 6  # images of the picture
+_SURE = 0.75  # confidence below which it is said
+
+
+def outline(
+    file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, given: dict[str, Any]
+) -> None:
+    """Adds the outlines of the images `topic` to the recording in `file` as the stream `name`."""
+    recording = read_recording(file)
+    out = out or _same(file, recording)
+    try_file(out)
+    images = topic or _only(recording)
+    frames = recording.frame(images)
+    _require_free(recording, name)
+    marks: tuple[PlaceSaid, ...] = ()
+    if drawn is None:
+        contours, told, marks = _found(frames, images, given)
+    else:
+        contours, told = _drawn(drawn, frames, images, given)
+    records = {**recording.metadata, f"found/{name}": {"images": images, **told}}
+    streams = {**recording.contours, name: contours}
+    write_recording(replace(recording, contours=streams, metadata=records), out)
+    for key, text in told.items():
+        say(f"{key}: {text}", indent="  ")
+    _pictured(frames, contours, out.with_name(f"{out.stem}-{safe_name(name)}.png"), marks)
+    say(
+        f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
+        indent="  ",
+    )
+
+
+def _same(file: Path, recording: Recording) -> Path:
+    """The recording itself, unless that would lose what is no stream here."""
+    if recording.unread:
+        raise UsageError(
+            f"{file.name} has {len(recording.unread)} topics that are not read and would be "
+            "lost: write to another file, -o OUT.mcap"
+        )
+    return file
+
+
+def _only(recording: Recording) -> str:
+    if len(recording.frames) != 1:
+        raise UsageError(
+            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
+            if recording.frames
+            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
+        )
+    return next(iter(recording.frames))
+
+
+def _require_free(recording: Recording, name: str) -> None:
+    """Outlines that this command made may be made again."""
+    if name in recording.streams and f"found/{name}" not in recording.metadata:
+        raise UsageError(f"{recording.name} already has a stream '{name}': choose --name OTHER")
+
+
+def _found(
+    frames: Frames, images: str, given: dict[str, Any]
+) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
+    for option in ("sd", "unit", "label"):
+        if given[option]:
+            raise UsageError(f"--{option} is for third-party outlines; give it with --from FILE")
+    hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
+                given["shape"], given["bright"])  # fmt: skip
+    with progress("outlines") as told:
+        found = followed(frames, hint, images, told, given["confidence"])
+    _warned(found)
+    return found.contours, _told(found, hint), _marks(found, hint)
+
+
+def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
+    """What was said, a radius alone about the outline, and the other regions."""
+    first = found.contours.outlines[0].mean(axis=0)
+    said = PlaceSaid("as given", first if hint.centre is None else hint.centre, hint.radius, True)
+    others = (
+        PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
+    )
+    return (*([] if hint.centre is None and hint.radius is None else [said]), *others)
+
+
+def _warned(found: FollowedOutline) -> None:
+    if found.rivals:
+        named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
+        complain(
+            f"{len(found.rivals)} other regions are as distinct as the outline: {named}; to choose "
+            "one, give --centre X,Y"
+        )
+    if found.confidence.min() < _SURE:
+        complain(f"confidence falls to {found.confidence.min():.2f}: check the picture")
+    if found.without:
+        i, why = next(iter(found.without.items()))
+        complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
+
+
+def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
+    sd, c = found.contours.sd, found.confidence
+    assert found.contours.each is not None
+    own = 1e3 * found.contours.each[:, 0]
+    told = {
+        "confidence": f"{c.min():.2f} to {c.max():.2f}",
+        "sd": f"{1e3 * sd:.3g} mm ({own.min():.3g} to {own.max():.3g}), {EXPERTS:.2f} times "
+        "that of the wall on twins, the error of experts' outlines in other data: assumed, not "
+        "measured on these images",
+        "searched": f"{'bright' if hint.bright else 'dark'} region, {hint.shape}, from "
+        + ("the given centre" if hint.centre is not None else "the most distinct disc"),
+        "rivals": _named(found.rivals),
+    }
+    if found.beside:
+        told["near the given centre"] = _named(found.beside)
+    if found.without:
+        told["left out"] = ", ".join(map(str, found.without))
+    return told
+
+
+def _named(regions: tuple[RivalRegion, ...]) -> str:
+    return "; ".join(f"{r.words}: {r.share:.2f}" for r in regions) or "none"
+
+
+def _drawn(
+    path: Path, frames: Frames, images: str, given: dict[str, Any]
+) -> tuple[Contours, dict[str, str]]:
+    useless = [k for k in ("centre", "radius", "bright") if given[k]]
+    if useless:
+        raise UsageError(f"--{useless[0]} is for searched outlines; leave it out with --from")
+    if given["sd"] is None:
+        raise UsageError(
+            f"{path.name} does not contain the uncertainty of its outlines along their normal; "
+            f"give "
+            "it, as --sd 0.3mm or 2px"
+        )
+    sd = _length("--sd", given["sd"], frames)
+    unit, label = given["unit"] or "px", given["label"] or ""
+    contours = foreign_outlines(path, frames, images, sd or 0.0, unit, label)
+    told = {"drawn by others": path.name, "sd": f"{given['sd']}, as given"}
+    return contours, {**told, "label": label} if label else told
+
+
+def _place(text: str | None, frames: Frames) -> Any:
+    """X,Y in pixels or with units, from the first pixel's centre, m."""
+    if text is None:
+        return None
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
+    return np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
+
+
+def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> float | None:
+    if text is None:
+        return None
+    number, unit = split(text.strip()) or (np.nan, "")
+    metres = number * frames.m_per_px[axis] if unit == "px" else None
+    value = in_si(number, unit, "m") if unit not in ("px", "") else metres
+    if value is None or not np.isfinite(value) or (value <= 0 and option != "--centre"):
+        raise UsageError(f"{option} {text}: expected a length with its unit, as 8mm or 80px")
+    return float(value)
+
+
+def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[PlaceSaid, ...]) -> None:
+    """Up to six images, evenly, with their outlines; in the first one what was said of the place
+    and what else might be meant."""
+    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
+    holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
+    try:
+        picture = outlines_over(frames, contours, holds, "evenly spaced in time", "", marks=marks)
+        file.write_bytes(png(picture))
+    except OSError as error:
+        raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error
+    say(f"{file}: {len(at)} images with their outlines: check them", indent="  ")

@@ -1,0 +1,4 @@
+"""Questions of `validate new`, and the declaration that the answers make.
+
+Start with `new`.
+"""

@@ -1,0 +1,154 @@
+"""Kinds of questions about a measured body: what each takes, checked as it is answered."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from validate.commands.questions.asking import Question
+from validate.commands.questions.kind import quantity_in
+from validate.errors import UsageError
+from validate.parameters import with_values
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.drive import FEWEST
+from validate.pipeline.bodies.markers import AS_SEEN
+from validate.pipeline.plates.choices import recorded_sides
+from validate.recording.types import Recording
+from validate.scene.body_facts import SAME, largest_side, odd_size
+from validate.scene.contact import Indenter, RigidContact
+from validate.scene.material import Material
+from validate.scene.mesh import Mesh
+from validate.scene.places import GRAMMAR, place_of
+
+_SIDES = {
+    "block": (
+        ("width", "thickness", "height"),
+        "sizes along x, y, z from the origin, as 60mm,45mm,70mm",
+    ),
+    "cylinder": (("diameter", "height"), "diameter and height, axis z, as 25mm,30mm"),
+}
+NOTED, RELEASE = "noted", "release"  # answers to what loads the body
+UNKNOWN, NONE, RECORDED = "unknown", "none", "recorded"
+
+
+_OWNERS: Mapping[str, Any] = {
+    "material": Material(1.0, 0.3, rho=1.0),
+    "indenter": Indenter("plate"),
+}
+_INDENTER: Any = Indenter("plate")
+_PARTS: Mapping[str, tuple[Any, str]] = {
+    "moved.noted": (MeasuredBody(), "noted"),
+    "indenter.friction": (RigidContact("moved", "zmax", _INDENTER), "friction"),
+}
+
+
+_SIDES_OF = {"body.block": 3, "body.cylinder": 2}
+
+
+def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
+    """A parameter's value as --set takes it."""
+    return Question(path, text, default, why, open=not default, check=parsed(path))
+
+
+def size_question(recording: Recording, shape: str) -> Question:
+    """Return the question about the sides of a block or cylinder; the header's are proposed.
+
+    A header with some of the sides names these in the question.
+    """
+    known = recorded_sides(recording)
+    names, text = _SIDES[shape]
+    if all(name in known for name in names):
+        proposed = ",".join(f"{1e3 * known[name]:.9g}mm" for name in names)
+        why = f"{', '.join(names)} in the header of the recording"
+        return by_path(f"body.{shape}", text, proposed, why)
+    held = [f"{name} {1e3 * known[name]:.6g} mm" for name in names if name in known]
+    return by_path(
+        f"body.{shape}", text + (f"; the header gives {', '.join(held)}" if held else "")
+    )
+
+
+def sides(text: str, count: int) -> tuple[float, ...]:
+    """So many lengths m; raises `UsageError` for another number of them."""
+    found = tuple(map(quantity_in("m"), text.split(",")))
+    if len(found) != count:
+        raise UsageError(f"'{text}': {len(found)} lengths; expected {count}")
+    return found
+
+
+def a_known_modulus(text: str) -> None:
+    if text == UNKNOWN:
+        raise UsageError("identifying it needs a compared force (seen.force) and a displacement "
+                         "(moved.by a signal in m); give a value")  # fmt: skip
+    parsed("material.E")(text)
+
+
+def parsed(key: str, skip: str = "") -> Callable[[str], Any]:
+    """A check of the parameter that an answer is of."""
+    if key in _SIDES_OF:
+        return lambda text: sides(text, _SIDES_OF[key])
+    first, _, last = key.partition(".")
+    part, path = _PARTS.get(key) or ((_OWNERS[first], last) if first in _OWNERS else (
+        MeasuredBody(), key))  # fmt: skip
+    return lambda text: None if text == skip else with_values(part, {path: text})
+
+
+def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
+    """The first of them says what words there are; it is asked in every interview."""
+    named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
+    words = f": {GRAMMAR}{named}; join several with +" if key == "held.all" else ""
+    return Question(
+        key, f"{text}{words}{'' if is_open else '; empty: none'}",
+        open=is_open, check=lambda words: mesh is None or place_of(words, mesh),
+    )  # fmt: skip
+
+
+def by_topic(key: str, text: str, topics: list[str]) -> Question:
+    return Question(key, text, topics[0], "the first in the recording", choices=(*topics, NONE))
+
+
+def three_of(names: Sequence[str]) -> Callable[[str], Any]:
+    def check(text: str) -> None:
+        chosen = [part.strip() for part in text.split(",")]
+        if absent := [n for n in chosen if n not in names]:
+            raise UsageError(f"no marker {', '.join(absent)}; there are {', '.join(names)}")
+        if len(set(chosen)) < FEWEST:
+            raise UsageError(f"{len(set(chosen))} markers; at least {FEWEST} are needed")
+
+    return check
+
+
+def there(text: str) -> None:
+    if not Path(text).is_file():
+        raise UsageError("no such file; paths start from the current folder")
+
+
+def a_layout(text: str) -> None:
+    if text not in (RECORDED, AS_SEEN):
+        there(text)
+
+
+def known_size(key: str, mesh: Mesh | None, unit: str) -> list[Question]:
+    """Return the question about the largest side of a body, where it is unusual."""
+    if mesh is None or not (odd := odd_size(mesh, unit)):
+        return []
+    side = largest_side(mesh)
+
+    def check(text: str) -> None:
+        if abs(quantity_in("m")(text) / side - 1) > SAME:
+            raise UsageError(
+                f"the file's largest side is {1e3 * side:.4g} mm; if that is wrong, change the unit"
+            )
+
+    return [Question(key, f"largest side of the body, as 3mm, to confirm its unit: the body is "
+                          f"{odd}",
+                     open=True, check=check)]  # fmt: skip
+
+
+def facets_of(mesh: Mesh | None) -> Callable[[str], Any]:
+    return lambda name: mesh is None or mesh.facet_nodes(name)
+
+
+def unit_of(recording: Recording, topic: str) -> str:
+    if topic == NOTED:
+        return "m"
+    found = recording.signals.get(topic)
+    return found.unit if found is not None else ""

@@ -1,0 +1,158 @@
+"""`validate import` and `merge`."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from validate.commands.arguments import complain, pairs
+from validate.commands.display import say
+from validate.errors import UsageError
+from validate.files import member, members
+from validate.identify.repeats import averaged, labels_of
+from validate.places import try_file
+from validate.recording.chain import require_chain
+from validate.recording.clocks.alignment import declared_offset, shift
+from validate.recording.formats.unread import known_unread
+from validate.recording.images.image import AS_IT_IS
+from validate.recording.mcap.recover import recover
+from validate.recording.mcap.write import write_recording
+from validate.recording.merge import merge
+from validate.recording.motion_capture.text_rows import ASSUMED, LEFT_OUT, ZEROS
+from validate.recording.readers import (
+    READERS,
+    named,
+    read_recording,
+    recognised,
+    recognises,
+)
+from validate.recording.scales import odd_scales
+from validate.recording.tables.every import ALL, every_specimen
+from validate.recording.types import Recording
+
+_NAMED = 6  # streams or fields that are named one by one
+
+
+def import_files(
+    files: tuple[Path, ...],
+    kind: str | None,
+    out: Path,
+    mapping: tuple[str, ...],
+    specimens: str | None,
+    given: Mapping[str, Any],
+) -> None:
+    """Reads foreign files, of the `kind` that they show where none is said, as a recording;
+    several are repeats of one test of a testing machine."""
+    try_file(out)
+    said = pairs(mapping, "--map") | {k: str(v) for k, v in given.items() if v is not None}
+    found = _logs(files, kind)
+    logs = [log for file in found for log in _read(file, kind, said)]
+    if len(logs) == 1 and specimens is None:
+        recording = logs[0]
+    else:
+        recording = averaged(logs, labels_of(specimens, logs), out.stem)
+        _tell(recording)
+    require_chain(recording)
+    write_recording(recording, out)
+    written(recording, out)
+    for line in _besides(recording):
+        complain(line)
+    ask_back(recording)
+
+
+def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
+    """The files, and of a folder that is no format of its own those in it, in their order."""
+    if len(files) > 1 or not files[0].is_dir() or kind:
+        return list(files)
+    if known_unread(files[0]) or any(recognises(reader, files[0]) for reader in READERS):
+        return list(files)
+    return [member(file) for file in members(files[0])] or list(files)
+
+
+def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recording]:
+    """A file as its reader makes it, all its specimens where that is said, and what decided."""
+    reader = named(kind) if kind else recognised(file)
+    every = said.get("specimen") == ALL
+    found = every_specimen(reader, file, said) if every else [reader.read(file, said)]
+    why = "as given by --as" if kind else f"because {reader.sign}"
+    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
+    for recording in found:
+        _tell(recording)
+    return found
+
+
+def _tell(recording: Recording) -> None:
+    """What was assumed or taken as not seen, where a scale is from, how deep images became 8 bits,
+    by which lens they are straight, what is told of a stream, and events, of which none is one."""
+    for key, text in recording.metadata.get(ASSUMED, {}).items():
+        say(f"{key}: {text}", indent="  ")
+    made = recording.metadata.get("provenance", {})
+    for key in (ASSUMED, ZEROS, "scale", "levels", "lens", "events", *recording.streams):
+        if made.get(key, AS_IT_IS) != AS_IT_IS:
+            say(f"{key}: {made[key]}", indent="  ")
+
+
+def recover_file(
+    files: tuple[Path, ...],
+    kind: str | None,
+    out: Path,
+    mapping: tuple[str, ...],
+    given: Mapping[str, Any],
+) -> None:
+    """Saves what of an MCAP file without an end is whole, and says what is missing."""
+    more = mapping or any(v is not None for v in given.values())
+    if kind not in (None, "mcap") or more or len(files) > 1:
+        raise UsageError("--recover copies messages unchanged: it takes only one FILE and -o")
+    try_file(out)
+    found = recover(files[0], out)
+    for line in found.lines:
+        say(line, indent="  ")
+    topics = ", ".join(f"{topic} ({count})" for topic, count in found.counts.items())
+    say(f"{out}: {topics}; {out.stat().st_size / 1e3:.0f} kB", indent="  ")
+
+
+def _besides(recording: Recording) -> list[str]:
+    """What of the file did not become a stream."""
+    left = [r[LEFT_OUT] for r in recording.metadata.values() if r.get(LEFT_OUT)]
+    unread = [f"{topic}: {why}" for topic, why in recording.unread.items()]
+    if len(unread) > _NAMED:
+        unread = [f"{len(unread)} fields; the first: {unread[0]}; `validate inspect` lists them"]
+    return [f"not read: {text}" for text in (*left, *unread)]
+
+
+def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
+    """Writes one recording with all streams, moved where the user says so."""
+    try_file(out)
+    merged = merge([read_recording(f) for f in files], out.stem)
+    require_chain(merged)
+    for topic, text in pairs(shifts, "--shift").items():
+        merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
+    write_recording(merged, out)
+    written(merged, out)
+    if not shifts and len(files) > 1:
+        complain(
+            "all files are assumed to share one clock. If each recorder had its own clock, "
+            "`validate align` measures the offset; --shift TOPIC=SECONDS sets a known one"
+        )
+    ask_back(merged)
+
+
+def ask_back(recording: Recording) -> None:
+    """A line on standard error for every scale of images or outlines that is beyond reason."""
+    for line in odd_scales(recording):
+        complain(line)
+
+
+def _seconds(topic: str, text: str) -> tuple[float, float]:
+    seconds, _, sd = text.partition(":")
+    try:
+        return float(seconds), float(sd or "nan")
+    except ValueError:
+        raise UsageError(f"--shift {topic}={text}: expected SECONDS or SECONDS:SD") from None
+
+
+def written(recording: Recording, out: Path) -> None:
+    """Says which streams a file got and how large it is."""
+    size = out.stat().st_size / 1e3
+    names = list(recording.streams)
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    say(f"{out}: {', '.join(names[:_NAMED])}{more}; {size:.0f} kB", indent="  ")

@@ -1,0 +1,108 @@
+"""Where cells run, for as long as a command lasts: this process, local workers or a scheduler."""
+
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+from validate.engine.cell import Where
+from validate.errors import UsageError
+from validate.fem.kernels.threads import idle_now
+
+
+class Pool:
+    """Workers that start when they are first needed, or before that in the background (`begin`).
+
+    They end with the block: `with Pool(where) as pool`. `preload` names the modules that a worker
+    needs, which are imported once for all of them. `shares`: the calling process does what it can
+    until they have started, so that one alone is none. Raises `UsageError` for fewer than none.
+    """
+
+    def __init__(self, where: Where, preload: Sequence[str] = (), *, shares: bool = False) -> None:
+        if where.workers is not None and where.workers < 0:
+            raise UsageError(f"--workers {where.workers}: expected 0 (in this process) or more")
+        self._where, self._preload = where, tuple(preload)
+        count = idle_now() if where.workers is None else where.workers
+        self.workers = 0 if shares and count == 1 else count
+        self._stack, self._count = ExitStack(), 0
+        self._client: Any = None
+        self._error: BaseException | None = None
+        self._starting: threading.Thread | None = None
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._starting:
+            self._starting.join()
+        self._stack.close()
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler that runs; "" where workers are local."""
+        return self._where.scheduler
+
+    @property
+    def used(self) -> bool:
+        """Whether cells are sent at all."""
+        return bool(self.address) or self.workers > 0
+
+    @property
+    def busy(self) -> int:
+        """Workers that have started."""
+        return self._count if self._client else 0
+
+    @property
+    def words(self) -> str:
+        return f"Dask at {self.address}" if self.address else f"{self._count} local"
+
+    def prepare(self) -> None:
+        """Has what workers need imported, in a process that they are forked from later."""
+        if self.workers and not self.address:
+            from validate.engine.server import serve
+
+            serve(self._preload)
+
+    def begin(self, most: int | None = None) -> None:
+        """Starts the workers in the background, at most so many."""
+        if self._starting or not self.used:
+            return
+        self._count = self.workers if most is None else min(self.workers, most)
+        self.prepare()
+        self._starting = threading.Thread(target=self._start, daemon=True)
+        self._starting.start()
+
+    def client(self, most: int | None = None) -> Any:
+        """The client of the workers, started where they are not; waits for them.
+
+        Raises `UsageError` when the scheduler cannot be reached.
+        """
+        self.begin(most)
+        assert self._starting is not None
+        self._starting.join()
+        if self._error:
+            raise self._error
+        return self._client
+
+    def beside(
+        self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
+    ) -> Callable[[], list[Any]]:
+        """Begins to apply a function of a module to `shared` and each item, on local workers where
+        some have started; what it returns waits for the values, in order.
+
+        Without workers, and where one dies, an item is done in this process when it is asked for.
+        Raises what the function raises.
+        """
+        if self.address or not self.busy:
+            return lambda: [function(shared, item) for item in items]
+        from validate.engine.cluster import side_by_side
+
+        return side_by_side(self._client, function, shared, items)
+
+    def _start(self) -> None:
+        from validate.engine.cluster import connected  # Dask takes a second
+
+        try:
+            self._client = self._stack.enter_context(connected(self._where, self._count))
+        except BaseException as error:
+            self._error = error

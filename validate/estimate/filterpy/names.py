@@ -1,0 +1,34 @@
+"""The one door to filterpy (2.0, MIT): its names, and what its ensemble draws from."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import filterpy.kalman.ensemble_kalman_filter as fp_ensemble
+from filterpy.kalman import (
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    KalmanFilter,
+    MerweScaledSigmaPoints,
+    UnscentedKalmanFilter,
+)
+
+__all__ = [
+    "EnsembleKalmanFilter",
+    "ExtendedKalmanFilter",
+    "KalmanFilter",
+    "MerweScaledSigmaPoints",
+    "UnscentedKalmanFilter",
+    "drawing",
+]
+
+
+@contextmanager
+def drawing(draws: Callable[..., Any]) -> Iterator[None]:
+    """The ensemble filter draws from `draws` (mean, covariance, size) instead."""
+    before = fp_ensemble.multivariate_normal
+    fp_ensemble.multivariate_normal = draws
+    try:
+        yield
+    finally:
+        fp_ensemble.multivariate_normal = before

@@ -1,0 +1,165 @@
+"""Our small filters beside filterpy's: exact pairs on small systems, agreement to rounding."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.estimate.filterpy.filters import kalman
+from validate.estimate.filterpy.linear_model import LinearModel
+from validate.estimate.filterpy.names import (
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    MerweScaledSigmaPoints,
+    UnscentedKalmanFilter,
+    drawing,
+)
+from validate.estimate.kalman.formulas import (
+    Gaussian,
+    ekf_predict,
+    ekf_update,
+    kf_predict,
+    kf_update,
+)
+from validate.estimate.reduced.sampled_kalman import (
+    SigmaPoints,
+    enkf_predict,
+    enkf_update,
+    ensemble_gaussian,
+    ukf_predict,
+    ukf_update,
+)
+
+
+@dataclass(frozen=True)
+class OracleRow:
+    """Our filter beside filterpy's: the largest difference in any entry of x or P (of order 1)."""
+
+    pair: str
+    states: int
+    steps: int
+    largest: float
+
+
+def oracle_table(steps: int = 60, seed: int = 1) -> tuple[OracleRow, ...]:
+    """Every pair on a small system of its kind, every seventh measurement missing."""
+    pairs = (_kalman_pair, _extended_pair, _unscented_pair, _ensemble_pair)
+    return tuple(pair(steps, np.random.default_rng(seed)) for pair in pairs)
+
+
+# A pendulum with damping, seen through the sine of its angle.
+_STEP = 0.05
+_Q, _R = np.diag([1e-4, 1e-3]), np.array([[1e-2]])
+_START = Gaussian(np.array([0.6, 0.0]), np.diag([0.1, 0.2]))
+
+
+def _f(x: Floats) -> Floats:
+    return np.array([x[0] + _STEP * x[1], 0.98 * x[1] - _STEP * 9.81 * np.sin(x[0])])
+
+
+def _f_jacobian(x: Floats) -> Floats:
+    return np.array([[1.0, _STEP], [-_STEP * 9.81 * np.cos(x[0]), 0.98]])
+
+
+def _h(x: Floats) -> Floats:
+    return np.array([np.sin(x[0])])
+
+
+def _h_jacobian(x: Floats) -> Floats:
+    return np.array([[np.cos(x[0]), 0.0]])
+
+
+def _measured(steps: int, rng: np.random.Generator, m: int) -> list[Floats | None]:
+    return [None if k % 7 == 6 else rng.normal(0, 0.5, m) for k in range(steps)]
+
+
+def _apart(ours: Gaussian, guest: Any) -> float:
+    """Largest difference in mean and covariance."""
+    return float(max(np.abs(ours.x - guest.x).max(), np.abs(ours.P - guest.P).max()))
+
+
+def _kalman_pair(steps: int, rng: np.random.Generator) -> OracleRow:
+    n, m, l = 6, 3, 2
+    F = 0.4 * rng.normal(size=(n, n))
+    model = LinearModel(
+        F,
+        rng.normal(size=(n, l)),
+        rng.normal(size=(m, n)),
+        0.1 * np.eye(n),
+        0.2 * np.eye(m),
+        np.zeros(n),
+        np.eye(n),
+    )
+    guest, ours, worst = kalman(model), Gaussian(model.x0, model.P0), 0.0
+    for z in _measured(steps, rng, m):
+        loads = rng.normal(size=l)
+        guest.predict(u=loads)
+        guest.update(z)
+        ours = kf_predict(ours, model.F, model.Q, model.B @ loads)
+        ours = ours if z is None else kf_update(ours, z, model.H, model.R).posterior
+        worst = max(worst, _apart(ours, guest))
+    return OracleRow("KalmanFilter", n, steps, worst)
+
+
+def _extended_pair(steps: int, rng: np.random.Generator) -> OracleRow:
+    guest = ExtendedKalmanFilter(2, 1)
+    guest.x, guest.P, guest.Q, guest.R = _START.x.copy(), _START.P.copy(), _Q, _R
+
+    def predict_x(_: float = 0) -> None:
+        guest.x = _f(guest.x)
+
+    guest.predict_x = predict_x  # its own is linear
+    ours, worst = _START, 0.0
+    for z in _measured(steps, rng, 1):
+        guest.F = _f_jacobian(guest.x)
+        guest.predict()
+        guest.update(z, _h_jacobian, _h)
+        ours = ekf_predict(ours, _f, _f_jacobian, _Q)
+        ours = ours if z is None else ekf_update(ours, z, _h, _h_jacobian, _R).posterior
+        worst = max(worst, _apart(ours, guest))
+    return OracleRow("ExtendedKalmanFilter", 2, steps, worst)
+
+
+def _unscented_pair(steps: int, rng: np.random.Generator) -> OracleRow:
+    sigma = SigmaPoints(0.5, 2.0, 1.0)
+    points = MerweScaledSigmaPoints(2, sigma.alpha, sigma.beta, sigma.kappa)
+    guest = UnscentedKalmanFilter(2, 1, _STEP, _h, lambda x, _: _f(x), points)
+    guest.x, guest.P, guest.Q, guest.R = _START.x.copy(), _START.P.copy(), _Q, _R
+    ours, worst = _START, 0.0
+    for z in _measured(steps, rng, 1):
+        guest.predict()
+        guest.update(z)
+        ours = ukf_predict(ours, _f, _Q, sigma)
+        ours = ours if z is None else ukf_update(ours, z, _h, _R, sigma).posterior
+        worst = max(worst, _apart(ours, guest))
+    return OracleRow("UnscentedKalmanFilter", 2, steps, worst)
+
+
+def _ensemble_pair(steps: int, rng: np.random.Generator) -> OracleRow:
+    """Both get the same draws: the guest's generator is replaced while the pair runs."""
+    N, draws = 20, _Draws(rng)
+    with drawing(draws):
+        guest = EnsembleKalmanFilter(_START.x, _START.P, 1, _STEP, N, _h, lambda x, _: _f(x))
+        guest.Q, guest.R = _Q, _R
+        members, worst = draws.last.copy(), 0.0
+        for z in _measured(steps, rng, 1):
+            guest.predict()
+            members = enkf_predict(members, _f, draws.last)
+            guest.update(z)
+            if z is not None:
+                members = enkf_update(members, z, _h, _R, draws.last)
+            worst = max(worst, float(np.abs(members - guest.sigmas).max()))
+            worst = max(worst, float(np.abs(ensemble_gaussian(members).x - guest.x).max()))
+    return OracleRow("EnsembleKalmanFilter", 2, steps, worst)
+
+
+class _Draws:
+    """Normal draws that are remembered."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng, self.last = rng, np.zeros((0, 0))
+
+    def __call__(self, mean: Floats, cov: Floats, size: int) -> Floats:
+        self.last = self.rng.multivariate_normal(mean, cov, size)
+        return self.last.copy()

@@ -1,0 +1,95 @@
+"""A linear system in few modes with unknown load, as a model whose state is the whole state.
+
+x = (q, q', r, b): amplitudes and rates of the lowest modes, the rest r and a bias b in N of every
+load, which walks at random. Every mode is exact for loads held at their end value over a step. What
+a load does statically to the modes left out follows with its own time constant, c/k of its shape:
+at once without damping, but with stiffness damping the stiffest modes creep as slowly as the rest.
+Unlike paper 001's filter the rate is estimated too, and what the filter doubts is the load, so that
+a correction moves every node as the load would.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.estimate.filterpy.linear_model import LinearModel
+from validate.estimate.measurements import Measurements
+from validate.fem.modes import Modes, modes_of
+from validate.fem.system import System
+from validate.solve.dynamic.modal import exact_walk, left_out
+
+
+@dataclass(frozen=True)
+class LoadDoubt:
+    """How unsure the loads are: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
+
+    `jitter` N (sd) is force noise of each step on its own.
+    """
+
+    start: float
+    walk: float
+    jitter: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("start", "walk", "jitter"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise SceneError(
+                    f"uncertainty of the load, {name} = {value:g}: expected a number >= 0"
+                )
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """`model` of x (n,); the free unknowns are `lift` (m, n) x; the last `loads` states are biases
+    in N."""
+
+    model: LinearModel
+    lift: Floats
+    loads: int
+
+
+def reduced_model(
+    system: System, measurements: Measurements, dt: float, modes: int, doubt: LoadDoubt, R: Floats
+) -> ReducedModel:
+    """The model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
+
+    Raises `SceneError` for damping that couples the modes.
+    """
+    lowest = modes_of(system, min(modes, len(system.free)))
+    rest = left_out(system, lowest, np.ascontiguousarray(system.loads[system.free]))
+    F, B = _transition(system, lowest, _kept(system, rest, dt), dt)
+    l = rest.shape[1]
+    lift = np.hstack([lowest.shapes, np.zeros_like(lowest.shapes), rest, np.zeros_like(rest)])
+    H, n = measurements.free(system.free) @ lift, lift.shape[1]
+    P0 = np.zeros((n, n))
+    P0[-l:, -l:] = doubt.start**2 * np.eye(l)
+    Q = doubt.jitter**2 * (B @ B.T)
+    Q[-l:, -l:] += doubt.walk**2 * dt * np.eye(l)
+    return ReducedModel(LinearModel(F, B, H, Q, np.diag(R), np.zeros(n), P0), lift, l)
+
+
+def _transition(system: System, modes: Modes, kept: Floats, dt: float) -> tuple[Floats, Floats]:
+    """F (n, n) and B (n, l): modes exact for a force held in the step, rests, biases."""
+    walk = exact_walk(modes, dt, "constant")
+    assert walk.rate is not None
+    (qq, qv, _, _, qf), (vq, vv, _, _, vf) = walk.q, walk.rate
+    forces = modes.shapes.T @ system.loads[system.free]
+    r, l = forces.shape
+    B = np.vstack([qf[:, None] * forces, vf[:, None] * forces, np.diag(1 - kept), np.zeros((l, l))])
+    F = np.zeros((len(B), len(B)))
+    F[: 2 * r, : 2 * r] = np.block([[np.diag(qq), np.diag(qv)], [np.diag(vq), np.diag(vv)]])
+    F[2 * r : 2 * r + l, 2 * r : 2 * r + l] = np.diag(kept)
+    F[:, -l:] = B  # a bias is a load
+    F[-l:, -l:] = np.eye(l)
+    return F, B
+
+
+def _kept(system: System, rest: Floats, dt: float) -> Floats:
+    """Share (l,) of the rests that stays over a step: exp(-dt k / c), 0 without damping."""
+    K, C = (X[system.free][:, system.free] for X in (system.K, system.C))
+    k, c = (np.einsum("ij,ij->j", rest, X @ rest) for X in (K, C))
+    creeps = (c > 0) & (k > 0)
+    return np.where(creeps, np.exp(-dt * k / np.where(creeps, c, 1.0)), 0.0)

@@ -1,0 +1,301 @@
+"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7); masses by scikit-fem.
+
+The stiffness is pointwise, mixed or with nodal mean dilatation; materials may differ from cell to
+cell.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementHex1,
+    ElementHex2,
+    ElementQuad1,
+    ElementTetP1,
+    ElementTetP2,
+    ElementTriP1,
+    ElementTriP2,
+    MeshHex,
+    MeshQuad,
+    MeshTet,
+    MeshTri,
+    asm,
+)
+from skfem.models.elasticity import lame_parameters
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.assembly.cells import rule, values_at, volumes_at
+from validate.fem.assembly.mean_dilatation import projections
+from validate.fem.assembly.surface import surface_stiffness
+from validate.scene.material import Material
+from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.scene import Scene
+from validate.scene.shape_functions import simplex_slopes, symmetric_points
+
+# The library's mesh and element, and the degree that a mass is integrated to.
+_ELEMENTS = {
+    "tri3": (MeshTri, ElementTriP1, 2),
+    "tri6": (MeshTri, ElementTriP2, 4),
+    "tet4": (MeshTet, ElementTetP1, 2),
+    "tet10": (MeshTet, ElementTetP2, 4),
+    "quad4": (MeshQuad, ElementQuad1, 3),
+    "hex8": (MeshHex, ElementHex1, 3),
+    "hex27": (MeshHex, ElementHex2, 5),
+}
+# Our corners in the order in which the library lists a hexahedron's.
+_HEXAHEDRON = (0, 4, 3, 1, 7, 5, 2, 6)
+
+
+def stiffness(scene: Scene) -> sparse.csr_array:
+    """K (N, N) N/m of the scene's mesh and material, N = n d, node-major.
+
+    In 2-D of the scene's plane state and thickness (1 m: N/m per metre).
+
+    Raises `SceneError` for an inverted element, named, or an element kind that is not assembled.
+    """
+    require_positive_cells(scene.mesh)
+    if scene.dilatation == "nodal_mean":
+        K = _nodal_mean_stiffness(scene)
+    else:
+        K = _assembled(scene, *(scene.thickness * c for c in lame_constants(scene)))
+    for part in surface_stiffness(scene):
+        K = K + part
+    return sparse.csr_array(K)
+
+
+def harmonic(scene: Scene) -> sparse.csr_array:
+    """grad v : grad u (N, N) m of the scene's mesh, for unknowns that a boundary held all round
+    leaves free: 2 eps : eps less div v div u, which differs from it by a surface integral alone."""
+    shear, both = (
+        stiffness(replace(scene, material=Material(E, nu), regions=(), dilatation="pointwise"))
+        for E, nu in ((2.0, 0.0), (2.5, 0.25))  # Lame's (0, 1) and (1, 1) Pa
+    )
+    return sparse.csr_array(2 * shear - both)
+
+
+def stiffness_damping(scene: Scene) -> sparse.csr_array:
+    """The share of C (N, N) N s/m that is proportional to K: sum over cells of beta_e K_e."""
+    if scene.dilatation == "nodal_mean":
+        return sparse.csr_array(scene.material.stiffness_damping * stiffness(scene))
+    beta = scene.thickness * scene.per_cell(lambda m: m.stiffness_damping)
+    return _assembled(scene, *(beta * c for c in lame_constants(scene)))
+
+
+def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
+    """Consistent M (N, N) kg, in 2-D of the thickness; with `damping`, its share of C in N s/m.
+
+    Raises `SceneError` where a material has no density.
+    """
+    materials = (scene.material, *(r.material for r in scene.regions))
+    if any(m.rho is None for m in materials):
+        raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
+    weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
+    weight, basis = scene.thickness * weight, _basis(scene.mesh)
+    scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
+    if scene.mesh.kind == "hex27":
+        theirs = _renumbered(basis.doflocs.T, scene.mesh.nodes)
+        scalar = scalar[theirs][:, theirs]
+    else:
+        _require_node_major(basis.doflocs, scene.mesh.nodes, 1)
+    return sparse.csr_array(sparse.kron(scalar, np.eye(scene.mesh.dimension)))
+
+
+def _weighted_mass(u: Any, v: Any, w: Any) -> Any:
+    return w["weight"] * u * v
+
+
+def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
+    """Diagonal masses (N,) kg with the body's mass: row sums, for quadratic elements HRZ.
+
+    Row sums of quadratic elements are zero or negative at vertices; Hinton, Rock & Zienkiewicz
+    (1976) scale the diagonal instead.
+    """
+    if scene.mesh.order == 1:
+        return np.asarray(M.sum(axis=1), dtype=np.float64).ravel()
+    diagonal: Floats = M.diagonal()
+    if not diagonal.any():  # the damping of a body without mass damping
+        return diagonal
+    return np.asarray(diagonal * (M.sum() / diagonal.sum()))
+
+
+def lame_constants(scene: Scene) -> tuple[Floats, Floats]:
+    """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2). At nu = 0.5
+    lambda is that of the penalty beside unknown pressures (`fem.assembly.incompressible`)."""
+    stress = scene.plane == "stress"
+    return scene.per_cell(_plane_stress if stress else _lambda), scene.per_cell(_mu)
+
+
+def _lambda(m: Material) -> float:
+    if m.incompressible:
+        return m.assembled_bulk_modulus - 2 / 3 * m.shear_modulus
+    return float(lame_parameters(m.E, m.nu)[0])
+
+
+def _plane_stress(m: Material) -> float:
+    return m.E * m.nu / (1 - m.nu**2)
+
+
+def _mu(m: Material) -> float:
+    return m.shear_modulus
+
+
+def library_mesh(mesh: Mesh) -> Any:
+    """The vertices and cells as scikit-fem has them, its order of corners included."""
+    order = _HEXAHEDRON if mesh.bricks and mesh.dimension == 3 else slice(None)
+    corners = np.ascontiguousarray(mesh.corners[:, order].T)
+    vertices = int(mesh.corners.max()) + 1
+    return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
+
+
+def _basis(mesh: Mesh) -> Basis:
+    _, element, mass_degree = _ELEMENTS[mesh.kind]
+    return Basis(library_mesh(mesh), element(), intorder=mass_degree)
+
+
+def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:
+    """Stiffness with the Lame constants (e,) Pa of every cell.
+
+    For shapes a, b with slopes g: K_ab = sum of w (lam g_a g_b^T + mu g_b g_a^T + mu g_a.g_b 1),
+    all of it from the sums of w g_ai g_bj. As scikit-fem's `linear_elasticity`, five times as fast.
+    Mixed cells take kappa = lam + 2 mu/3 with the projected volume strain, -2 mu/3 with its own.
+    """
+    mesh = scene.mesh
+    points = stiffness_points(mesh)
+    slopes, weights = points.slopes, points.weights
+    e, q, a, d = slopes.shape
+    g = slopes.reshape(e, q, a * d)
+    mixed = scene.dilatation == "mixed"
+    if mixed:
+        mean = projections(mesh, points.places, weights) @ g
+        volume = np.swapaxes(mean * weights[..., None], 1, 2) @ mean
+        volume *= (lam + 2 / 3 * mu)[:, None, None]
+        lam = -2 / 3 * mu
+    outer = (np.swapaxes(g * weights[..., None], 1, 2) @ g).reshape(e, a, d, a, d)
+    dots = np.einsum("eaibi->eab", outer)[:, :, None, :, None] * np.eye(d)[:, None, :]
+    lam, mu = (c[:, None, None, None, None] for c in (lam, mu))
+    cells = lam * outer + mu * (np.swapaxes(outer, 2, 4) + dots)
+    cells = cells.reshape(e, a * d, a * d)
+    return _summed(mesh, cells + volume if mixed else cells)
+
+
+def mean_divergence(scene: Scene) -> tuple[sparse.csr_array, Floats]:
+    """D (e q, N) so that D u is the projected volume strain of mixed cells at their points, and the
+    points' weights (e, q) m^d."""
+    points, mesh = stiffness_points(scene.mesh), scene.mesh
+    e, q, a, d = points.slopes.shape
+    mean = projections(mesh, points.places, points.weights) @ points.slopes.reshape(e, q, a * d)
+    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(e, 1, a * d)
+    columns = np.broadcast_to(unknowns, mean.shape).ravel()
+    starts = np.arange(0, mean.size + 1, a * d)
+    D = sparse.csr_array((mean.ravel(), columns, starts), shape=(e * q, mesh.nodes.size))
+    return D, points.weights
+
+
+@dataclass(frozen=True)
+class StiffnessPoints:
+    """The points that integrate a stiffness: dN/dx (e, q, a, d) 1/m, weights times volume (e, q)
+    m^d, places (e, q, d) m."""
+
+    slopes: Floats
+    weights: Floats
+    places: Floats
+
+
+def stiffness_points(mesh: Mesh) -> StiffnessPoints:
+    """Bricks at order + 1 Gauss points along each axis; straight-sided simplices at one point, or
+    quadratic at the points of equal weight that integrate products of slopes."""
+    if mesh.bricks:
+        at = rule(mesh, mesh.order + 1)
+        dxi = np.linalg.inv(at.jacobians(mesh.nodes[mesh.cells]))
+        slopes = np.einsum("qaj,eqji->eqai", at.dN, dxi)
+        return StiffnessPoints(slopes, volumes_at(mesh, at), values_at(mesh, at, mesh.nodes))
+    d, dL = mesh.dimension, shape_gradients(mesh)
+    L = np.full((1, d + 1), 1 / (d + 1)) if mesh.order == 1 else symmetric_points(d, 2)[0]
+    slopes = simplex_slopes(mesh.order, L)
+    slopes = (slopes.reshape(-1, d + 1) @ dL).reshape(len(dL), *slopes.shape[:2], d)
+    weights = np.repeat(cell_volumes(mesh)[:, None] / len(L), len(L), axis=1)
+    return StiffnessPoints(slopes, weights, L @ mesh.nodes[mesh.corners])
+
+
+def _summed(mesh: Mesh, K: Floats) -> sparse.csr_array:
+    """The matrices (e, k, k) of all cells in one (N, N), N = n d, node-major."""
+    d = mesh.dimension
+    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(len(K), -1).astype(np.int32)
+    rows, columns = (np.broadcast_to(u, K.shape).ravel()
+                     for u in (unknowns[:, :, None], unknowns[:, None, :]))  # fmt: skip
+    entries = sparse.coo_array((K.ravel(), (rows, columns)), shape=2 * (mesh.nodes.size,))
+    return sparse.csr_array(entries)
+
+
+def _renumbered(places: Floats, nodes: Floats) -> Ints:
+    """The library's unknown at each of our nodes; it numbers edges and faces in its own order."""
+    distance, theirs = cKDTree(places).query(nodes)
+    if np.max(distance) > 1e-9 * np.ptp(nodes) or len(np.unique(theirs)) != len(nodes):
+        raise AssertionError("scikit-fem has unknowns at other places than the nodes of the mesh")
+    return np.asarray(theirs, dtype=np.int64)
+
+
+def _require_node_major(places: Floats, nodes: Floats, per_node: int) -> None:
+    """The library's unknowns must lie where ours do, or every result would be permuted."""
+    if not np.allclose(places, np.repeat(nodes, per_node, axis=0).T, atol=1e-9 * np.ptp(nodes)):
+        raise AssertionError("scikit-fem numbers its unknowns differently from the mesh")
+
+
+def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
+    """K = K_dev + D^T kappa V D: the volume strain is averaged over the cells around each node.
+
+    D (n, N) maps displacements to nodal dilatations theta_a = sum_e V_e/4 div_e / V_a. The
+    deviatoric part is the full stiffness less its pointwise volumetric part.
+    Source: nodal averaging after Bonet & Burton (1998), for small strain.
+    """
+    mesh, material = scene.mesh, scene.material
+    B, volumes = divergence(mesh)
+    kappa = material.bulk_modulus
+    # A material without volume stiffness shares its deviatoric part with this one.
+    pointwise = B.T @ sparse.diags_array(kappa * volumes) @ B
+    ones = np.ones(len(mesh.cells))
+    K_dev = _assembled(scene, _lambda(material) * ones, _mu(material) * ones) - pointwise
+    share = _cell_to_node(mesh.corners, volumes, len(mesh.nodes))
+    V = np.asarray(share.sum(axis=1))
+    D = sparse.diags_array(1 / V) @ share @ B
+    return sparse.csr_array(K_dev + D.T @ sparse.diags_array(kappa * V) @ D)
+
+
+def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
+    """B (e, N) so that B u is the volume strain of every linear cell, and volumes (e,) m^d."""
+    return rows_of_cells(mesh, shape_gradients(mesh)), cell_volumes(mesh)
+
+
+def rows_of_cells(mesh: Mesh, values: Floats) -> sparse.csr_array:
+    """A row (e, N) for every cell with its corners' values (e, d + 1, d)."""
+    cells, d = mesh.corners, mesh.dimension
+    columns = (cells[..., None] * d + np.arange(d)).reshape(len(cells), -1)
+    rows = np.repeat(np.arange(len(cells)), columns.shape[1])
+    shape = (len(cells), len(mesh.nodes) * d)
+    return sparse.csr_array((values.ravel(), (rows, columns.ravel())), shape=shape)
+
+
+def shape_gradients(mesh: Mesh) -> Floats:
+    """dN_a/dx (e, d + 1, d) 1/m of the linear shape functions of every simplex.
+
+    Raises `SceneError` for bricks, whose gradients vary within the cell.
+    """
+    if mesh.bricks:
+        raise SceneError(f"elements of kind {mesh.kind} have no constant strain; use simplices")
+    x = mesh.nodes[mesh.corners]
+    inverse = np.linalg.inv(x[:, 1:] - x[:, :1])
+    rest = np.swapaxes(inverse, 1, 2)
+    return np.concatenate([-rest.sum(axis=1, keepdims=True), rest], axis=1)
+
+
+def _cell_to_node(corners: Ints, volumes: Floats, n: int) -> sparse.csr_array:
+    per = corners.shape[1]
+    columns = np.repeat(np.arange(len(corners)), per)
+    values = np.repeat(volumes / per, per)
+    return sparse.csr_array((values, (corners.ravel(), columns)), shape=(n, len(corners)))

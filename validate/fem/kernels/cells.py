@@ -1,0 +1,269 @@
+"""Compiled element loops of tet4 that take one cell after the other: laws with branches and
+logarithms, which no vector register takes, memories of viscoelastic cells, and looks at energies.
+
+Geometry is (blocks, 11 x 16), or with the card of a law (blocks, 11 + k, 16): the compiler knows
+which, so that neither kind is in the code of the other. Cells (blocks, 4, 16) hold 8 x node. The
+coupled forms take about 120 ns a cell, Ogden of three terms 1 us.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.fem.kernels.laws import (
+    Four,
+    energy_invariants,
+    energy_ogden,
+    first_coupled,
+    first_ogden,
+    first_split,
+    product_invariants,
+    product_ogden,
+)
+from validate.fem.kernels.nodes_in_lanes import BLOCK
+from validate.fem.kernels.points import (
+    INVARIANTS,
+    INVARIANTS_COUPLED,
+    OGDEN,
+    OGDEN_COUPLED,
+    energy,
+    first_neo_hooke,
+    rest,
+    row,
+)
+from validate.fem.kernels.tensors import (
+    Nine,
+    Six,
+    Three,
+    combined,
+    deformation,
+    inlined,
+    inverse,
+    product,
+    times,
+    transposed,
+    volume,
+)
+
+ROWS = 11  # of geometry: 9 gradients of nodes 1-3, 2 moduli times volume; a law's card follows
+
+
+@inlined
+def _number(geometry: Floats, block: int, k: int, l: int) -> float:
+    if geometry.ndim == 3:
+        return float(geometry[block, k, l])
+    return float(geometry[block, k * BLOCK + l])
+
+
+@inlined
+def gradients(geometry: Floats, block: int, l: int) -> Nine:
+    """dN/dX of nodes 1-3."""
+    return (
+        _number(geometry, block, 0, l), _number(geometry, block, 1, l),
+        _number(geometry, block, 2, l), _number(geometry, block, 3, l),
+        _number(geometry, block, 4, l), _number(geometry, block, 5, l),
+        _number(geometry, block, 6, l), _number(geometry, block, 7, l),
+        _number(geometry, block, 8, l),
+    )  # fmt: skip
+
+
+@inlined
+def _unknowns(cells: Any, block: int, l: int) -> tuple[Any, Any, Any, Any]:
+    """First unknowns of a cell's nodes. Unsigned: a sign would be tested for at every access."""
+    eight, three = np.uint64(8), np.uint64(3)
+    return (
+        np.uint64(cells[block, 0, l]) // eight * three,
+        np.uint64(cells[block, 1, l]) // eight * three,
+        np.uint64(cells[block, 2, l]) // eight * three,
+        np.uint64(cells[block, 3, l]) // eight * three,
+    )
+
+
+@inlined
+def _three(u: Floats, n: Any) -> Three:
+    return u[n], u[n + np.uint64(1)], u[n + np.uint64(2)]
+
+
+@inlined
+def _gradient(G: Nine, cells: Any, block: int, l: int, u: Floats) -> Nine:
+    """du/dX of a cell."""
+    n0, n1, n2, n3 = _unknowns(cells, block, l)
+    o, x, y, z = _three(u, n0), _three(u, n1), _three(u, n2), _three(u, n3)
+    U = (
+        x[0] - o[0], y[0] - o[0], z[0] - o[0], x[1] - o[1], y[1] - o[1], z[1] - o[1],
+        x[2] - o[2], y[2] - o[2], z[2] - o[2],
+    )  # fmt: skip
+    return product(U, G)
+
+
+@inlined
+def _add(f: Floats, n: Any, x: Three) -> None:
+    for i in range(3):
+        f[n + np.uint64(i)] += x[i]
+
+
+@inlined
+def _add_forces(f: Floats, cells: Any, block: int, l: int, P: Nine, G: Nine) -> None:
+    """Adds V P g of all four nodes."""
+    n0, n1, n2, n3 = _unknowns(cells, block, l)
+    f1, f2, f3 = times(P, row(G, 0)), times(P, row(G, 1)), times(P, row(G, 2))
+    _add(f, n0, rest(f1, f2, f3))
+    _add(f, n1, f1)
+    _add(f, n2, f2)
+    _add(f, n3, f3)
+
+
+@inlined
+def _four(card: Floats, b: float) -> Four:
+    """C10 V, C01 V, C20 V, C30 V of mu V and the last three of them."""
+    return 0.5 * b - card[0], card[0], card[1], card[2]
+
+
+@inlined
+def _first(law: int, H: Nine, a: float, b: float, card: Floats) -> Nine:
+    """V P of the laws that have a card."""
+    if law == INVARIANTS:
+        return first_split(H, a, _four(card, b))
+    if law == INVARIANTS_COUPLED:
+        return first_coupled(H, a, _four(card, b))
+    return first_ogden(law == OGDEN_COUPLED, H, a, card)
+
+
+@inlined
+def _first_along(law: int, H: Nine, D: Nine, a: float, b: float, card: Floats) -> Nine:
+    """V dP along D of the laws that have a card."""
+    if law < OGDEN:
+        return product_invariants(law == INVARIANTS_COUPLED, H, D, a, _four(card, b))
+    return product_ogden(law == OGDEN_COUPLED, H, D, a, card)
+
+
+@inlined
+def add_carded(law: int, geometry: Floats, cells: Any, u: Floats, f: Floats) -> None:
+    """Adds the forces of laws that have a card."""
+    for block in range(cells.shape[0]):
+        for l in range(BLOCK):
+            G, card = gradients(geometry, block, l), geometry[block, ROWS:, l]
+            H = _gradient(G, cells, block, l, u)
+            a, b = geometry[block, 9, l], geometry[block, 10, l]
+            _add_forces(f, cells, block, l, _first(law, H, a, b, card), G)
+
+
+@inlined
+def add_carded_products(
+    law: int, geometry: Floats, cells: Any, u: Floats, v: Floats, f: Floats
+) -> None:
+    for block in range(cells.shape[0]):
+        for l in range(BLOCK):
+            G, card = gradients(geometry, block, l), geometry[block, ROWS:, l]
+            H, D = _gradient(G, cells, block, l, u), _gradient(G, cells, block, l, v)
+            a, b = geometry[block, 9, l], geometry[block, 10, l]
+            _add_forces(f, cells, block, l, _first_along(law, H, D, a, b, card), G)
+
+
+@inlined
+def _dyad(axis: int, g: Three) -> Nine:
+    """e g^T."""
+    x, y, z = 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
+    return (
+        x * g[0], x * g[1], x * g[2], y * g[0], y * g[1], y * g[2], z * g[0], z * g[1], z * g[2]
+    )  # fmt: skip
+
+
+@inlined
+def add_carded_blocks(
+    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats
+) -> None:
+    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,), by their columns."""
+    rows = np.uint64(3 * d.size // f.size)
+    for block in range(cells.shape[0]):
+        for l in range(BLOCK):
+            G, card = gradients(geometry, block, l), geometry[block, ROWS:, l]
+            H = _gradient(G, cells, block, l, u)
+            a, b = geometry[block, 9, l], geometry[block, 10, l]
+            _add_forces(f, cells, block, l, _first(law, H, a, b, card), G)
+            g1, g2, g3 = row(G, 0), row(G, 1), row(G, 2)
+            for k, n in enumerate(_unknowns(cells, block, l)):
+                g = g1 if k == 1 else g2 if k == 2 else g3 if k == 3 else rest(g1, g2, g3)
+                x = y = z = (0.0, 0.0, 0.0)
+                for axis in range(3):
+                    column = times(_first_along(law, H, _dyad(axis, g), a, b, card), g)
+                    x, y, z = y, z, column
+                o = n // np.uint64(3) * rows
+                _add(d, o, (x[0], y[1], z[2]))
+                if rows == np.uint64(6):
+                    _add(d, o + np.uint64(3), (x[1], x[2], y[2]))
+
+
+@inlined
+def _pulled_back(P: Nine, G: Nine) -> Six:
+    """F^-1 P of a symmetric result, G = F^-T: xx, yy, zz, xy, xz, yz."""
+    S = product(transposed(G), P)
+    return S[0], S[4], S[8], S[1], S[2], S[5]
+
+
+@inlined
+def _late(memory: Floats, series: Floats, block: int, l: int, S: Six) -> Nine:
+    """V times the sum of the branches' stresses after a step that ends at V S; remembers both."""
+    x, y, z, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(series.shape[1] // 2):
+        decay, gain, o = series[block, 2 * k, l], series[block, 2 * k + 1, l], 6 * (k + 1)
+        for i in range(6):
+            change = gain * (S[i] - memory[block, i, l])
+            memory[block, o + i, l] = decay * memory[block, o + i, l] + change
+        x += memory[block, o, l]
+        y += memory[block, o + 1, l]
+        z += memory[block, o + 2, l]
+        xy += memory[block, o + 3, l]
+        xz += memory[block, o + 4, l]
+        yz += memory[block, o + 5, l]
+    for i in range(6):
+        memory[block, i, l] = S[i]
+    return x, xy, xz, xy, y, yz, xz, yz, z
+
+
+@inlined
+def add_late(
+    law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, memory: Floats, series: Floats
+) -> None:
+    """Forces of a viscoelastic body in a split form at the end of a step (`fem.laws.viscous`)."""
+    for block in range(cells.shape[0]):
+        for l in range(BLOCK):
+            G = gradients(geometry, block, l)
+            a, b = _number(geometry, block, 9, l), _number(geometry, block, 10, l)
+            H = _gradient(G, cells, block, l, u)
+            if geometry.ndim == 3:
+                P = _first(law, H, 0.0, b, geometry[block, ROWS:, l])
+            else:
+                P = first_neo_hooke(H, 0.0, b)
+            X, dJ = inverse(H)
+            late = product(deformation(H), _late(memory, series, block, l, _pulled_back(P, X)))
+            P = combined(1.0, combined(1.0, P, 1.0, late), 0.5 * a * dJ * (dJ + 2), X)
+            _add_forces(f, cells, block, l, P, G)
+
+
+@inlined
+def _energy_carded(law: int, H: Nine, a: float, b: float, dJ: float, card: Floats) -> float:
+    if law < OGDEN:
+        return energy_invariants(law == INVARIANTS_COUPLED, H, a, _four(card, b), dJ)
+    return energy_ogden(law == OGDEN_COUPLED, H, a, card, dJ)
+
+
+@inlined
+def cells_looked_at(
+    law: int, count: int, geometry: Floats, cells: Any, u: Floats
+) -> tuple[float, float, int]:
+    """Strain energy J, least det F and number of det F <= 0 of the first `count` cells."""
+    total, least, inverted = 0.0, np.inf, 0
+    for block in range(cells.shape[0]):
+        for l in range(min(BLOCK, count - block * BLOCK)):
+            H = _gradient(gradients(geometry, block, l), cells, block, l, u)
+            a, b = _number(geometry, block, 9, l), _number(geometry, block, 10, l)
+            dJ, _ = volume(H)
+            least = min(least, 1 + dJ)
+            inverted += not 1 + dJ > 0
+            if geometry.ndim == 3:
+                total += _energy_carded(law, H, a, b, dJ, geometry[block, ROWS:, l])
+            else:
+                total += energy(law, H, a, b, dJ)
+    return total, least, inverted

@@ -1,0 +1,4 @@
+"""Bodies at large strain: assembled for Newton, or as compiled forces for explicit steps.
+
+Start with `hyperelastic`.
+"""

@@ -1,0 +1,21 @@
+"""The library: what scripts and notebooks call, on the same functions as the commands.
+
+`run` and `open_run` give a `RunResult`, `study` a `StudyResult`: both read the folder that the
+command would have written. `docs/python.md` is the manual; `public_names.toml` lists what is
+promised.
+"""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "experiments": ("load",),
+    "single_run": ("run",),
+    "run_result": ("RunCheck", "RunResult", "open_run"),
+    "named_study": ("study",),
+    "study_result": ("StudyResult",),
+    "comparison": ("RunComparison", "compare"),
+    "recordings": ("open_recording",),
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -1,0 +1,101 @@
+"""One run with its report: what the command `validate run` and the function `run` share."""
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from validate.compare.result import Result
+from validate.engine.finish import CELLS, Report
+from validate.engine.pool import Pool
+from validate.pipeline.calibration.calibrated import Identify, here
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.external import with_guests
+from validate.pipeline.experiment.options import Options, doubtful
+from validate.pipeline.run.cells import InStore
+from validate.pipeline.run.named_run import reports_of, run_folder
+from validate.pipeline.run.reused import rests_on
+from validate.pipeline.run.road import compare
+from validate.report.stored.folder import STUDIES, locked, try_results
+from validate.report.stored.history import replaced
+from validate.report.write import kept_report, write_report
+
+LOG = logging.getLogger(__name__)
+Progress = Callable[[str], AbstractContextManager[Report]]  # of a title: what work reports to
+
+
+@contextmanager
+def no_progress(title: str) -> Iterator[Report]:
+    """Show nothing of what the work reports."""
+    yield lambda done, total, what: None
+
+
+@dataclass(frozen=True)
+class ReportedRun:
+    """A result, the path of its report.html, and what was taken from earlier runs, for the end of a
+    sentence."""
+
+    result: Result
+    page: Path
+    words: str
+
+
+def reported_run(
+    plain: Experiment,
+    options: Options,
+    pool: Pool,
+    out: Path | None = None,
+    *,
+    command: tuple[str, ...] = (),
+    progress: Progress = no_progress,
+    vtu: bool = False,
+) -> ReportedRun:
+    """Run an experiment on the cells that are stored, and write its report below `out`.
+
+    A report that would be the same is kept. `command` is recorded as what made it. A value that
+    looks as if its unit was forgotten is a warning. Raises children of `ValidateError` for bad
+    input, and `UsageError` for a folder that cannot be written, before anything runs.
+    """
+    experiment = with_guests(plain, options.guests)
+    folder = run_folder(experiment, options, out)
+    made_by = rests_on(experiment, options, command)
+    warn_of_units(experiment, options)
+    with locked(folder), progress(experiment.name) as report:
+        try_results(folder, (STUDIES, CELLS))
+        store = reports_of(experiment.path, out) / experiment.name
+        by = InStore(plain, options, store, pool)
+        identify = _identify(experiment, options, out, report, pool)
+        result = compare(experiment, options, report, identify, by)
+        if before := kept_report(result, folder, made_by, vtu=vtu):
+            words = f"{by.words}, the report of {before} is unchanged"
+            return ReportedRun(result, folder.resolve() / "report.html", words)
+        created = datetime.now(UTC).isoformat(timespec="seconds")
+        page = write_report(
+            result, folder, created=created, made=made_by, vtu=vtu, beside=pool.beside,
+            progress=lambda part: report(1, 1, f"writes the report: {part}"),
+        )  # fmt: skip
+    if old := replaced(page.parent, created):
+        LOG.warning(
+            "%s held a run of %s with other settings; its history line is kept: see `validate "
+            "history %s`", page.parent.name, old["created"], experiment.name,
+        )  # fmt: skip
+    return ReportedRun(result, page, by.words)
+
+
+def warn_of_units(experiment: Experiment, options: Options) -> None:
+    """Warn of each value that looks like one whose unit was forgotten."""
+    for line in doubtful(experiment, options.values):
+        LOG.warning(line)
+
+
+def _identify(
+    experiment: Experiment, options: Options, out: Path | None, report: Report, pool: Pool
+) -> Identify:
+    """What stands open is identified as `validate identify` does, on the same kept cells."""
+    if not experiment.calibrations:
+        return here
+    from validate.study.identify.study import beside
+
+    return beside(experiment, options, out, report, pool)

@@ -1,1 +1,0 @@
-"""Paper 002: what explicit steps, lumping and quasi-statics cost in accuracy."""

@@ -1,1 +1,0 @@
-"""Paper 004: asynchronous regions around a touched place."""

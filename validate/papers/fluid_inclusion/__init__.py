@@ -1,1 +1,0 @@
-"""Paper 000: a fluid inclusion in a gelatin phantom, Gosline, Salcudean, Yan (2004)."""

@@ -1,1 +1,0 @@
-"""Particles in a gel before and after indentation (FranckLab/SerialTrack)."""

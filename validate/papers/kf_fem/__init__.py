@@ -1,1 +1,0 @@
-"""Paper 001: Kalman filter finite elements on a small block under traction."""

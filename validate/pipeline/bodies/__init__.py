@@ -1,0 +1,4 @@
+"""Any measured body: its mesh, what moves it, its markers and its motion.
+
+Start with `measured`.
+"""

@@ -1,0 +1,88 @@
+"""Programs of others beside our own: error, verdict, rate and memory in one table."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from validate.compare.exhibit import Exhibit, NumberTable, TableCell
+from validate.compare.verdict import Check
+from validate.pipeline.checks.checks import Terms, terms_of
+from validate.pipeline.experiment.external import guests_of
+from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.runs import Road
+from validate.solve.external.scheme import Guest, changes
+
+_HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptance",
+         "validation", "rate / Hz", "memory / MB", "ended")  # fmt: skip
+_OURS = "this one"
+_MB = 1e-6
+_WORDS = (
+    "All use the u_val of the accepted method: its measurement, inputs and mesh error. The "
+    "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
+    "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
+    "peak of the external simulator's largest process; for our methods it is the peak of the "
+    "whole `validate` process until then."
+)
+
+
+def guest_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
+    """The table and what guests were found to do otherwise; nothing where no guest was run."""
+    guests = guests_of({n: m for n, m in road.methods.items() if n in main})
+    if not guests:
+        return ()
+    accepted = [n for n in road.experiment.accepted if n in main][:1]
+    terms = {k: t for n in accepted for _, one in terms_of(road, main[n]) for k, t in one.items()}
+    rows = [r for f in main.values() for r in _rows(f, road.methods[f.method].settings, terms)]
+    said = [(main[n].label, line) for n in guests for line in _findings(main[n])]
+    tables = [NumberTable("guests", "External simulators and our methods", _HEAD, tuple(rows))]
+    if said:
+        head = ("simulator", "deviations and failures")
+        tables.append(NumberTable("guest_findings", "Findings", head, tuple(said)))
+    return (Exhibit("guests", "External simulators", (_WORDS,), tables=tuple(tables)),)
+
+
+def _findings(guest: Followed) -> list[str]:
+    lines = [w for run in guest.runs for w in run.said if not w.startswith("guest: ")]
+    return list(dict.fromkeys(lines))
+
+
+def _rows(
+    f: Followed, settings: Any, terms: Mapping[str, Terms]
+) -> list[tuple[TableCell | float | str | None, ...]]:
+    """A row a check; one alone where it was not run, or has nothing that is checked."""
+    run, guest = f.run, isinstance(settings, Guest)
+    named = [line.removeprefix("guest: ") for line in run.said if line.startswith("guest: ")]
+    program = next(iter(named), "-") if guest else _OURS
+    rate = _rate(f, settings)
+    memory = _MB * run.memory or None
+    end = run.outcome.state + (f": {run.outcome.why}" if run.outcome.why else "")
+    cost = (rate, memory, end)
+    judged = [t.judge(f.residuals[k]) for k, t in terms.items() if k in f.residuals]
+    if not judged and not guest:
+        return []
+    if not judged or not run.finished:
+        return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
+    return [
+        (f.label, program, c.name, *_figures(c), c.acceptance, c.validation, *cost) for c in judged
+    ]
+
+
+def _rate(f: Followed, settings: Any) -> float | None:
+    """Steps a second; of statics only those whose inputs are new count: others are answered by
+    what is there."""
+    run, handles = f.run, getattr(settings, "handles", None)
+    if run.step_s is None:
+        return None
+    still = handles is not None and not handles.inertia
+    if not still or run.seconds is None or f.seen.inputs.shape[0] < len(run.seconds):
+        return run.step_s.rate_hz
+    new = changes(f.seen.t[: len(run.seconds)], f.seen.inputs[: len(run.seconds)])
+    at = np.searchsorted(f.seen.t, new.t)
+    return 1 / float(np.median(run.seconds[at]))
+
+
+def _figures(check: Check) -> tuple[TableCell, TableCell, TableCell]:
+    numbers = (check.value, 2 * check.u_val, check.margin)
+    value, doubt, margin = (TableCell(n, check.unit) for n in numbers)
+    return value, doubt, margin

@@ -1,0 +1,343 @@
+"""The ladder of an experiment that declares none: derived from its scene and its recording.
+
+Elements are those its cells allow, meshes coarser and finer ones of the same body, solvers all that
+know its kind; those that refuse it are rows with the reason. Errors are against the finest mesh of
+the ladder: a reference, not a measurement.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError, UsageError
+from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.large_strain.explicit import knows_single
+from validate.pipeline.bodies.own_body import OwnBody, own_body, with_law
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.ladder.ladder import (
+    LARGEST,
+    QUALITY,
+    LawPair,
+    Rival,
+    StabilityBody,
+    Trial,
+    marker_noise,
+    squeezed,
+    turned,
+)
+from validate.pipeline.ladder.references import (
+    ORDERS,
+    exact_in_ramps,
+    still_best,
+    still_pair,
+    swinging_pair,
+)
+from validate.pipeline.ladder.touched import touched_ladder
+from validate.scene.geometries.box import centroids
+from validate.scene.geometries.remeshed import linear, of_element
+from validate.scene.material import LawName, Material
+from validate.scene.mesh import Mesh, require_positive_cells
+from validate.scene.scene import Load, Scene
+from validate.solve.candidates import StillBody, SwingingBody
+from validate.solve.explicit.central import CentralDifference
+from validate.solve.schemes import candidates
+
+_LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh
+_COARSER = (0.5, 0.7, 1.0)  # of the reference's level
+_UNKNOWNS, _QUICK_UNKNOWNS = 30_000, 6_000  # of the reference
+_STEPS, _QUICK_STEPS = 500, 100  # of the recording's time
+_FRAMES = 40
+_POINTS = 16
+_TOUCHED, _QUICK_TOUCHED = 7_000, 1_500  # of a touched reference, stepped in parts
+_DERIVED = (
+    "The experiment declares no ladder: this one is derived from its scene. A mesh's "
+    "number is its cells along an edge, in percent of the experiment's mesh."
+)
+_INSIDE = 1e-9  # of the body's size: a point within rounding of a face is on it
+
+
+def trial_of(experiment: Experiment, quick: bool) -> Trial:
+    """What the experiment declares, else a ladder of its own scene."""
+    if experiment.ladder is None or experiment.ladder.trial is None:
+        return _trial(own_body(experiment), quick)
+    recording = experiment.load(experiment.parameters, folder_of(experiment))[0]
+    return experiment.ladder.trial(recording, experiment.parameters, quick)
+
+
+def body_of(experiment: Experiment) -> StabilityBody | None:
+    """What the experiment declares, else its own body; None where it has no density."""
+    if experiment.ladder and experiment.ladder.body:
+        return experiment.ladder.body
+    own = own_body(experiment)
+    if own.scene.material.rho is None:
+        return None
+    _require_instants(own)
+    return _body(own)
+
+
+# --- error against time ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Loading:
+    """Inputs (nt, k) at times (nt,) s from rest on, and the time in which they come on."""
+
+    t: Floats
+    y: Floats
+    rise_s: float
+    dynamic: bool
+
+    def inputs(self, t: Floats) -> Floats:
+        columns = [np.interp(t, self.t, column) for column in self.y.T]
+        return np.stack(columns, axis=1)
+
+
+def _untaken(own: OwnBody) -> UsageError:
+    """Of a scene that is touched by a probe, where nothing on the ladder takes it."""
+    return UsageError(
+        f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which a "
+        f"derived ladder does not support; run the experiment, or declare its ladder"
+    )
+
+
+def _trial(own: OwnBody, quick: bool) -> Trial:
+    if own.scene.tools:
+        return _touched(own, quick)
+    meshes, reference = _meshes(own, _QUICK_UNKNOWNS if quick else _UNKNOWNS, quick)
+    loading = _loading(own)
+    dt, frames = _steps_and_frames(loading, quick)
+    solvers, pair = _solvers(own, meshes, dt, loading)
+
+    def build(element: str, level: int, law: LawName) -> Scene:
+        return with_law(of_element(own.at(level), element), law)
+
+    return Trial(
+        build=build,
+        size=own.size,
+        meshes=meshes,
+        orders={element: ORDERS[element] for element in {*meshes, reference[0]}},
+        steps=dt,
+        inputs=loading.inputs,
+        frames=frames,
+        points=_points(own, meshes, reference),
+        reference=reference,
+        best=exact_in_ramps if loading.dynamic else still_best(bool(own.scene.cavities)),
+        solvers=solvers,
+        pair=pair,
+        dynamic=loading.dynamic,
+        rise_s=loading.rise_s,
+        noise=marker_noise(own.recording),
+        notes=(_DERIVED,),
+    )
+
+
+def _touched(own: OwnBody, quick: bool) -> Trial:
+    """Under a probe: the experiment's own methods, linear cells, smaller bodies."""
+    known = touched_ladder(own, 100)
+    if known is None:
+        raise _untaken(own)
+    element = _elements(linear(own.scene.mesh), own.scene)[0]
+    levels = _touched_levels(own, _QUICK_TOUCHED if quick else _TOUCHED)
+    ladder = touched_ladder(own, levels[0]) or known
+    loading, meshes, reference = _loading(own), {element: levels[:-1]}, (element, levels[-1])
+    dt, frames = _steps_and_frames(loading, quick)
+    return Trial(
+        build=lambda element, level, law: with_law(of_element(own.at(level), element), law),
+        size=own.size,
+        meshes=meshes,
+        orders={element: 1.0},
+        steps=dt,
+        inputs=loading.inputs,
+        frames=frames,
+        points=_points(own, meshes, reference),
+        reference=reference,
+        best=ladder.best,
+        solvers=ladder.solvers,
+        pair=None,
+        dynamic=True,
+        rise_s=loading.rise_s,
+        notes=(_DERIVED, ladder.note),
+    )
+
+
+def _touched_levels(own: OwnBody, most: int) -> tuple[int, ...]:
+    """Rising meshes as `_meshes` takes them, the finest of at most so many unknowns. Raises
+    `UsageError` where there are not two."""
+    for top in own.levels(_LEVELS)[::-1]:
+        levels = own.levels([round(share * top) for share in _COARSER])
+        if len(levels) > 1 and own.at(levels[-1]).mesh.nodes.size <= most:
+            return levels
+    raise UsageError(
+        f"'{own.experiment.name}' has {own.scene.mesh.nodes.size} unknowns and cannot be meshed "
+        f"twice with at most {most}; give it a number of cells as a parameter"
+    )
+
+
+def _elements(mesh: Mesh, scene: Scene) -> tuple[str, ...]:
+    """What the cells allow, the most exact last."""
+    if mesh.bricks:
+        return ("Q4",) if mesh.dimension == 2 else ("H8",)
+    return ("P1", "P2") if mesh.dimension == 2 or scene.regions else ("P1", "MD", "P2")
+
+
+def _meshes(
+    own: OwnBody, most: int, quick: bool
+) -> tuple[Mapping[str, tuple[int, ...]], tuple[str, int]]:
+    """Levels by element, and the reference: the most exact element on the finest mesh that has at
+    most so many unknowns. Raises `UsageError` where there are not two meshes."""
+    *others, best = _elements(linear(own.scene.mesh), own.scene)
+    shares = _COARSER[::2] if quick else _COARSER
+    for top in own.levels(_LEVELS)[::-1]:
+        levels = own.levels([round(share * top) for share in shares])
+        if len(levels) > 1 and of_element(own.at(levels[-1]), best).mesh.nodes.size <= most:
+            coarse = {e: levels if e != best else levels[:-1] for e in (*others, best)}
+            return coarse, (best, levels[-1])
+    if others and (levels := own.levels(_LEVELS)[:2])[1:]:  # a mesh that cannot be coarsened
+        return {others[0]: levels[:1]}, (others[0], levels[1])
+    raise UsageError(
+        f"'{own.experiment.name}' has only one mesh, so it cannot be refined; give it a number of "
+        f"cells as a parameter, or declare a ladder"
+    )
+
+
+def _loading(own: OwnBody) -> _Loading:
+    """With inertia the recorded inputs, else a ramp to the largest of them."""
+    seen, dynamic = own.seen, own.scene.material.rho is not None
+    if dynamic:
+        _require_instants(own)
+    steps = np.diff(seen.t)
+    dt = float(np.median(steps)) if len(steps) else 1.0
+    t, size = seen.t - seen.t[0] + dt, np.abs(seen.inputs).sum(axis=1)
+    if not size.any():
+        raise UsageError(f"'{own.experiment.name}' has only zero inputs; nothing moves")
+    reached = int(np.argmax(size >= 0.999 * size.max()))
+    if dynamic:
+        return _Loading(t, seen.inputs, 0.0 if reached == 0 else float(t[reached]), dynamic=True)
+    rise, peak = float(t[reached]), seen.inputs[int(np.argmax(size))]
+    return _Loading(np.array([0.0, rise]), np.array([0 * peak, peak]), rise, dynamic=False)
+
+
+def _require_instants(own: OwnBody) -> None:
+    """A step in time is the recording's: raises `UsageError` where it has none."""
+    if len(own.seen.t) < 2:
+        raise UsageError(
+            f"'{own.experiment.name}' is driven at {len(own.seen.t)} instant, so there is no time "
+            f"step to study; run the experiment, or declare its ladder"
+        )
+
+
+def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...], Floats]:
+    """Steps around the recording's, and the times compared; increments of a static load."""
+    if not loading.dynamic:
+        rise = loading.rise_s
+        return (rise / 6, rise / 240), rise * np.array([1 / 3, 2 / 3, 1.0])
+    dt = float(np.median(np.diff(loading.t)))
+    pairs = min(len(loading.t), _QUICK_STEPS if quick else _STEPS) // 2
+    apart = max(1, pairs // _FRAMES)
+    frames: Floats = 2 * dt * apart * np.arange(1, pairs // apart + 1, dtype=np.float64)
+    return ((2 * dt, dt) if quick else (2 * dt, dt, dt / 2)), frames
+
+
+def _solvers(
+    own: OwnBody, meshes: Mapping[str, tuple[int, ...]], steps: tuple[float, ...], loading: _Loading
+) -> tuple[tuple[Rival, ...], LawPair]:
+    """All that handle the scene, and what its law costs on the coarsest mesh."""
+    levels = next(iter(meshes.values()))
+    element, coarse, medium = list(meshes)[-1], levels[0], levels[len(levels) // 2]
+    own_law = own.scene.material.law
+    law: LawName = "neo_hooke" if own_law == "linear" else own_law
+    if loading.dynamic:
+        pair = swinging_pair(element, coarse, steps[0], law)
+        every = candidates(SwingingBody(steps, coarse, medium, law))
+    else:
+        cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
+        pair = still_pair(element, coarse, steps[0], cavities, law)
+        every = candidates(StillBody(cavities, steps[0], table, medium, coarse, law))
+    return tuple(s for s in every if _handles(s, steps[0], own.scene)), pair
+
+
+def _handles(solver: Rival, dt: float, scene: Scene) -> bool:
+    scheme, body = solver.make(dt), with_law(scene, solver.law)
+    if isinstance(scheme, CentralDifference) and scheme.precision == "single":
+        return scheme.handles.covers(body) and knows_single(body)
+    return scheme.handles.covers(body)
+
+
+def _points(
+    own: OwnBody, meshes: Mapping[str, tuple[int, ...]], reference: tuple[str, int]
+) -> Floats:
+    """The probes, and points inside the body on every mesh, far from one another."""
+    levels = sorted({reference[1], *(n for ns in meshes.values() for n in ns)})
+    coarsest = linear(own.at(levels[0]).mesh)
+    points = centroids(coarsest)
+    near = _INSIDE * float(np.ptp(coarsest.nodes, axis=0).max())
+    for level in levels:
+        points = points[barycentric_rows(linear(own.at(level).mesh), points).outside <= near]
+    if not len(points):
+        raise SceneError("the meshes have no common point; declare a ladder in the experiment")
+    probes = [np.array(p.point)[None] for p in own.scene.probes]
+    return np.vstack([*probes, _spread(points)])
+
+
+def _spread(points: Floats) -> Floats:
+    """At most `_POINTS` of them, each the furthest from those before."""
+    picked = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    while len(picked) < min(_POINTS, len(points)):
+        away = np.linalg.norm(points[:, None] - points[picked], axis=2).min(axis=1)
+        picked.append(int(np.argmax(away)))
+    return points[picked]
+
+
+# --- stability ------------------------------------------------------------------------------------
+
+
+def _body(own: OwnBody) -> StabilityBody:
+    """The body without its fluid, in linear cells, on meshes whose modes can all be taken."""
+    if own.scene.tools:
+        raise _untaken(own)
+    fitting = [n for n in own.levels(_LEVELS) if linear(own.at(n).mesh).nodes.size <= LARGEST]
+    if not fitting:
+        raise UsageError(
+            f"'{own.experiment.name}' has {linear(own.scene.mesh).nodes.size} unknowns and cannot "
+            f"be coarsened to {LARGEST}, all of whose modes are taken; give it a number of cells "
+            "as a parameter, or declare a body in its ladder"
+        )
+    meshes = own.levels([round(share * fitting[-1]) for share in _COARSER])
+    drive = None if own.scene.loads else own.scene.drives[0]
+    steps = np.diff(own.seen.t)
+    base = turned(own.scene.material, meshes[-1])
+    return StabilityBody(
+        f"{own.experiment.title} ({linear(own.scene.mesh).kind} cells; mesh: percent of the "
+        f"experiment's mesh)",
+        lambda level, material: _solid(own, level, material),
+        base,
+        meshes,
+        float(np.median(steps)),
+        pull=None if drive is None else Load("pull", drive.facets, drive.direction),
+        qualities=QUALITY if _squeezable(_solid(own, meshes[-1], base.material)) else (1.0,),
+    )
+
+
+def _solid(own: OwnBody, level: int, material: Material) -> Scene:
+    """Of another material; regions keep their modulus over the rest."""
+    scene = own.at(level)
+    share = material.E / own.scene.material.E
+    regions = tuple(
+        replace(r, material=replace(material, E=share * r.material.E)) for r in scene.regions
+    )
+    return replace(
+        scene, body=linear(scene.mesh), material=material, regions=regions, cavities=(),
+        probes=(), dilatation="pointwise",
+    )  # fmt: skip
+
+
+def _squeezable(scene: Scene) -> bool:
+    """Whether a layer of cells can be squeezed without turning others over."""
+    try:
+        require_positive_cells(squeezed(scene.mesh, min(QUALITY)))
+    except SceneError:
+        return False
+    return True

@@ -1,0 +1,21 @@
+"""A model against the clock: from a recorded path, or from packets on this machine's loopback."""
+
+from validate.pipeline.live.clock import Lived, live, realtime
+from validate.pipeline.live.listener import Listener
+from validate.pipeline.live.path import RecordedPath, recorded_tip
+from validate.pipeline.live.prepared import Prepared, prepared
+from validate.pipeline.live.written import LIVE, as_given, written
+
+__all__ = [
+    "LIVE",
+    "Listener",
+    "Lived",
+    "Prepared",
+    "RecordedPath",
+    "as_given",
+    "live",
+    "prepared",
+    "realtime",
+    "recorded_tip",
+    "written",
+]

@@ -1,0 +1,241 @@
+"""A block with a fluid-filled inclusion between two plates, from outlines, markers and a stage:
+what a file declares beside its scene, and the experiment that follows.
+
+Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from validate.compare.result import Kind
+from validate.compare.verdict import Accept
+from validate.errors import ComparisonError
+from validate.parameters import Ranges, quantity, with_given
+from validate.pipeline.experiment.experiment import Experiment, Input, Uncertainty, vary
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.tree import Tree, beside, changed_by
+from validate.pipeline.plates.inclusion_body import (
+    WITHIN,
+    inclusion,
+    measured_inclusion,
+    shifted,
+    sweep_stack,
+)
+from validate.pipeline.plates.inclusion_sweep import off_circles, outlined_sweep
+from validate.recording.types import Recording
+from validate.register.clocks import clock_sd
+from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.markers import Sampling, Together, placed_markers
+from validate.register.outlines.outlines import Corner, observe_outlines
+from validate.register.outlines.plane import cavity_sampler
+from validate.register.registered import Registered
+from validate.register.signals import driving, holds_at, instant, require_rising, validating
+from validate.scene.geometries.inclusion import InclusionShape
+from validate.scene.scene import Contact as Contact
+from validate.scene.scene import Scene
+
+# --- How much plates rub: a share between slipping and bonded.
+
+_HALF = 4.0  # of E over the plates' distance: the stiffness at a share of one half (ours)
+
+
+def plates_of_share(share: float, E: float, apart: float) -> tuple[Contact, float]:
+    """Contact and tangential stiffness N/m^3 of plates `apart` m that rub by a `share` 0..1.
+
+    0 slips, 1 bonds, between them springs of k = 4 E/apart share/(1 - share): the one definition of
+    how much plates rub, for what is identified and for what is uncertain (Pa, m).
+    """
+    if share in (0.0, 1.0):
+        return ("slip" if share == 0 else "bonded"), 0.0
+    return "partial", _HALF * E / apart * share / (1 - share)
+
+
+def rubbing_share(contact: str, friction: float, E: float, apart: float) -> float:
+    """The share 0..1 of that contact with springs of `friction` N/m^3; see `plates_of_share`."""
+    if contact != "partial":
+        return float(contact == "bonded")
+    return friction / (friction + _HALF * E / apart)
+
+
+# -------------------------------------------------------------------------------------------------
+
+_TRACES = {"N": ("force.plate", "stage.force"), "Pa": ("pressure", "inclusion.pressure")}
+_PLANE = (
+    Together("marker.inplane", (0, 2), "position along the stage and sideways"),
+    Together("marker.vertical", (1,), "position along the vertical"),
+)
+
+
+@dataclass(frozen=True)
+class InclusionRanges(Ranges):
+    E: float = quantity(0.05, "1", "relative, of the modulus")
+    nu: float = quantity(0.005, "1", "of the Poisson ratio")
+    friction: float = quantity(0.03, "1", "absolute, of the plates' friction share k/(k + 4 E/x)")
+
+
+@dataclass(frozen=True)
+class Streams:
+    """Topics of the recording. `signals` are a force in N or a pressure in Pa."""
+
+    stage: str = quantity("stage", "1", "displacement of the moving plate, m")
+    outline: str = quantity("outline", "1", "outlines of the inclusion")
+    markers: str = quantity("markers", "1", "markers")
+    signals: tuple[str, ...] = quantity((), "1", "force and pressure, where recorded")
+    tracker: str = quantity("pen", "1", "record with the upward direction of the markers")
+
+
+@dataclass(frozen=True)
+class InclusionRegistration(MarkerFit):
+    """Of markers, and of the image that shows the inclusion."""
+
+    sampling: Sampling = quantity("barycentric", "1", "markers to nodes")
+    wall: Literal["measured", "facets", "nearest_node"] = quantity(
+        "measured", "1", "wall on the measured circle, on the mesh's facets, or by nearest node"
+    )
+    image_shift_x: float = quantity(0.0, "m", "correction of the image pose along x")
+    image_shift_z: float = quantity(0.0, "m", "correction of the image pose along z")
+
+
+@dataclass(frozen=True)
+class InclusionTest:
+    """What no scene holds of such a test."""
+
+    streams: Streams = Streams()
+    registration: InclusionRegistration = InclusionRegistration()
+    ranges: InclusionRanges = InclusionRanges()
+    loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
+
+
+def rubbing(tree: Tree, share: float) -> Tree:
+    """The plates rub by a share, from 0 (they slip) to 1 (bonded)."""
+    contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
+    path = "foundations.plates."
+    changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
+    return changed
+
+
+def rubbed(tree: Tree, z: float) -> Tree:
+    """Plates that rub by z `ranges.friction` more; what lies beyond slipping or bonded is mirrored
+    back."""
+    plates = next(f for f in tree.scene.foundations if f.name == "plates")
+    share = rubbing_share(
+        plates.contact, plates.stiffness, tree.scene.material.E, tree.scene.body.x
+    )
+    share = abs(share + z * tree.settings.ranges.friction)
+    return rubbing(tree, min(share, 2 - share))
+
+
+FINER = 1.25  # times the cells along every edge: the finest mesh of `MESHES`
+#: More than three meshes: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells
+#: have no common factor: within 5 % the grids are similar. Order 2: corners at the plates and
+#: facets on the wall limit that of quadratic elements.
+MESHES = vary("body.cells", f"x 0.625 0.75 0.875 {FINER}, order 2")
+#: The inputs that every such experiment has, with the fields of `InclusionRanges`.
+INPUTS = (
+    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+         "nu within its declared uncertainty"),
+    Input("plate friction", rubbed, "share of the way from slipping to bonded plates", "assumed"),
+)  # fmt: skip
+
+
+def inclusion_test(
+    name: str,
+    title: str,
+    source: str,
+    parameters: Tree,
+    methods: Mapping[str, Method],
+    accepted: tuple[str, ...],
+    accept: tuple[Accept, ...],
+    kind: Kind = "measured",
+) -> Experiment:
+    """The experiment; inputs are varied with the first method of linear elements (none: the last),
+    which is cheap."""
+    cheap = [n for n, m in methods.items() if _linear(parameters, m)]
+    return Experiment(
+        name, title, source, parameters, methods, accepted, accept, load,
+        place=_place, kind=kind, variations=(MESHES, *INPUTS),
+        uncertainty=Uncertainty(surrogate=(*cheap, *reversed(list(methods)))[0]),
+    )  # fmt: skip
+
+
+def _linear(tree: Tree, method: Method) -> bool:
+    return bool(changed_by(tree, method.scene or {}).scene.body.element == "linear")
+
+
+def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
+    return tuple(outlined(recording, tree) for recording in beside(tree, folder))
+
+
+def outlined(recording: Recording, tree: Tree) -> Recording:
+    """The recording with the outlines in the images of its sweep, where the body is meshed from
+    it."""
+    return outlined_sweep(recording) if tree.scene.body.inclusion.shape == "sweep" else recording
+
+
+def _place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
+    return placed(recording, tree, scene, tree.settings.loads, _PLANE)
+
+
+# --- what a paper's own block of this kind uses too -----------------------------------------------
+
+
+def placed(
+    recording: Recording, tree: Tree, scene: Scene, loads: tuple[float, ...],
+    together: tuple[Together, ...], corners: tuple[Corner, ...] = (),
+) -> Registered:  # fmt: skip
+    """Stage, outlines, markers and signals at rest and at `loads` m.
+
+    Raises `ComparisonError` without loads, `RegistrationError` for a signal that falls as the
+    plates close, and what the parts raise.
+    """
+    if not loads:
+        raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
+    streams, how = tree.settings.streams, tree.settings.registration
+    contours = shifted(recording.contour(streams.outline), tree)
+    measured = measured_inclusion(recording, tree)
+    shape = None if how.wall == "facets" else measured
+    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
+    stage = driving(recording, streams.stage, "m")
+    signals = []
+    for topic in streams.signals:
+        unit = _unit(recording, topic)
+        name, trace = _TRACES[unit]
+        signals.append(validating(recording, topic, unit, quantity=name, trace=trace))
+        require_rising(stage, signals[-1])
+    rest, *holds = holds_at(stage, contours.t, loads, within=WITHIN)
+    outline = observe_outlines(
+        contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
+        sd_t=clock_sd(recording, streams.outline),
+    )  # fmt: skip
+    markers = placed_markers(
+        recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
+        up=(0.0, 1.0, 0.0), how=how, sampling=how.sampling,
+    )  # fmt: skip
+    swept = tree.scene.body.inclusion.shape == "sweep"
+    said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
+    said = (*said, *_misplaced(measured, inclusion(recording, tree)))
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
+
+
+def _unit(recording: Recording, topic: str) -> str:
+    """The unit of a signal; where it is absent or of another kind, the one to be asked for."""
+    found = recording.signals.get(topic)
+    return found.unit if found is not None and found.unit in _TRACES else "N"
+
+
+def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:
+    """A word where the meshed inclusion is not where the rest outline lies."""
+    off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
+    wide = meshed.radius - measured.radius
+    if off < 0.5e-3 and abs(wide) < 0.5e-3:
+        return ()
+    return (
+        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
+        f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
+        "show this.",
+    )

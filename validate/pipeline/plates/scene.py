@@ -1,0 +1,154 @@
+"""The scene of a body between two plates or grips: contact, sizes, and the modulus of a model.
+
+    Scene(
+        body=Cylinder("25 mm", "20 mm", element="tet10", part="quarter"),
+        material=Material(None, 0.499),                  # identified
+        supports=(Support("lower_plate", (2,)),),        # a whole body: rests=True
+        drives=(Drive("stage", "upper_plate", "-z"),),   # pulled: "+z"
+    )
+
+Such plates slip; `BONDED_PLATES` are what a method changes where they hold the body.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from validate.errors import UsageError
+from validate.identify.modulus import CylinderSize, ModulusFit, TestKind, loading
+from validate.parameters import known
+from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT, PLATES, sizes_of_mesh
+from validate.pipeline.calibration.fitted_moduli import modulus_in
+from validate.pipeline.experiment.tree import Built, Tree, changed_by, mesh_of
+from validate.pipeline.plates.choices import BONDED_PLATES
+from validate.recording.types import Recording
+from validate.register.clocks import clock_sd
+from validate.register.observation import Role
+from validate.register.registered import Registered
+from validate.register.signals import SignalObservation, windows_of
+from validate.scene.geometries.specification import Cylinder, MeshFile
+from validate.scene.scene import Scene, Support
+
+# --- A log of a testing machine in the scene: displacement from contact, force from its zero.
+
+
+def pressed_log(
+    recording: Recording,
+    fit: ModulusFit,
+    height: float,
+    limit: float,
+    strains: Mapping[str, tuple[float, float]],
+    noise: float,
+    role: Role = "validates",
+    share: float = 0.0,
+    test: TestKind = "compression",
+    toe: float | None = None,
+) -> Registered:
+    """Displacement less contact and toe, force less the cell's offset, to the strain `limit`.
+
+    The force, of sd `noise` N, is read at the displacement's times and compared in the windows of
+    strain; what an uncertain clock of either makes of it is counted. `share` is how far specimens
+    differ, relative, one standard uncertainty. `toe` m is where a method's own law begins to carry
+    load, counted from contact (none: where the fitted line does); windows are the same for all.
+    """
+    log = loading(recording, test)
+    moved = log.d[:, None] - fit.contact - fit.toe * height
+    last = int(np.argmax(moved[:, 0] > limit * height)) or len(moved)
+    stage = SignalObservation(
+        "displacement", "drives", log.t[:last], moved[:last], "m",
+        recording.signal("displacement", "m").sd, sd_t=clock_sd(recording, "displacement"),
+    )  # fmt: skip
+    cell = SignalObservation(
+        "force", role, log.t[:last], log.force[:last, None] - fit.offset, "N",
+        float(np.hypot(noise, log.error)), "force", "stage.force", clock_sd(recording, "force"),
+        share,
+    )  # fmt: skip
+    windows = {label: (a * height, b * height) for label, (a, b) in strains.items()}
+    selections = windows_of(stage, windows)
+    if toe is not None:
+        stage = replace(stage, y=stage.y + fit.toe * height - toe)
+    return Registered((stage, cell), selections, outside=len(log.t) - last)
+
+
+# -------------------------------------------------------------------------------------------------
+
+Ends = Literal["slip", "bonded"]
+
+LOWER, UPPER = PLATES
+
+
+def between(ends: Ends, tree: Tree) -> Mapping[str, Any]:
+    """What a method changes for plates that slip or hold the body."""
+    if ends == "bonded":
+        return BONDED_PLATES
+    whole = not getattr(tree.scene.body, "held", ())
+    return {"supports": (Support(LOWER, (2,), rests=whole),)}
+
+
+def ends_of(scene: Scene) -> Ends:
+    """Whether the moving plate holds the body sideways."""
+    return "bonded" if any(s.facets == UPPER for s in scene.supports) else "slip"
+
+
+def kind_of_test(tree: Tree) -> TestKind:
+    """Whether the upper plate presses or pulls; raises `UsageError` for another motion."""
+    moved = {(d.name, d.facets, tuple(d.direction)) for d in tree.scene.drives}
+    for kind, sign in (("compression", -1.0), ("tension", 1.0)):
+        if moved == {("stage", UPPER, (0.0, 0.0, sign))}:
+            return kind  # type: ignore[return-value]
+    raise UsageError(
+        f'drives: {len(moved)} that no test between plates has; declare Drive("stage", '
+        f'"{UPPER}", "-z"), in tension "+z"'
+    )
+
+
+def pressed_size(tree: Tree, folder: Path) -> CylinderSize:
+    """Height and diameter m of the cylinder, or those of equal area of a mesh file.
+
+    Raises `UsageError` while a size is not set, and what `sizes_of_mesh` does.
+    """
+    body = tree.scene.body
+    if isinstance(body, Cylinder):
+        return CylinderSize(known(body.diameter, DIAMETER), known(body.height, HEIGHT))
+    if isinstance(body, MeshFile):
+        tree = tree.with_scene(body=replace(body, halvings=0, element="linear"))
+    sizes = sizes_of_mesh(mesh_of(None, tree, folder), getattr(body, "file", "body"))
+    return CylinderSize(sizes[DIAMETER], sizes[HEIGHT])
+
+
+def model_name(law: str, ends: str, order: int) -> str:
+    """What parameters call a model."""
+    return f"{law}, {ends}, order {order}"
+
+
+def by_model(scene: Scene) -> str:
+    """The name of the model that a scene was built with."""
+    return model_name(scene.material.law, ends_of(scene), scene.mesh.order)
+
+
+@dataclass(frozen=True)
+class BuiltPressed(Built):
+    """As `Built`; the modulus is the method's own, else that which the run identified its model
+    with, else the declared one; 1 Pa while none is known, when only memory is asked for."""
+
+    def __call__(
+        self, recording: Recording | None, tree: Tree, changes: Mapping[str, Any] | None = None
+    ) -> Scene:
+        own = dict(changes or {})
+        if "material.E" not in own:
+            own["material.E"] = self._modulus(changed_by(tree, own))
+        return super().__call__(recording, tree, own)
+
+    def model(self, tree: Tree) -> str:
+        """The name of the model with these parameters, a method's changes among them."""
+        order = mesh_of(None, tree, self.folder).order
+        return model_name(tree.scene.material.law, ends_of(tree.scene), order)
+
+    def _modulus(self, tree: Tree) -> float:
+        p, scene = tree.settings, tree.scene
+        held: float | None = p.E_bonded if ends_of(scene) == "bonded" else None
+        identified = modulus_in(p.by_method, self.model(tree))
+        return float(identified or held or scene.material.E or 1.0)

@@ -1,0 +1,65 @@
+"""Estimate of a run before it is started: time, memory and unknowns of all its variants."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from validate.errors import ValidateError
+from validate.fem.linear_solvers.factor import solvable_bytes
+from validate.parameters import describe, with_values
+from validate.pipeline.checks.checks import variants_of
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import load_file
+from validate.pipeline.experiment.origins import opened
+from validate.pipeline.run.cost import NODAL_MEAN, linear_seconds, newton_seconds
+from validate.pipeline.run.runs import Road
+from validate.scene.scene import Scene
+
+_PROGRAM, _PROGRAM_SECONDS = 0.5e9, 8.0  # bytes and s of the program itself and its report
+_SOLVE = 4e-8  # s of a solution with a factor, per N^(4/3)
+_ASSUMED_E = "10 kPa"  # of a modulus that is identified: it changes no size
+
+
+@dataclass(frozen=True)
+class RunEstimate:
+    """About how long all runs take (s), memory at the peak (bytes), unknowns of the finest mesh."""
+
+    seconds: float
+    memory: float
+    unknowns: float
+
+
+def estimated(file: Path) -> RunEstimate | None:
+    """Return the estimate for the parameters that a file declares; None for a scene without a mesh,
+    or one that cannot be built yet."""
+    try:
+        return _estimated(load_file(file))
+    except ValidateError:
+        return None
+
+
+def _estimated(experiment: Experiment) -> RunEstimate | None:
+    found = opened(experiment, experiment.parameters)
+    described = describe(found.parameters)
+    unset = [p.path for p in described if p.path == "material.E" and p.default is None]
+    parameters = with_values(found.parameters, dict.fromkeys(unset, _ASSUMED_E.replace(" ", "")))
+    experiment = experiment.follows(experiment, found.recordings, parameters)
+    road = Road(experiment, experiment.methods, parameters, None, quick=False)
+    variants, scenes = variants_of(road), {}
+    for name in {v.method for v in variants}:
+        model = experiment.methods[name].scene
+        scene = experiment.build(found.recordings[0], parameters, model)
+        if not isinstance(scene, Scene):
+            return None
+        scenes[name] = scene
+    seen = experiment.place(found.recordings[0], parameters, next(iter(scenes.values())))
+    seconds, largest, memory = _PROGRAM_SECONDS, 0.0, 0.0
+    for variant in variants:
+        scene, steps = scenes[variant.method], len(seen.t) * variant.split
+        N = scene.mesh.nodes.size * road.finer(variant) ** scene.mesh.dimension
+        costs = N * NODAL_MEAN if scene.dilatation == "nodal_mean" else N
+        linear = scene.material.law == "linear" and not scene.contacts
+        alone = linear_seconds(costs) + steps * _SOLVE * costs ** (4 / 3)
+        seconds += alone if linear else steps * newton_seconds(costs)
+        largest = max(largest, N)
+        memory = max(memory, solvable_bytes(N, scene.mesh.dimension) * (1 if linear else 3))
+    return RunEstimate(seconds, _PROGRAM + memory, largest)

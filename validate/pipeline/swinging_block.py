@@ -1,0 +1,73 @@
+"""Trial solvers of a block that swings, held at one end and compared at the other."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.pipeline.bodies.own_body import with_law
+from validate.pipeline.ladder.ladder import Trial
+from validate.pipeline.ladder.references import ORDERS, exact_in_time, swinging_pair
+from validate.scene.geometries.box import box, grid
+from validate.scene.material import LawName
+from validate.scene.mesh import Mesh, quadratic
+from validate.scene.scene import Scene
+from validate.solve.candidates import SwingingBody
+from validate.solve.schemes import candidates
+
+_SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
+
+
+def swinging_trial(
+    base: Scene,
+    per: tuple[int, int, int],
+    steps: tuple[float, float, float],
+    frames: Floats,
+    inputs: Callable[[Floats], Floats],
+    quick: bool,
+    noise: tuple[float, str] | None = None,
+) -> Trial:
+    """A block of the scene `base` on meshes of `per` x level cells, held where it is there.
+
+    `per` is 1 but along the longest edge, at whose free end points are compared.
+    """
+    size = tuple(float(x) for x in base.mesh.nodes.max(axis=0))
+
+    def build(element: str, level: int, law: LawName) -> Scene:
+        return with_law(replace(base, body=_block_mesh(size, per, element, level)), law)
+
+    fine = (2, 4) if quick else (2, 4, 8)
+    return Trial(
+        build=build,
+        size=lambda level: size[1] / level,
+        meshes={"H8": fine, "P1": fine, "P2": (2,) if quick else (2, 4)},
+        orders=ORDERS,
+        steps=steps[:2] if quick else steps,
+        inputs=inputs,
+        frames=frames,
+        points=_spread_points(size, int(np.argmax(per))),
+        reference=("P2", 4 if quick else 6),
+        best=exact_in_time,
+        solvers=candidates(SwingingBody(steps, _SMALL, _MEDIUM)),
+        pair=swinging_pair("P2", 2, steps[0]),
+        dynamic=True,
+        rise_s=0.0,
+        noise=noise,
+    )
+
+
+def _block_mesh(size: tuple[float, ...], per: tuple[int, ...], element: str, level: int) -> Mesh:
+    """`per` x level cells per axis; P2's have midside nodes: as many nodes as P1 at twice these."""
+    cells = tuple(n * level for n in per)
+    if element == "H8":
+        return grid(size, cells)
+    return quadratic(box(size, cells)) if element == "P2" else box(size, cells)
+
+
+def _spread_points(size: tuple[float, ...], along: int) -> Floats:
+    """Nine points on the free end across axis `along` and three on the axis to it."""
+    share = [(a, b) for a in (0.25, 0.5, 0.75) for b in (0.25, 0.5, 0.75)]
+    ends = np.array([np.insert(np.array(s), along, 1.0) for s in share])
+    axis = np.array([np.insert(np.array([0.5, 0.5]), along, s) for s in (0.25, 0.5, 0.75)])
+    return np.asarray(np.vstack([ends, axis]) * np.array(size))

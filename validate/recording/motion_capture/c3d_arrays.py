@@ -1,0 +1,202 @@
+"""What a C3D file holds, as plain arrays. The only file that imports ezc3d."""
+
+import tempfile
+from collections.abc import Iterator
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.errors import RecordingError
+from validate.files import read_bytes
+from validate.recording.motion_capture.c3d_bytes import (
+    BIG,
+    BLOCK,
+    INTEL,
+    MOST,
+    layout,
+    parts_beyond,
+    records,
+)
+from validate.recording.reader import head
+
+# --- C3D in the byte order of SGI, as the same file in Intel's: the library reads that one.
+
+_HEADER = ((2, 12, 2), (12, 16, 4), (16, 20, 2), (20, 24, 4), (294, 302, 2), (304, 376, 4))
+_Span = tuple[int, int, int]  # from, to, and the bytes of a number
+
+
+def turned(path: Path, copy: Path) -> Path:
+    """The path itself, or where its numbers stand the other way round a `copy` that is Intel's.
+
+    C3D user guide: header, parameter section, data. Whole numbers and floats are turned each in
+    its place, so that a file of whole numbers stays one.
+    """
+    raw = bytearray(read_bytes(path))
+    lies = layout(path, bytes(raw[:BLOCK]))
+    if lies.processor != BIG:
+        return path
+    begin = BLOCK * (max(raw[0], 2) - 1)
+    wide = lies.each // max(4 * lies.points + lies.analog, 1) or 2
+    spans = [*_HEADER, *_parameters(bytes(raw[: lies.at(0)]), begin), (lies.at(0), len(raw), wide)]
+    for span in spans:
+        _turn(raw, *span)
+    raw[begin + 3] = INTEL
+    copy.write_bytes(raw)
+    return copy
+
+
+def _turn(raw: bytearray, begin: int, end: int, wide: int) -> None:
+    """Each number between two places turned round; what is left over stays."""
+    end = begin + (min(end, len(raw)) - begin) // wide * wide
+    part = raw[begin:end]
+    for i in range(wide):
+        raw[begin + i : end : wide] = part[wide - 1 - i :: wide]
+
+
+def _parameters(raw: bytes, begin: int) -> Iterator[_Span]:
+    """Where the links of groups and parameters stand, and the values of the latter."""
+    for group, _, at in records(raw, begin):
+        yield at, at + 2, 2
+        if group > 0:
+            kind, many = abs(int.from_bytes(raw[at + 2 : at + 3], signed=True)), raw[at + 3]
+            values = at + 4 + many
+            yield values, values + kind * prod(raw[at + 4 : values]), max(kind, 1)
+
+
+# -------------------------------------------------------------------------------------------------
+
+LIBRARIES = ("ezc3d",)
+_OUTPUTS = {"ANGLES": "ANGLE_UNITS", "FORCES": "FORCE_UNITS", "MOMENTS": "MOMENT_UNITS",
+            "POWERS": "POWER_UNITS", "SCALARS": "SCALAR_UNITS"}  # fmt: skip
+_WORD = 65536  # levels of a whole number of two bytes
+_MANY = 10  # parameters of one name, numbered from 2: one holds 255 words at most
+
+
+def arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Points (nt, n, 3) and residuals (nt, n) in the file's unit, analog (nt a, c), poses
+    (nt r, m, 4, 4), `rates` of the three, and words; `outputs` (k, 2): labels among the points that
+    are none, as angles, and their units; `uncounted`: bytes after the frames that were counted.
+
+    Raises `RecordingError` for a file without all frames that its parameters tell of.
+    """
+    with tempfile.TemporaryDirectory(prefix="validate-") as folder:
+        return _held(turned(path, Path(folder) / "turned.c3d"), Path(folder) / "part.c3d")
+
+
+def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
+    """Of a file in an order that the library reads; a long trial is read by parts."""
+    import ezc3d
+
+    found = ezc3d.c3d(str(path))
+    parameters = found["parameters"]
+    lies = layout(path, head(path, BLOCK))
+    frames = _count(parameters) if lies.frames == MOST else 0
+    size = path.stat().st_size
+    if size < lies.at(frames):
+        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
+    rest = parts_beyond(path, frames, part)
+    held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
+    header = found["header"]
+    rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
+             _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
+    return {
+        **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
+        "rates": np.array(rates),
+        "labels": _words(parameters, "POINT", "LABELS"),
+        "unit": _words(parameters, "POINT", "UNITS")[:1],
+        "channels": _words(parameters, "ANALOG", "LABELS"),
+        "channel_units": _words(parameters, "ANALOG", "UNITS"),
+        "bodies": _words(parameters, "ROTATION", "LABELS"),
+        "outputs": _outputs(parameters),
+        "first_frame": np.array(header["points"]["first_frame"] + 1),
+        "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
+        "events": _event_names(parameters),
+        "event_times": _event_times(parameters),
+    }
+
+
+def _frames(found: Any) -> dict[str, NDArray[Any]]:
+    """What the file holds frame by frame, times first."""
+    data = found["data"]
+    return {
+        "points": np.transpose(data["points"][:3], (2, 1, 0)),
+        "residuals": data["meta_points"]["residuals"][0].T,
+        "analog": _analog(found["parameters"], data["analogs"][0].T),
+        "poses": np.transpose(data["rotations"], (3, 2, 0, 1)),
+    }
+
+
+def _analog(parameters: Any, found: NDArray[Any]) -> NDArray[np.float64]:
+    """Samples in their units. The library takes whole numbers without a sign for signed ones."""
+    values = np.asarray(found, dtype=np.float64)
+    whole = float(_numbers(parameters, "POINT", "SCALE", 1)[0]) > 0
+    words = _words(parameters, "ANALOG", "FORMAT")[:1]
+    if not (values.size and whole and [w.upper() for w in words] == ["UNSIGNED"]):
+        return values
+    many = values.shape[1]
+    each = _numbers(parameters, "ANALOG", "SCALE", many)
+    each = each * _numbers(parameters, "ANALOG", "GEN_SCALE", 1)[0]
+    offset = _numbers(parameters, "ANALOG", "OFFSET", many)
+    raw = np.rint(values / np.where(each == 0, 1.0, each) + offset)
+    return np.asarray((raw % _WORD - offset % _WORD) * each)
+
+
+def _numbers(parameters: Any, group: str, name: str, many: int) -> NDArray[np.float64]:
+    """The first numbers of a parameter and its continuations; where too few, a scale of 1."""
+    held = [float(v) for v in _values(parameters, group, name)][:many]
+    return np.array(held + [1.0] * (many - len(held)))
+
+
+def _count(parameters: Any) -> int:
+    """Frames of a long trial as programs tell of them: Vicon's first and last field, of two words
+    each, else a number beside or in place of the one that counts to 65535."""
+    fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ("START", "END")]
+    if all(len(words) == 2 for words in fields):
+        begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
+        return end - begin + 1
+    told = [v for name in ("LONG_FRAMES", "FRAMES") for v in _values(parameters, "POINT", name)]
+    return max((int(v) for v in told), default=0)
+
+
+def _outputs(parameters: Any) -> NDArray[Any]:
+    """Labels and units of computed outputs, which lie among the points."""
+    pairs = []
+    for group, units in _OUTPUTS.items():
+        unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
+        pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
+    return np.array(pairs, dtype=str).reshape(-1, 2)
+
+
+def _event_names(parameters: Any) -> NDArray[Any]:
+    """Labels, each after its context (Left, Right), where as many are stated."""
+    labels, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
+    if len(sides) != len(labels):
+        return labels
+    pairs = zip(sides.tolist(), labels.tolist(), strict=True)
+    return np.array([f"{side} {label}".strip() for side, label in pairs], dtype=str)
+
+
+def _event_times(parameters: Any) -> NDArray[np.float64]:
+    """Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise."""
+    group = parameters.get("EVENT", {})
+    times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
+    return times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0))
+
+
+def _rate(parameters: Any, group: str, samples: NDArray[np.float64]) -> float:
+    value = parameters[group]["RATE"]["value"] if samples.size else []
+    return float(value[0]) if len(value) else 0.0
+
+
+def _values(parameters: Any, group: str, name: str) -> list[Any]:
+    """The values of a parameter and of NAME2, NAME3, ... that continue it."""
+    names = [name, *(f"{name}{i}" for i in range(2, _MANY))]
+    held = parameters.get(group, {})
+    return [v for n in names if n in held for v in held[n]["value"]]
+
+
+def _words(parameters: Any, group: str, name: str) -> NDArray[Any]:
+    return np.array([str(w).strip() for w in _values(parameters, group, name)], dtype=str)

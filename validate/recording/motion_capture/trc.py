@@ -1,0 +1,119 @@
+"""TRC, the marker trajectories of OpenSim and of motion capture: tabs or commas."""
+
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.formats.options import RATE, SD, UNIT, above_zero, frame, metres, spread
+from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.motion_capture.text_rows import (
+    ASSUMED,
+    TextRow,
+    TextRows,
+    as_number,
+    numbers,
+    text_rows,
+    told_left,
+    told_zeros,
+    whole_points,
+    without_zeros,
+)
+from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.types import Markers, Recording
+
+_MAGIC = b"PathFileType"
+_ROUNDED = 1e-3  # s: times have three decimals
+_BEFORE = 2  # columns before the first coordinate: frame, time
+
+
+def read_trc(path: Path, options: Options) -> Recording:
+    """Points as `markers` (nt, k, 3) m; a blank, NaN or three zeros are "not seen".
+
+    Options: `unit` in place of the file's, `sd` of a coordinate (0: not stated), `rate` (Hz) in
+    place of its times, `frame` (default capture). Raises `UsageError` without a unit of length,
+    `RecordingError` for a table that is no TRC, or damaged.
+    """
+    held = text_rows(path)
+    header = _header(held)
+    names = _names(held, header)
+    values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
+    shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
+    x = whole_points(held, shown, names, rows)
+    factor, stated = metres(options, header.get("Units", ""), path.name)
+    t, counted = _times(held, header, values, options)
+    markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
+    told = {
+        "kind": "marker trajectories (TRC)",
+        "unit": stated,
+        "header": "; ".join(f"{k} {v}" for k, v in header.items() if v),
+        "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
+        "rows": f"{len(values)}, the header declares {header.get('NumFrames', 'none')}",
+    }
+    source = source_of(path, "text file: integrity not provable")
+    told |= counted | told_zeros(zeros) | told_left(left)
+    return recorded(path.stem, source, {"markers": markers}, told)
+
+
+def _header(held: TextRows) -> dict[str, str]:
+    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
+        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
+    keys, values = held.rows[1].cells, held.rows[2].cells
+    return {k: v for k, v in zip(keys, values, strict=False) if k}
+
+
+def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
+    """Every third cell of the fourth line; where programs left no blanks between, all of them."""
+    cells = held.rows[3].cells[_BEFORE:]
+    named = [c for c in cells if c]
+    stated = header.get("NumMarkers", "")
+    if stated.isdecimal() and int(stated) != len(named):
+        raise RecordingError(
+            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
+        )
+    if not named:
+        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
+    return distinct(named, len(named))
+
+
+def _rows(held: TextRows) -> list[TextRow]:
+    """From the first that begins with a number, blank lines apart."""
+    body = held.rows[4:]
+    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
+    return [r for r in body[begin:] if any(r.cells)]
+
+
+def _times(
+    held: TextRows, header: dict[str, str], values: Floats, options: Options
+) -> tuple[Floats, dict[str, str]]:
+    """Seconds from the first row, and what was assumed: rows of equal times, as of three decimals
+    at 2 kHz, are counted at the header's rate where they stand by it."""
+    if "rate" in options:
+        return np.arange(len(values)) / above_zero(options, "rate"), {}
+    t = values[:, 1] - values[0, 1]
+    if np.isnan(t).any():
+        raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; give "
+                             f"--map rate=HZ")  # fmt: skip
+    if (np.diff(t) > 0).all():
+        return np.asarray(t), {}
+    rate = as_number(header.get("DataRate", "")) or np.nan
+    exact = np.arange(len(t)) / rate
+    if not (rate > 0 and np.abs(t - exact).max() <= _ROUNDED):
+        row = int(np.argmax(np.diff(t) <= 0)) + 2
+        raise RecordingError(f"{held.name}: the time of row {row} is not after the one before it; "
+                             f"give --map rate=HZ")  # fmt: skip
+    return exact, {
+        ASSUMED: f"rows of equal times are counted at the {rate:g} Hz that the file declares"
+    }
+
+
+TRC = Reader(
+    "trc",
+    "marker trajectories (TRC)",
+    lambda p: head(p, 12) == _MAGIC,
+    read_trc,
+    "its first cell is PathFileType",
+    options=(UNIT, SD, frame("capture"), RATE),
+    extensions=(".trc",),
+)

@@ -1,0 +1,213 @@
+"""Vicon's CSV: one block of lines for trajectories, devices and models each.
+
+A block is its title, its rate in Hz, a line of names, one of columns, one of units, then a row a
+frame (devices: a row a sub-frame) until a blank line.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError
+from validate.recording.formats.options import SD, UNIT, frame, metres, spread
+from validate.recording.formats.recorded import begun, distinct, recorded
+from validate.recording.motion_capture.text_rows import (
+    LEFT_OUT,
+    TextRow,
+    TextRows,
+    as_number,
+    numbers,
+    text_rows,
+    told_left,
+    told_zeros,
+    whole_points,
+    without_zeros,
+)
+from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.types import Markers, Recording, Signal, Stream
+
+_POINTS, _DEVICES, _EVENTS = "Trajectories", "Devices", "Events"
+_TITLES = (
+    _POINTS,
+    _DEVICES,
+    "Segments",
+    "Joints",
+    "Model Outputs",
+    _EVENTS,
+    "Force Plates",
+    "Objects",
+)
+_BEFORE = 2  # columns before the first value: frame, sub-frame
+
+
+@dataclass(frozen=True)
+class CsvBlock:
+    """`rate` Hz; names (k,) above their first columns, columns and units (w,), and the rows."""
+
+    rate: float
+    names: tuple[str, ...]
+    columns: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[TextRow, ...]
+
+    @property
+    def width(self) -> int:
+        return len(self.columns)
+
+
+def read_vicon(path: Path, options: Options) -> Recording:
+    """Trajectories as `markers`, each channel of a device as `analog/<device>.<channel>`.
+
+    Times are frame numbers over the block's rate, from the first frame of all. Options: `unit` of
+    length in place of the file's, `sd` of a coordinate (0: not stated), `frame` (default capture).
+    Other blocks are listed as unread. Raises `UsageError` without a unit of length,
+    `RecordingError` for a file without trajectories and devices, or damaged.
+    """
+    held = text_rows(path)
+    blocks = _blocks(held)
+    streams: dict[str, Stream] = {}
+    told = {"kind": "motion capture (Vicon CSV)"}
+    if _POINTS in blocks:
+        markers, more = _points(held, blocks[_POINTS], options)
+        streams["markers"] = markers
+        told |= more
+    devices = {title: block for title, block in blocks.items() if title.startswith(_DEVICES)}
+    for title, block in devices.items():
+        signals, more = _signals(held, block, title.removeprefix(_DEVICES), options)
+        streams |= signals
+        told |= more | told_left([r[LEFT_OUT] for r in (told, more) if LEFT_OUT in r])
+    told |= _events(held)
+    if not streams:
+        raise RecordingError(
+            f"{path.name}: neither trajectories nor devices; it has "
+            f"{', '.join(blocks) or 'none'}; export those two as well"
+        )
+    unread = {
+        title: f"a block of {len(b.rows)} rows that is not read"
+        for title, b in blocks.items()
+        if title != _POINTS and title not in devices
+    }
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.stem, source, begun(streams), told, unread)
+
+
+def _blocks(held: TextRows) -> dict[str, CsvBlock]:
+    """Blocks by title, numbered where one stands twice; one without rows is left out."""
+    begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
+    found: dict[str, CsvBlock] = {}
+    titles: Counter[str] = Counter()
+    for begin, end in pairwise([*begins, len(held.rows)]):
+        title = held.rows[begin].cell(0)
+        block = _block(held, held.rows[begin:end]) if title != _EVENTS else None
+        if block is not None:
+            titles[title] += 1
+            found[title if titles[title] == 1 else f"{title} ({titles[title]})"] = block
+    return found
+
+
+def _events(held: TextRows) -> dict[str, str]:
+    """Rows of subject, context, name and time below their title, rate and names."""
+    begin = next((i for i, r in enumerate(held.rows) if r.cell(0) == _EVENTS and _lone(r)), None)
+    rows = held.rows[begin + 3 :] if begin is not None else ()
+    end = next((i for i, r in enumerate(rows) if not any(r.cells)), len(rows))
+    told = [f"{' '.join(filter(None, r.cells[1:3]))} {r.cell(3)} s" for r in rows[:end]]
+    return (
+        {"events": f"{'; '.join(told)} (events of the trial, listed but not stored as a stream)"}
+        if told
+        else {}
+    )
+
+
+def _lone(row: TextRow) -> bool:
+    return not any(row.cells[1:])
+
+
+def _block(held: TextRows, rows: tuple[TextRow, ...]) -> CsvBlock | None:
+    if len(rows) < 6:
+        return None
+    _, rate, names, columns, units, *values = rows
+    hz = as_number(rate.cell(0)) or 0.0
+    if not 0 < hz < np.inf:
+        raise RecordingError(
+            f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is not a rate in Hz; damaged"
+        )
+    end = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
+    width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)
+    return CsvBlock(hz, names.cells, columns.cells[:width], units.cells, tuple(values[:end]))
+
+
+def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers, Mapping[str, str]]:
+    """Named triples X, Y, Z; derivatives (X', X'') are passed over."""
+    axes = tuple(c.upper() for c in block.columns)
+    at = [i for i in range(_BEFORE, block.width - 2) if axes[i : i + 3] == ("X", "Y", "Z")]
+    if not at:
+        raise RecordingError(f"{held.name}: trajectories without columns X, Y, Z; damaged")
+    names = distinct([block.names[i] if i < len(block.names) else "" for i in at], len(at))
+    values, rows, left = numbers(held, block.rows, block.width)
+    columns = np.array(at)[:, None] + np.arange(3)
+    shown, zeros = without_zeros(values[:, columns])
+    x = whole_points(held, shown, names, rows)
+    unit = next((u for u in block.units[_BEFORE:] if u), "")
+    factor, stated = metres(options, unit, held.name)
+    markers = Markers(
+        values[:, 0] / block.rate, names, factor * x, spread(options),
+        options.get("frame", "capture"),
+    )  # fmt: skip
+    missing = f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}"
+    return markers, {"unit": stated, "rate_hz": repr(block.rate), "points_not_seen": missing,
+                     **told_zeros(zeros),
+                     **told_left(left)}  # fmt: skip
+
+
+def _signals(
+    held: TextRows, block: CsvBlock, more: str, options: Options
+) -> tuple[dict[str, Signal], dict[str, str]]:
+    """Channels of devices; one with blank cells is left out and told. `more` follows each name."""
+    values, _, left = numbers(held, block.rows, block.width)
+    t = _sub_frames(values) / block.rate
+    found, gone = {}, list(left)
+    frame = options.get("frame", "capture")
+    for i, topic in enumerate(_channels(block, more), start=_BEFORE):
+        if np.isnan(values[:, i]).any():
+            gone.append(f"{topic}: {int(np.isnan(values[:, i]).sum())} blank cells")
+            continue
+        unit = block.units[i] if i < len(block.units) else ""
+        found[topic] = Signal(t, values[:, [i]], unit or "not stated", 0.0, frame)
+    return found, {"analog_rate_hz": repr(block.rate), **told_left(gone)}
+
+
+def _channels(block: CsvBlock, more: str) -> tuple[str, ...]:
+    """A topic for every column of a device: its name stands above the first of them."""
+    device, topics = "device", []
+    for i in range(_BEFORE, block.width):
+        device = block.names[i] if i < len(block.names) and block.names[i] else device
+        topics.append(f"analog/{device}.{block.columns[i]}{more}")
+    return distinct(topics, len(topics))
+
+
+def _sub_frames(values: Floats) -> Floats:
+    """Samples counted from frame 0: the block's rate is that of its rows, so that a frame has as
+    many samples as it has sub-frames."""
+    each = values[:, 1].max() + 1
+    return np.asarray(values[:, 0] * each + values[:, 1])
+
+
+def _recognises(path: Path) -> bool:
+    first = head(path, 64).removeprefix(b"\xef\xbb\xbf").splitlines()
+    return bool(first) and first[0].rstrip(b",;\t\r ").decode("ascii", "replace") in _TITLES
+
+
+VICON = Reader(
+    "vicon",
+    "motion capture (Vicon CSV)",
+    _recognises,
+    read_vicon,
+    "its first cell is the title of a block, as Trajectories",
+    options=(UNIT, SD, frame("capture")),
+    extensions=(".csv",),
+)

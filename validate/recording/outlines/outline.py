@@ -1,0 +1,392 @@
+"""The outline of an anechoic inclusion in a B-mode image, with its uncertainty, or the reason why
+there is none.
+
+No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
+(`discs`), unless a centre and radius are given; the wall is the closed path in polar
+coordinates that best parts two kinds of speckle (`polar`); it is then moved to where half
+of the power is left (`wall`) and judged (`quality`). Refusals rest on numbers that
+do not depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall
+that is closed or lies outside the image.
+
+Limits: the region must be star-shaped about its centroid; regions under about 20 speckles are lost.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import least_squares
+
+from validate.arrays import Floats, checked, rms
+from validate.errors import RecordingError
+from validate.recording.images.image import ellipse_through
+from validate.recording.outlines.discs import candidates, scanned
+from validate.recording.outlines.polar import (
+    ANGLES,
+    DIRECTIONS,
+    RAYS,
+    Grey,
+    Wall,
+    speckle_area,
+    trace,
+)
+from validate.recording.outlines.wall import placed
+from validate.recording.types import Contours, Frames
+
+# --- Is a traced path the wall of a closed dark region, and how well is it known?
+
+SD_NOISE = 1.2  # wall error / (speckle size / contrast), measured on twins
+SD_BIAS = 0.2  # what is left of the wall error where contrast is high / speckle size
+_SECTOR = 20.0  # deg of the wall that are judged together
+
+
+@dataclass(frozen=True)
+class Quality:
+    """gcnr 0..1 of inside against surroundings, closed share of the wall 0..1."""
+
+    gcnr: float
+    closed: float
+
+
+def quality(grey: Grey, wall: Wall) -> Quality:
+    """How well a path parts dark from bright.
+
+    gcnr is 1 - overlap of the two grey level distributions (generalised contrast-to-noise ratio,
+    Rodriguez-Molares et al. 2020): 0 for alike, 1 for apart, whatever the grey scale. `closed` is
+    the share of the wall whose own surroundings (20 deg of them) are brighter than the inside by
+    at least a third of the outline's median contrast.
+    """
+    within, beside = (_band(grey, wall, *span) for span in ((0.1, 0.85), (1.1, 1.5)))
+    return Quality(_gcnr(within[0], beside[0]), _closed(within, beside))
+
+
+def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floats]:
+    """Values (RAYS, 24) between two shares of the radius and their area weights (24,)."""
+    shares = np.sqrt(np.linspace(low**2, high**2, 24))  # equal areas
+    away = wall.radius[:, None, None] * shares[None, :, None] * DIRECTIONS[:, None, :]
+    return grey.at(wall.centre + away), shares
+
+
+def _gcnr(inside: Floats, outside: Floats) -> float:
+    edges = np.linspace(0, 256, 33)
+    a, b = (np.histogram(v[~np.isnan(v)], edges)[0] for v in (inside, outside))
+    if not (a.sum() and b.sum()):
+        return 0.0
+    return float(1 - np.minimum(a / a.sum(), b / b.sum()).sum())
+
+
+def _closed(within: tuple[Floats, Floats], beside: tuple[Floats, Floats]) -> float:
+    values = beside[0]
+    seen = ~np.isnan(values)
+    width = _SECTOR / 360 * RAYS / 2
+    total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
+    count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
+    step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
+    return float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0
+
+
+def wall_sd(grey: Grey, wall: Wall) -> float:
+    """Standard deviation m along the normal, rms over the wall.
+
+    A wall between two kinds of speckle is known to a speckle's size over the contrast of both; its
+    place under the blur to a part of the speckle's size. Both factors were measured on twins of
+    known truth (benchmarks/contours.py prints the calibration).
+    """
+    contrast = np.maximum(wall.levels.contrast, 0.5)
+    share = SD_NOISE**2 * float((1 / contrast**2).mean()) + SD_BIAS**2
+    return float(np.sqrt(grey.speckle * share))
+
+
+# --- Ellipses and circles through an outline's points, and how far points lie off a curve.
+
+
+def ellipse_points(points: Floats) -> Floats:
+    """Points (120, 2) on the direct least-squares ellipse (Fitzgibbon et al. 1999) of (k, 2)."""
+    centre, axes, turn = ellipse_through(points)
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    around = np.stack([axes[0] * np.cos(ANGLES), axes[1] * np.sin(ANGLES)], axis=1)
+    return np.asarray(centre + around @ R.T)
+
+
+def circle_points(points: Floats) -> Floats:
+    """Points (120, 2) on the circle of least radial distances to points (k, 2)."""
+    middle = points.mean(axis=0)
+    scale = float(np.linalg.norm(points - middle, axis=1).mean())
+
+    def off(p: Floats) -> Floats:
+        return np.asarray(np.linalg.norm(points - middle - scale * p[:2], axis=1) / scale - p[2])
+
+    found = least_squares(off, [0.0, 0.0, 1.0]).x
+    return np.asarray(middle + scale * found[:2] + scale * found[2] * DIRECTIONS)
+
+
+def off_curve(points: Floats, curve: Floats) -> Floats:
+    """Distances (k,) of points (k, 2) from the closed curve through (m, 2), along its chords.
+
+    Of 120 points of a circle the chords lie within 0.04 % of the radius.
+    """
+    chord = np.roll(curve, -1, axis=0) - curve
+    away = points[:, None] - curve
+    share = np.clip((away * chord).sum(axis=-1) / (chord**2).sum(axis=-1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[..., None] * chord, axis=-1).min(axis=1))
+
+
+# -------------------------------------------------------------------------------------------------
+
+Shape = Literal["free", "ellipse", "circle"]
+
+MIN_GCNR = 0.63  # 1 - overlap of the grey levels of region and surroundings
+MIN_EVIDENCE = 80.0  # nats
+MIN_CLOSED = 0.75  # of the wall; two edge shadows take some 20 %
+MAX_MISSING = 0.03  # of the wall outside the image
+_ROUGH_RADIUS = 0.25  # of the shorter side, when only a centre is given
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A closed outline: points (k, 2) m in image coordinates, sd m along the normal.
+
+    centre (2,) m and radius m (of equal area); contrast 0..1 is the generalised contrast-to-noise
+    ratio; moved m is by how much the wall was moved outward from the path for the blur.
+    """
+
+    points: Floats
+    sd: float
+    centre: Floats
+    radius: float
+    contrast: float
+    closed: float
+    moved: float
+    shape: Shape
+
+    def __post_init__(self) -> None:
+        points = checked(self.points, "outline [m]", (None, 2), error=RecordingError)
+        centre = checked(self.centre, "outline centre [m]", (2,), error=RecordingError)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "centre", centre)
+
+
+def extract_outline(
+    image: NDArray[np.uint8],
+    m_per_px: tuple[float, float],
+    *,
+    centre: Sequence[float] | Floats | None = None,
+    radius: float | None = None,
+    shape: Shape = "free",
+    bright: bool = False,
+) -> Outline:
+    """The outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
+
+    `centre` (2,) m and `radius` m may be given roughly (a radius within a third of the true one);
+    m_per_px is (x, y). `shape` "free" follows the wall, the others fit it. Raises `RecordingError`
+    with the numbers where there is no such region: none found, contrast too low, open, cut by the
+    border.
+    """
+    grey = _darkened(image, m_per_px, bright)
+    return _placed(grey, *_first(_walls(grey, centre, radius), bright), shape, bright)
+
+
+@dataclass(frozen=True)
+class RivalRegion:
+    """Another closed region of an image: centre (2,) m, radius m, and how well it parts from its
+    surroundings as a share of how well the outline does."""
+
+    centre: Floats
+    radius: float
+    share: float
+
+    @property
+    def words(self) -> str:
+        x, y = 1e3 * self.centre
+        return f"({x:.1f}, {y:.1f}) mm, radius {1e3 * self.radius:.1f} mm"
+
+
+def rivals_of(
+    image: NDArray[np.uint8],
+    m_per_px: tuple[float, float],
+    outline: Outline,
+    *,
+    radius: float | None = None,
+    bright: bool = False,
+) -> tuple[RivalRegion, ...]:
+    """Other regions that would pass where no centre is given, the strongest first; arguments as of
+    `extract_outline`."""
+    grey = _darkened(image, m_per_px, bright)
+    walls = [w for w in _walls(grey, None, radius) if not _refusal(*w)]
+    others = [w for w in walls if not _beside(w[0], outline)]
+    own = [_strength(*w) for w in walls if _beside(w[0], outline)]
+    base = max(own or [_strength(*w) for w in others], default=1.0)
+    found: list[RivalRegion] = []
+    for wall, judged in sorted(others, key=lambda w: -_strength(*w)):
+        if all(np.linalg.norm(wall.centre - r.centre) > r.radius for r in found):
+            found.append(RivalRegion(wall.centre, rms(wall.radius), _strength(wall, judged) / base))
+    return tuple(found)
+
+
+def _beside(wall: Wall, outline: Outline) -> bool:
+    return bool(np.linalg.norm(wall.centre - outline.centre) < outline.radius)
+
+
+def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: bool) -> Grey:
+    if image.ndim != 2 or image.dtype != np.uint8 or min(image.shape) < 16:
+        raise RecordingError(f"image {image.shape} {image.dtype}: expected 16 x 16 uint8 or larger")
+    plain = image.astype(np.float64)
+    dark = 255.0 - plain if bright else plain
+    return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
+
+
+def _placed(grey: Grey, wall: Wall, judged: Quality, shape: Shape, bright: bool) -> Outline:
+    found = placed(grey, wall, bright)
+    free = _outline(found.points, wall_sd(grey, wall), judged, found.moved)
+    return free if shape == "free" else _fitted(free, shape, grey)
+
+
+def outlines_of(
+    frames: Frames,
+    *,
+    centre: Sequence[float] | Floats | None = None,
+    radius: float | None = None,
+    shape: Shape = "free",
+    bright: bool = False,
+    images: str = "",
+) -> Contours:
+    """The outline of every image; sd is the root mean square of all.
+
+    `images` is the topic of the frames, kept with the outlines. Other options as in
+    `extract_outline`. Raises `RecordingError` naming the first image without one and how many there
+    are: none is left out silently.
+    """
+    find = partial(extract_outline, centre=centre, radius=radius, shape=shape, bright=bright)
+    outlines: list[Outline] = []
+    refused: list[str] = []
+    for i, image in enumerate(frames.images):
+        try:
+            outlines.append(find(image, frames.m_per_px))
+        except RecordingError as error:
+            refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
+    if refused:
+        raise RecordingError(
+            f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
+        )
+    sd = rms([o.sd for o in outlines])
+    points = tuple(o.points for o in outlines)
+    return Contours(frames.t, points, sd, frames.pose, frames.frame, images)
+
+
+def _starts(
+    grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
+) -> list[tuple[Floats, float]]:
+    if radius is not None and not 0 < radius < np.inf:
+        raise RecordingError(f"rough radius {radius} m: expected a positive number")
+    if centre is None:
+        found = candidates(scanned(grey.image), grey.m_per_px)
+        return [(c.centre, c.radius if radius is None else radius) for c in found]
+    place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
+    if np.isnan(grey.at(place[None])).any():
+        raise RecordingError(
+            f"rough centre ({1e3 * place[0]:.2f}, {1e3 * place[1]:.2f}) mm lies outside the image "
+            f"of {_size(grey)}; it is measured from the first pixel"
+        )
+    if radius is not None:
+        return [(place, radius)]
+    sides = np.array(grey.image.shape[::-1]) * np.array(grey.m_per_px)
+    largest = _ROUGH_RADIUS * float(sides.min())
+    return [(place, largest * factor) for factor in (0.25, 0.5, 1.0, 1.5)]
+
+
+def _size(grey: Grey) -> str:
+    height, width = grey.image.shape
+    return f"{1e3 * width * grey.m_per_px[0]:.1f} x {1e3 * height * grey.m_per_px[1]:.1f} mm"
+
+
+def _walls(
+    grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
+) -> Iterator[tuple[Wall, Quality]]:
+    """Walls traced from every start, the most promising first."""
+    starts = _starts(grey, centre, radius)
+    if not starts:
+        raise RecordingError("no closed dark region: no disc is darker than its surroundings")
+    for start in _ranked(grey, starts):
+        wall = trace(grey, *start)
+        yield wall, quality(grey, wall)
+
+
+def _first(walls: Iterator[tuple[Wall, Quality]], bright: bool) -> tuple[Wall, Quality]:
+    """The first whose wall is closed, apart in grey level and large."""
+    refusals = []
+    for wall, judged in walls:
+        refusal = _refusal(wall, judged)
+        if not refusal:
+            return wall, judged
+        refusals.append(refusal)
+    raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
+
+
+def _strength(wall: Wall, judged: Quality) -> float:
+    return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
+
+
+def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats, float]]:
+    """The starts, the most promising first, after two rounds each."""
+    if len(starts) == 1:
+        return starts
+
+    def rank(start: tuple[Floats, float]) -> tuple[bool, float]:
+        wall = trace(grey, *start, rounds=2)
+        q = quality(grey, wall)
+        return not _refusal(wall, q), _strength(wall, q)
+
+    return sorted(starts, key=rank, reverse=True)
+
+
+def _refusal(wall: Wall, judged: Quality) -> str:
+    """Why a wall is none; empty when it is."""
+    radius = 1e3 * rms(wall.radius)
+    place = f"at ({1e3 * wall.centre[0]:.1f}, {1e3 * wall.centre[1]:.1f}) mm, radius {radius:.1f}"
+    if wall.missing > MAX_MISSING:
+        return (
+            f"the region {place} mm is cut by the border, {100 * wall.missing:.0f} % of its "
+            f"wall lies outside; use an image that shows all of it"
+        )
+    if judged.gcnr < MIN_GCNR or wall.evidence < MIN_EVIDENCE:
+        return (
+            f"the best region {place} mm has contrast {judged.gcnr:.2f} (needs {MIN_GCNR:g}) and "
+            f"evidence {wall.evidence:.0f} nats (needs {MIN_EVIDENCE:g}); give its rough centre "
+            "and radius, or raise the gain"
+        )
+    if judged.closed < MIN_CLOSED:
+        return (
+            f"the best region {place} mm is closed along {100 * judged.closed:.0f} % of its wall "
+            f"(needs {100 * MIN_CLOSED:g} %); give its rough centre and radius"
+        )
+    return ""
+
+
+def _outline(points: Floats, sd: float, judged: Quality, moved: float) -> Outline:
+    centre, radius = _enclosed(points)
+    return Outline(points, sd, centre, radius, judged.gcnr, judged.closed, moved, "free")
+
+
+def _enclosed(points: Floats) -> tuple[Floats, float]:
+    """Centroid (2,) and radius of the circle of equal area of a closed outline (k, 2)."""
+    middle = points.mean(axis=0)
+    a, b = points - middle, np.roll(points, -1, axis=0) - middle
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = float(cross.sum()) / 2
+    centroid = middle + ((a + b) * cross[:, None]).sum(axis=0) / (6 * area)
+    return centroid, float(np.sqrt(abs(area) / np.pi))
+
+
+def _fitted(free: Outline, shape: Shape, grey: Grey) -> Outline:
+    """An ellipse or circle through a free outline; what does not fit enters its sd."""
+    fit, freedom = (ellipse_points, 5) if shape == "ellipse" else (circle_points, 3)
+    points = fit(free.points)
+    centre, radius = _enclosed(points)
+    misfit = max(rms(off_curve(free.points, points)) ** 2 - free.sd**2, 0.0)
+    independent = max(2 * np.pi * free.radius / (4 * np.sqrt(grey.speckle)), freedom)
+    sd = float(np.sqrt(free.sd**2 * freedom / independent + misfit))
+    return replace(free, points=points, sd=sd, centre=centre, radius=radius, shape=shape)

@@ -1,0 +1,319 @@
+"""Tables of points as one's own scripts write them: a column a coordinate, or a row a point.
+
+`time (s), tip_x (mm), tip_y (mm), tip_z (mm), ...` are markers over time; `name, x, y, z` are
+landmarks at one instant; with a time or a frame in each row, and a name in several, markers again.
+Columns that belong to no point are told, never taken for one.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError, ValidateError
+from validate.recording.formats.options import (
+    M_PER_PX,
+    RATE,
+    SD,
+    UNIT,
+    above_zero,
+    frame,
+    length,
+    metres,
+    spread,
+)
+from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.motion_capture.text_rows import (
+    ASSUMED,
+    LEFT_OUT,
+    NONE,
+    TextRow,
+    TextRows,
+    as_number,
+    numbers,
+    rows_of,
+    text_rows,
+    told_left,
+    whole_points,
+)
+from validate.recording.reader import MapOption, Options, Reader, head, source_of
+from validate.recording.tables.displacement_field import field_columns, is_grid
+from validate.recording.tables.point_layout import AXES, PIXELS, PointLayout, layout_of
+from validate.recording.tables.table import split_unit
+from validate.recording.tables.vocabulary import role_of_name
+from validate.recording.types import Markers, Recording
+from validate.units import si_factor
+
+_SPARSE = 20  # cells of markers for each row; beyond it tracks are fragments
+_UNSURE = 0.6  # the likelihood below which DeepLabCut itself draws no point
+_FURTHER = (
+    MapOption("time", "unit of the times", "a time", "as the table declares"),
+    MapOption("z", "third coordinate of points with x and y alone", "m"),
+    MapOption("likelihood", "below it a point is not seen", "1", f"{_UNSURE}"),
+)
+
+
+def read_point_table(path: Path, options: Options) -> Recording:
+    """Points over time as `markers` (nt, k, 3) m, or rows of named points as `landmarks` (1, k, 3).
+
+    Blank cells and NaN are "not seen". Options: `unit` of length and `time` (its unit) in place of
+    the table's, `m_per_px` where coordinates are pixels, `likelihood` below which DeepLabCut's are
+    not seen, `rate` (Hz) in place of its times, `z` where points have x and y alone, `sd` of a
+    coordinate (0: not stated), `frame` (default capture). Raises `UsageError` for what the table
+    does not say, `RecordingError` for one without points, or damaged.
+    """
+    held = text_rows(path)
+    layout = layout_of(held)
+    if layout is None:
+        raise RecordingError(
+            f"{held.name}: no line names points; expected columns such as time (s), tip_x (mm), "
+            f"tip_y (mm), tip_z (mm), or name, x, y, z"
+        )
+    instant = [] if layout.instant is None else [layout.instant]
+    columns = [*layout.columns, *layout.sure, *instant]
+    values, rows, left = numbers(held, layout.rows, len(layout.names), columns)
+    _require_motion(held, layout, values)
+    x = _points(held, layout, values, rows)
+    x, unsure = _without_unsure(layout, x, values, options)
+    factor, stated = _scale(held, layout, options)
+    third = factor if x.shape[2] == len(AXES) else 1.0
+    x = _with_third(held, x, options) * np.array([factor, factor, third])
+    landmarks = layout.label is not None
+    t = np.zeros(1) if landmarks else _times(held, layout, values, options)
+    names = _labels(held, layout, rows) if landmarks else tuple(layout.points)
+    if layout.whose is not None:
+        t, names, x = _by_instants(held, layout, rows, t, x)
+    markers = Markers(t, names, x, spread(options), options.get("frame", "capture"))
+    told = {"kind": "a table of points", "unit": stated,
+            "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
+            **unsure, **_others(layout), **told_left(left)}  # fmt: skip
+    topic = "landmarks" if landmarks else "markers"
+    source = source_of(path, "text file: integrity not provable")
+    return recorded(path.stem, source, {topic: markers}, told)
+
+
+def _require_motion(held: TextRows, layout: PointLayout, values: Floats) -> None:
+    """Refuse points of a grid at one instant: over time, one point would jump between them."""
+    moves = layout.instant is not None
+    count = len(values) // len(np.unique(values[:, -1])) if moves else len(values)
+    field = field_columns([split_unit(name)[0] for name in layout.names])
+    rows = f"{held.name}: {count} rows" + (
+        f" at each '{layout.names[layout.instant or 0]}'" * moves
+    )
+    if count > 1 and field and (layout.whose is None or field.strains):
+        raise RecordingError(field.refusal(rows))
+    one = len(layout.points) == 1 and layout.label is None and layout.whose is None
+    if one and not moves and is_grid(values):
+        raise RecordingError(
+            f"{rows} on a grid of {len(np.unique(values[:, 0]))} x {len(np.unique(values[:, 1]))} "
+            "places at one instant, not the motion of one point; add a column called name (a "
+            "landmark per row), or for a single point a column called time"
+        )
+
+
+def _points(
+    held: TextRows, layout: PointLayout, values: Floats, rows: tuple[TextRow, ...]
+) -> Floats:
+    """Coordinates (nt, k, d) in the table's unit; of landmarks (1, k, d)."""
+    d = len(next(iter(layout.points.values())))
+    x = values[:, : len(layout.columns)].reshape(len(values), -1, d)
+    x = np.where(np.abs(x) < NONE, x, np.nan)
+    if layout.label is not None:
+        if np.isnan(x).any():
+            raise RecordingError(f"{held.name}: a landmark without coordinates; remove its line")
+        return x.reshape(1, -1, d)
+    return whole_points(held, x, tuple(layout.points), rows)
+
+
+def _without_unsure(
+    layout: PointLayout, x: Floats, values: Floats, options: Options
+) -> tuple[Floats, dict[str, str]]:
+    """Points, those of too small a likelihood as not seen, and the record's entry about them."""
+    if not layout.sure:
+        if "likelihood" in options:
+            raise UsageError("--map likelihood: the table has none for each point")
+        return x, {}
+    least = above_zero({"likelihood": str(_UNSURE), **options}, "likelihood")
+    count = len(layout.columns)
+    low = values[:, count : count + len(layout.sure)] < least
+    told = f"likelihood below {least:g} is taken as missing ({int(low.sum())} of {low.size})"
+    entry = (
+        {} if "likelihood" in options else {ASSUMED: f"{told}; change it with --map likelihood=0.9"}
+    )
+    return np.where(low[..., None], np.nan, x), entry or {"likelihood": told}
+
+
+def _scale(held: TextRows, layout: PointLayout, options: Options) -> tuple[float, str]:
+    """Metres in the table's unit, and who said so.
+
+    Raises `UsageError` where nobody does, and for pixels without their size.
+    """
+    unit = "" if "unit" in options else _one_unit(held, layout) or layout.above.get("units", "")
+    if "m_per_px" in options and (not unit or unit in PIXELS):
+        if "unit" in options:
+            raise UsageError(f"{held.name}: --map unit and m_per_px exclude each other; give one")
+        size = length(options, "m_per_px", "0.1mm")
+        return size, f"px of {size:g} m (entered)"
+    if "m_per_px" in options:
+        raise UsageError(f"{held.name}: --map m_per_px: coordinates are in {unit}")
+    if unit in PIXELS:
+        raise UsageError(f"{held.name}: coordinates in pixels; give the pixel size, as --map "
+                         f"m_per_px=0.1mm")  # fmt: skip
+    return metres(options, unit, held.name)
+
+
+def _by_instants(
+    held: TextRows, layout: PointLayout, rows: Sequence[TextRow], t: Floats, x: Floats
+) -> tuple[Floats, tuple[str, ...], Floats]:
+    """Times (nt,), names and points (nt, k, 3) of rows (n, p, 3) that are each of one instant and
+    one label; NaN where a label has no row.
+
+    Raises `RecordingError` for two rows of one label at one instant, and for many short tracks.
+    """
+    labels = [row.cell(layout.whose or 0) or "unnamed" for row in rows]
+    own = {label: i for i, label in enumerate(dict.fromkeys(labels))}
+    instants, at = np.unique(t, return_inverse=True)
+    if len(instants) * len(own) > _SPARSE * len(rows) + 1000:
+        raise RecordingError(f"{held.name}: {len(own)} labels at {len(instants)} instants in only "
+                             f"{len(rows)} rows; keep only long tracks")  # fmt: skip
+    places = list(zip(at.tolist(), (own[label] for label in labels), strict=True))
+    twice = next((p for p, count in Counter(places).items() if count > 1), None)
+    if twice is not None:
+        line = [r.line for r, p in zip(rows, places, strict=True) if p == twice][1]
+        raise RecordingError(f"{held.name}: line {line}: '{labels[places.index(twice)]}' has "
+                             "another row at this instant; remove one")  # fmt: skip
+    found = np.full((len(instants), len(own), *x.shape[1:]), np.nan)
+    found[tuple(np.array(places).T)] = x
+    several = len(layout.points) > 1
+    names = [f"{n}.{p}" if several else n for n in own for p in layout.points]
+    return instants - instants[0], tuple(names), found.reshape(len(instants), -1, x.shape[2])
+
+
+def _with_third(held: TextRows, x: Floats, options: Options) -> Floats:
+    """Points with the z that the user says, where they have none: in m, as the factor knows."""
+    if x.shape[2] == len(AXES):
+        if "z" in options:
+            raise UsageError(f"{held.name}: --map z: the points already have a z; leave it out")
+        return x
+    if "z" not in options:
+        raise UsageError(f"{held.name}: points have x and y only; give the position of their "
+                         f"plane, as --map z=0mm")  # fmt: skip
+    z = length(options, "z", "0mm", zero=True) + 0 * x[..., :1]  # NaN where it was not seen
+    return np.concatenate([x, z], axis=2)
+
+
+def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options) -> Floats:
+    """Seconds of each row from the first instant."""
+    instants = values[:, -1] if layout.instant is not None else np.arange(float(len(values)))
+    if np.isnan(instants).any():
+        line = layout.rows[int(np.argmax(np.isnan(instants)))].line
+        raise RecordingError(f"{held.name}: line {line}: it has no time; correct it")
+    if layout.whose is None:
+        _require_one_row_each(held, layout, instants)
+    elif layout.time is not None and "rate" in options:
+        nth = np.unique(instants, return_inverse=True)[1]
+        return np.asarray(nth / above_zero(options, "rate"))
+    if layout.time is None:
+        return np.asarray((instants - instants.min()) / _frequency(held, layout, options))
+    if "rate" in options:
+        return np.arange(len(values)) / above_zero(options, "rate")
+    t = _seconds_of(held, layout, options) * instants
+    if layout.whose is None and (np.diff(t) <= 0).any():
+        at = 1 + int(np.argmax(np.diff(t) <= 0))
+        raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is not after "
+                             f"the one before; correct it, or give --map rate=HZ")  # fmt: skip
+    return np.asarray(t - t.min())
+
+
+def _require_one_row_each(held: TextRows, layout: PointLayout, instants: Floats) -> None:
+    """Refuses rows of several points at each instant whose names no column has: as rows in time,
+    one point would jump between them."""
+    count, column = len(instants) / len(np.unique(instants)), layout.instant or 0
+    if count >= 2 and len(layout.points) == 1:
+        raise RecordingError(
+            f"{held.name}: {count:.3g} rows at each '{layout.names[column]}', and no column names "
+            "the point of each row; add one called marker, or for a single point remove that column"
+        )
+    if layout.time is None and (np.diff(instants) <= 0).any():
+        line = layout.rows[1 + int(np.argmax(np.diff(instants) <= 0))].line
+        raise RecordingError(f"{held.name}: line {line}: its '{layout.names[column]}' is not "
+                             f"after the one before; correct it, or remove that "
+                             f"column")  # fmt: skip
+
+
+def _seconds_of(held: TextRows, layout: PointLayout, options: Options) -> float:
+    """Seconds of the unit of time."""
+    name = layout.names[layout.time or 0]
+    unit = options.get("time", layout.units[layout.time or 0])
+    if not unit:
+        raise UsageError(f"{held.name}: '{name}' has no unit; give --map time=s, or --map "
+                         f"rate=HZ")  # fmt: skip
+    return si_factor(unit, "time")
+
+
+def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:
+    """Hz, as the user says it, else a line above the names."""
+    if "rate" in options:
+        return above_zero(options, "rate")
+    stated = as_number(layout.above.get("frequency", "")) or 0.0
+    if not 0 < stated < np.inf:
+        raise UsageError(
+            f"{held.name}: no column of time; if its rows are instants, give --map rate=HZ; if "
+            f"they "
+            "are points at one instant, name each in a column called name"
+        )
+    return stated
+
+
+def _labels(held: TextRows, layout: PointLayout, rows: Sequence[TextRow]) -> tuple[str, ...]:
+    """Names of landmarks; refuses names that all stand several times: rows of other instants."""
+    labels = [row.cell(layout.label or 0) for row in rows]
+    often = Counter(labels)
+    if len(often) > 1 and min(often.values()) > 1:
+        raise RecordingError(
+            f"{held.name}: every one of {len(often)} names occurs in several rows, and no column "
+            "gives the time; add one called frame or time"
+        )
+    return distinct(labels, len(rows))
+
+
+def _one_unit(held: TextRows, layout: PointLayout) -> str:
+    units = {layout.units[i] for i in layout.columns}
+    if len(units) > 1:
+        shown = ", ".join(repr(u) for u in sorted(units))
+        raise UsageError(f"{held.name}: coordinates in {shown}; give one, as --map unit=mm")
+    return units.pop()
+
+
+def _others(layout: PointLayout) -> dict[str, str]:
+    taken = {*layout.columns, *layout.sure, layout.instant, layout.label, layout.whose}
+    left = [repr(n) for i, n in enumerate(layout.names) if i not in taken and n]
+    return {LEFT_OUT + ", columns": ", ".join(left)} if left else {}
+
+
+def _recognises(path: Path) -> bool:
+    """Text whose first lines have one that names points, and none of a force: such a log is a
+    testing machine's first, and its points come in by --as."""
+    begin = head(path)
+    begin = begin[: begin.rfind(b"\n") + 1]
+    if not begin or 0 in begin[:2]:
+        return False
+    try:
+        layout = layout_of(rows_of(path.name, begin))
+    except ValidateError:
+        return False
+    return layout is not None and "force" not in map(role_of_name, layout.names)
+
+
+POINTS = Reader(
+    "points",
+    "a table of points (CSV)",
+    _recognises,
+    read_point_table,
+    "a line names coordinates of points",
+    options=(UNIT, M_PER_PX, SD, frame("capture"), RATE, *_FURTHER),
+    extensions=(".csv", ".tsv", ".txt"),
+    general=True,
+)

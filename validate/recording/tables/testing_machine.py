@@ -1,0 +1,383 @@
+"""Force-displacement tests exported as text (Instron / Bluehill and others) as recordings."""
+
+import codecs
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks.clock_check import clock_of
+from validate.recording.motion_capture.text_rows import ASSUMED, told_left
+from validate.recording.reader import Reader, head
+from validate.recording.tables.blocks import parse_tables, without_repeats
+from validate.recording.tables.columns import (
+    NEEDED,
+    OPTIONS,
+    MissingColumnError,
+    Pick,
+    Said,
+    derived_pick,
+    left_columns,
+    parse_mapping,
+    role_of,
+    timed_pick,
+)
+from validate.recording.tables.consistency import (
+    MIN_SAMPLES,
+    check_derived,
+    check_height,
+    check_speed,
+    check_swapped,
+    check_time,
+)
+from validate.recording.tables.direction import ASK, Kind, Signs, kind_of_test, signs
+from validate.recording.tables.displacement_field import field_columns
+from validate.recording.tables.encoding import whole_file
+from validate.recording.tables.geometry import loaded_area, specimen_of
+from validate.recording.tables.specimens import chosen, specimen_tables
+from validate.recording.tables.stress import (
+    Sized,
+    Sizes,
+    derived,
+    is_derived,
+    require_left,
+    sizes_of,
+    with_sizes,
+)
+from validate.recording.tables.table import Table
+from validate.recording.tables.vocabulary import tells_a_stop
+from validate.recording.types import Record, Recording, Signal, Source
+
+# --- A log of a force or of a displacement alone, as of weights that are hung on or of a stage.
+
+NONE = "none"
+_UNITS = {"force": "N", "displacement": "m"}
+
+
+def alone(
+    path: Path, data: bytes, table: Table, mapping: Mapping[str, str], label: str, written_as: str
+) -> Recording:
+    """The one signal that the user did not say to be absent, with the sign that it is written with.
+
+    Raises `UsageError` where both are said to be, and as `needed_pick` does.
+    """
+    roles = [role for role in _UNITS if mapping.get(role) != NONE]
+    if not roles:
+        raise UsageError(
+            "--map force=none --map displacement=none: no column is left to read; leave one of "
+            "them out"
+        )
+    role = roles[0]
+    said = parse_mapping({k: v for k, v in mapping.items() if v != NONE}, table)
+    table = without_repeats(table, said.get("time"), mapping.get("repeated"))
+    time, pick = (timed_pick(name, table, said.get(name)) for name in ("time", role))
+    check_time(time, table.lines)
+    sign = (pick.said.sign if pick.said else None) or 1
+    y = sign * pick.values[:, None] + 0.0  # no negative zeros
+    stamps = np.round(time.values * 1e9).astype(np.int64)
+    digest = hashlib.sha256(data).hexdigest()
+    return Recording(
+        name=path.stem,
+        source=Source(path.name, digest, len(data), f"{written_as}: integrity not provable"),
+        t0_ns=0,
+        signals={role: Signal(time.values, y, _UNITS[role], 0.0, "machine")},
+        clock={role: clock_of(role, None, stamps, stamps)},
+        metadata={
+            "header": dict(table.header),
+            ASSUMED: _taken(role, time, pick, sign),
+            "provenance": {
+                "file": path.name, "sha256": digest, "specimen in file": label,
+                **told_left(left_columns(table, {time.column.label, pick.column.label})),
+            },
+        },
+    )  # fmt: skip
+
+
+def _taken(role: str, time: Pick, pick: Pick, sign: int) -> dict[str, str]:
+    how = (
+        "reversed, as given by --map"
+        if sign < 0
+        else "as written: the positive direction is not known"
+    )
+    units = (f"'{p.column.label}' in {p.unit} x {p.factor:.6g}" for p in (time, pick))
+    return {"test": f"only {role}, as given by --map", "signs": how, "units": ", ".join(units)}
+
+
+# -------------------------------------------------------------------------------------------------
+
+_SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", "  ": "space",
+                    " ": "space"}  # fmt: skip
+
+
+def read_instron(path: Path, mapping: Mapping[str, str] | None = None) -> Recording:
+    """Read a force-displacement test exported as CSV text, of one specimen.
+
+    Returns signals `displacement` (nt, 1) m and `force` (nt, 1) N, compression positive, on the
+    file's own time in s (sd 0: not stated), and the records `header` (as written), `specimen`
+    (`diameter_m`, `height_m`, ..., in SI; `test`: compression or tension), `assumed` (kind of test,
+    signs, unit factors, each with what decided) and `provenance` (columns, unit factors, sign
+    flips, what was compared). Strain and stress columns only check the others.
+
+    `mapping` overrides what the file says (`--map KEY=VALUE` of the command line):
+
+        force=COLUMN[:UNIT][:-]          UNIT replaces the declared unit, `:-` flips the sign,
+        displacement=COLUMN[:UNIT][:-]   `:+` keeps it; COLUMN is the header text, with or without
+        time=COLUMN[:UNIT]               its unit, or #3 for the third column
+        displacement=none, force=none    it was not logged: the other comes in alone, as written
+        time=every:STEP UNIT             no or useless time column: constant step, `every:0.1s`
+        strain=, stress=, stretch=       COLUMN[:UNIT], where force or displacement is not written:
+        area=314mm2, length=20mm         sizes before the test that make them of stress and strain
+        measure=engineering|true         of which body these are, where their names do not say
+        test=compression|tension         where neither words nor the sign of strain say it
+        specimen=LABEL                   which of several specimens, by the file's label or number
+        repeated=first|last              which row counts where several have the same time
+        encoding=cp1250, decimal=,       how the text is written, where that cannot be found out
+
+    A column or unit given so is believed: checks of it are reported in `provenance`, not raised.
+    Raises `UsageError` for a missing file, an unknown column, and a test that may press or
+    pull; `RecordingError` for a file that is no such table, is damaged or contradicts itself, or
+    holds several specimens and none is named; nothing is ever returned in part.
+    """
+    said = dict(mapping or {})
+    data = whole_file(path)
+    try:
+        tables = specimen_tables(parse_tables(data, said.get("encoding"), said.get("decimal")))
+        label, table = chosen(tables, said.get("specimen"))
+        return recording_of(path, data, table, said, label)
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from error
+
+
+def recording_of(
+    path: Path,
+    data: bytes,
+    table: Table,
+    mapping: Mapping[str, str],
+    label: str,
+    written_as: str = "text file",
+) -> Recording:
+    """The recording of the table of one specimen; `data` are the bytes of the file."""
+    _require_test(table)
+    if NONE in (mapping.get("force"), mapping.get("displacement")):
+        return alone(path, data, table, mapping, label, written_as)
+    said = parse_mapping(mapping, table)
+    table = without_repeats(table, said.get("time"), mapping.get("repeated"))
+    if len(table.lines) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{len(table.lines)} samples; at least {MIN_SAMPLES} are needed; export the whole test"
+        )
+    specimen = specimen_of(table.header, table.decimal)
+    kind = kind_of_test(mapping.get("test"), table.header, _labels(table))
+    sizes = sizes_of(mapping, specimen, kind)
+    found = _found(table, said, sizes, kind)
+    picks, made = {role: one.pick for role, one in found.items()}, _made(found)
+    kind = kind or next((one.kind for one in made.values() if one.kind), None)
+    specimen = with_sizes(specimen, mapping)
+    flips, notes = _checked(table, found, specimen, kind, sizes)
+    time, signals = _signals(picks, flips)
+    stamps = np.round(time * 1e9).astype(np.int64)
+    digest = hashlib.sha256(data).hexdigest()
+    origin = {"file": path.name, "sha256": digest, "specimen in file": label}
+    shown = {key: repr(value) for key, value in specimen.items()}
+    return Recording(
+        name=path.stem,
+        source=Source(path.name, digest, len(data), f"{written_as}: integrity not provable"),
+        t0_ns=0,
+        signals=signals,
+        clock={topic: clock_of(topic, None, stamps, stamps) for topic in signals},
+        metadata={
+            "header": dict(table.header),
+            "specimen": {**shown, "test": flips.kind.name if flips.kind else "not stated"},
+            ASSUMED: {**_assumed(picks, flips), **_by_sizes(made), **_stop(table.header)},
+            "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
+        },
+    )
+
+
+def _require_test(table: Table) -> None:
+    """Refuse rows of a displacement field; with times or a force they may be a test."""
+    field = field_columns([c.name for c in table.columns])
+    if field and not {"time", "force"} & {role_of(c) for c in table.columns}:
+        raise RecordingError(field.refusal(f"{len(table.lines)} rows"))
+
+
+def _labels(table: Table) -> list[str]:
+    """The names of the columns that the test is made of, whether they are taken or not."""
+    return [c.label for c in table.columns if role_of(c)]
+
+
+def _found(
+    table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None
+) -> dict[str, Sized]:
+    """The needed roles, those made by a size with words on how; what is missing is told at once."""
+    found: dict[str, Sized] = {}
+    wrong: list[RecordingError] = []
+    for role in NEEDED:
+        try:
+            if is_derived(role, table, said):
+                found[role] = derived(role, table, said, sizes, kind)
+            else:
+                found[role] = Sized(timed_pick(role, table, said.get(role)), "")
+        except RecordingError as error:
+            wrong.append(error)
+    if wrong:
+        raise _all(wrong, kind)
+    _require_apart(found["displacement"].pick, found["force"].pick, table)
+    return found
+
+
+def _require_apart(displacement: Pick, force: Pick, table: Table) -> None:
+    """Raises `UsageError` where one column would be both."""
+    if displacement.column is not force.column:
+        return
+    kept = "force" if force.said else "displacement"
+    other = "displacement" if force.said else "force"
+    left = [c.label for c in table.columns if role_of(c) == kept and c is not force.column]
+    raise UsageError(
+        f"column '{force.column.label}' would be both displacement and force; name the other "
+        f"column, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
+    )
+
+
+def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
+    """One error for all that is missing, each thing to be said once."""
+    missing = [e for e in wrong if isinstance(e, MissingColumnError)]
+    if len(wrong) == 1 and (kind or not missing):
+        return wrong[0]
+    what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
+    asks = dict.fromkeys(ask for e in missing for ask in e.asks)
+    if missing and not kind:
+        asks[f"{ASK.removeprefix('give ')}, as neither strain nor stretch shows it"] = None
+    return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
+
+
+def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:
+    return {role: one for role, one in found.items() if one.words}
+
+
+def _by_sizes(made: Mapping[str, Sized]) -> Record:
+    return {"sizes": "; ".join(one.words for one in made.values())} if made else {}
+
+
+def _checked(
+    table: Table,
+    found: Mapping[str, Sized],
+    specimen: Mapping[str, float],
+    kind: Kind | None,
+    sizes: Sizes,
+) -> tuple[Signs, list[str]]:
+    """All checks; the flips and what the derived columns said."""
+    time, displacement, force = (found[role].pick for role in NEEDED)
+    strain, stress = derived_pick("strain", table), derived_pick("stress", table)
+    made = _made(found)
+    check_time(time, table.lines)
+    if not made:
+        check_swapped(time, displacement, force, strain, stress)
+    pairs = (
+        (displacement, strain, specimen.get("height_m")),
+        (force, stress, loaded_area(specimen, kind.name if kind else "")),
+    )
+    notes = [
+        check_derived(base, beside, size, table.lines)
+        for base, beside, size in pairs
+        if beside is not None and size is not None and base.role not in made
+    ]
+    if "speed_m_per_s" in specimen and "displacement" not in made:
+        check_speed(time, displacement, specimen["speed_m_per_s"])
+    flips = signs(displacement, force, kind, strain, stress)
+    closing = displacement.values * flips.displacement
+    if "displacement" in made and sizes.length:
+        require_left(made["displacement"], closing, sizes.length)
+    elif "height_m" in specimen:
+        check_height(displacement, closing, specimen["height_m"])
+    return flips, notes
+
+
+def _signals(picks: Mapping[str, Pick], flips: Signs) -> tuple[Floats, dict[str, Signal]]:
+    t = picks["time"].values
+    d, f = picks["displacement"].values, picks["force"].values
+    return t, {
+        "displacement": Signal(t, _column(d * flips.displacement), "m", 0.0, "machine"),
+        "force": Signal(t, _column(f * flips.force), "N", 0.0, "machine"),
+    }
+
+
+def _column(x: Floats) -> Floats:
+    """(n,) as (n, 1); adding 0 turns the negative zeros of such exports into zeros."""
+    return x[:, None] + 0.0
+
+
+def _provenance(
+    table: Table,
+    picks: Mapping[str, Pick],
+    flips: Signs,
+    notes: list[str],
+    mapping: Mapping[str, str],
+) -> Record:
+    used = {picks[role].column.label for role in NEEDED}
+    return {
+        **{f"{role} column": picks[role].column.label for role in NEEDED},
+        **{f"{role} unit": f"{p.unit} x {p.factor!r}" for role, p in picks.items()},
+        "signs flipped": _flipped(flips),
+        "given by the user": ", ".join(f"{k}={v}" for k, v in mapping.items()) or "nothing",
+        "compared": "; ".join(notes) or "nothing: no strain or stress with known geometry",
+        "columns not used": ", ".join(c.label for c in table.columns if c.label not in used),
+        **told_left(left_columns(table, used)),
+        "besides": "; ".join(table.notes) or "nothing",
+        "text": f"{table.encoding} ({table.encoding_why}), "
+        f"{_SEPARATOR_NAMES[table.separator]} separated, decimal sign {table.decimal}, "
+        f"{len(table.lines)} rows",
+    }
+
+
+def _flipped(flips: Signs) -> str:
+    flipped = [role for role in ("displacement", "force") if getattr(flips, role) < 0]
+    return ", ".join(flipped) or "none"
+
+
+def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
+    """Kind of test, signs and unit factors, each with what decided."""
+    kind = f"{flips.kind.name}: {flips.kind.why}" if flips.kind else "not stated"
+    units = [
+        f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (given)' if p.unit_is_said else ''}"
+        for p in picks.values()
+    ]
+    return {
+        "test": kind,
+        "signs": f"flipped: {_flipped(flips)}, so that compression is positive; {flips.why}",
+        "units": ", ".join(units),
+    }
+
+
+def _stop(header: Mapping[str, str]) -> Record:
+    """Words that tell that the run was ended early; how far it got is in the rows."""
+    told = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
+    said = next((text for text in told if tells_a_stop(text)), None)
+    return (
+        {"run": f"aborted, by the words '{said[:60]}'; rows up to there are read"} if said else {}
+    )
+
+
+def _is_text(path: Path) -> bool:
+    """Whether the file begins with text: with a UTF-16 mark, or without control characters."""
+    start = head(path)
+    wide = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return wide or (any(start) and not re.search(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]", start))
+
+
+INSTRON = Reader(
+    "instron",
+    "a testing machine's export, text",
+    _is_text,
+    read_instron,
+    "it is text of no other known format",
+    options=OPTIONS,
+    extensions=(".csv", ".txt", ".tsv"),
+    general=True,
+)

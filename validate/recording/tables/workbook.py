@@ -1,0 +1,195 @@
+"""Testing machines' exports as workbooks (.xlsx, .xls, .ods): the sheet with the test, read as text
+is."""
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from validate.errors import RecordingError, UsageError
+from validate.files import open_file
+from validate.recording.formats.apart import decoded
+from validate.recording.reader import MapOption, Options, Reader, head
+from validate.recording.tables.blocks import parse_tables
+from validate.recording.tables.columns import OPTIONS, role_of
+from validate.recording.tables.encoding import whole_file
+from validate.recording.tables.specimens import chosen, specimen_tables
+from validate.recording.tables.table import Table
+from validate.recording.tables.testing_machine import recording_of
+from validate.recording.types import Recording
+
+_OPTIONS = (*OPTIONS, MapOption("sheet", "sheet of the workbook", default="the one with a test"))
+ALL = "all"  # --map specimen=all
+_WORKBOOK = "xl/workbook.xml"
+_ARCHIVE = b"PK\x03\x04"
+_CONTAINER = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_OPEN_DOCUMENT = b"application/vnd.oasis.opendocument.spreadsheet"
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """A sheet's tables by specimen; none and why where it holds no table."""
+
+    name: str
+    tables: Mapping[str, Table]
+    why: str = ""
+
+    @property
+    def is_test(self) -> bool:
+        return any(
+            {"force", "displacement"} <= {role_of(c) for c in t.columns}
+            for t in self.tables.values()
+        )
+
+
+def read_xlsx(path: Path, options: Options) -> Recording:
+    """The sheet of a workbook that holds displacement and force, as `instron.read_instron` reads
+    text, with its options and `sheet` (a name) where several hold a test.
+
+    The other sheets are named in the notes. Raises as it does, `UsageError` for an unknown sheet
+    and without the library, `RecordingError` where no sheet holds a table, or several hold a test
+    and none is named.
+    """
+    return _read(path, options, "validate.recording.tables.xlsx_arrays")
+
+
+def read_sheets(path: Path, options: Options) -> Recording:
+    """`read_xlsx` of a workbook of old Excel or OpenDocument."""
+    return _read(path, options, "validate.recording.tables.sheets_arrays")
+
+
+def _read(path: Path, options: Options, decoder: str) -> Recording:
+    said = {key: value for key, value in options.items() if key != "sheet"}
+    data = whole_file(path)
+    try:
+        sheets = _sheets(path, options, decoder)
+        sheet = _chosen(sheets, options.get("sheet"))
+        label, table = chosen(sheet.tables, said.get("specimen"))
+        return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from error
+
+
+def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
+    """What chooses each specimen, by its label: those of the sheet that is named or alone holds a
+    test, else of all sheets that do; raises as `read_xlsx`."""
+    decoder = (
+        "validate.recording.tables.xlsx_arrays"
+        if _is_workbook(path)
+        else "validate.recording.tables.sheets_arrays"
+    )
+    try:
+        tests = _tests(_sheets(path, options, decoder), options.get("sheet"))
+    except RecordingError as error:
+        raise RecordingError(f"{path.name}: {error}") from error
+    one = len(tests) == 1
+    return {
+        label if one else s.name if len(s.tables) == 1 else f"{s.name}-{label}":
+        {"sheet": s.name, "specimen": label} for s in tests for label in s.tables
+    }  # fmt: skip
+
+
+def _sheets(path: Path, options: Options, decoder: str) -> list[_Sheet]:
+    found = decoded(decoder, path)
+    texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
+    return [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
+
+
+def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
+    try:
+        return _Sheet(name, specimen_tables(parse_tables(text, "utf-8", decimal or ".")))
+    except RecordingError as error:
+        return _Sheet(name, {}, str(error))
+
+
+def _chosen(sheets: list[_Sheet], said: str | None) -> _Sheet:
+    tests = _tests(sheets, said)
+    if len(tests) > 1:
+        held = ", ".join(f"'{s.name}'" for s in tests[:8])
+        raise RecordingError(
+            f"{len(tests)} sheets may hold the test: {held}; choose one with "
+            f"--map 'sheet={tests[0].name}'; import takes all as repeats with specimen={ALL}"
+        )
+    return tests[0]
+
+
+def _tests(sheets: list[_Sheet], said: str | None) -> list[_Sheet]:
+    """The sheet that is named, else those that hold a test, else those that hold a table."""
+    names = ", ".join(f"'{s.name}'" for s in sheets[:8])
+    if said is not None:
+        named = [s for s in sheets if s.name == said]
+        if not named:
+            raise UsageError(f"--map sheet={said}: unknown sheet; the workbook has {names}")
+        if not named[0].tables:
+            raise RecordingError(f"sheet '{said}': {named[0].why}")
+        return named
+    tests = [s for s in sheets if s.is_test] or [s for s in sheets if s.tables]
+    if not tests:
+        why = sheets[0].why if sheets else "no sheet"
+        raise RecordingError(f"no table in the sheets {names} of this workbook: {why}")
+    return tests
+
+
+def _noted(table: Table, used: _Sheet, sheets: list[_Sheet]) -> Table:
+    others = [f"sheet '{s.name}' not used" for s in sheets if s is not used]
+    return replace(
+        table,
+        encoding=f"sheet '{used.name}'",
+        encoding_why="of a workbook",
+        notes=(*table.notes, *others),
+    )
+
+
+def _is_workbook(path: Path) -> bool:
+    return _packs(path, _WORKBOOK)
+
+
+def _packs(path: Path, name: str, holding: bytes = b"") -> bool:
+    """Whether it is an archive with a member that begins so."""
+    if not head(path, 4).startswith(_ARCHIVE):
+        return False
+    try:
+        with zipfile.ZipFile(path) as packed, packed.open(name) as member:
+            return member.read(len(holding)) == holding
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError, KeyError, RuntimeError):
+        return False
+
+
+def _is_other_workbook(path: Path) -> bool:
+    if head(path, 8) == _CONTAINER:
+        return any(name in _first_names(path) for name in ("Workbook", "Book"))
+    return _packs(path, "mimetype", _OPEN_DOCUMENT)
+
+
+def _first_names(path: Path) -> list[str]:
+    """Names in the first directory sector of a compound file ([MS-CFB] 2.2, 2.6)."""
+    with open_file(path) as file:
+        start = file.read(52)
+        size = 1 << min(int.from_bytes(start[30:32], "little"), 12)
+        file.seek((int.from_bytes(start[48:52], "little") + 1) * size)
+        sector = file.read(size)
+    entries = [sector[i : i + 64] for i in range(0, len(sector), 128)]
+    return [e.decode("utf-16-le", "replace").partition("\0")[0] for e in entries]
+
+
+XLSX = Reader(
+    "xlsx",
+    "a testing machine's export, workbook",
+    _is_workbook,
+    read_xlsx,
+    "it is an archive with a workbook",
+    options=_OPTIONS,
+    extensions=(".xlsx",),
+)
+
+SHEETS = Reader(
+    "sheets",
+    "a testing machine's export, workbook of old Excel (.xls) or OpenDocument (.ods)",
+    _is_other_workbook,
+    read_sheets,
+    "it is a container or archive with a workbook",
+    options=_OPTIONS,
+    extensions=(".xls", ".ods"),
+)

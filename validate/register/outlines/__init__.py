@@ -1,0 +1,19 @@
+"""Outlines in image planes against the wall of a simulated body.
+
+Start with `outlines`.
+"""
+
+from validate.exports import lazily, names
+
+_HOMES = {
+    "outlines": (
+        "Corner",
+        "OutlineObservation",
+        "NormalDistances",
+        "merged",
+        "observe_outlines",
+    )
+}
+
+__all__ = names(_HOMES)
+__getattr__ = lazily(__name__, _HOMES)

@@ -1,0 +1,130 @@
+"""Image planes: poses, and the section of a deformed surface with the plane of an image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from validate.arrays import Floats, Ints
+from validate.errors import RegistrationError
+from validate.fem.assembly.locate import Rows, facet_samples, nearest_node_rows
+from validate.scene.geometries.inclusion import InclusionShape
+from validate.scene.mesh import Mesh
+
+_CANDIDATES = 12  # nearest triangles that may hold a point
+
+
+@dataclass(frozen=True)
+class SurfaceSampler:
+    """Points on a cavity wall that follow the simulation: rest (v, 3) m, rows, triangles (t, 3)."""
+
+    rest: Floats
+    rows: Rows
+    triangles: Ints
+
+    def deformed(self, u: Floats) -> Floats:
+        """Positions (v, 3) m under nodal displacements u (n, 3) m."""
+        return self.rest + self.rows.apply(u)
+
+    def rows_at(self, points: Floats) -> sparse.csr_array:
+        """Rows (m, n) of the places on the wall that are nearest to points (m, 3) m."""
+        middles = self.rest[self.triangles].mean(axis=1)
+        near = cKDTree(middles).query(points, k=min(_CANDIDATES, len(middles)))[1]
+        corners = self.triangles[near.reshape(len(points), -1)]
+        shares = _shares(self.rest[corners], points)
+        feet = np.einsum("pkc,pkcd->pkd", shares, self.rest[corners])
+        best = np.linalg.norm(feet - points[:, None], axis=2).argmin(axis=1)
+        each = np.arange(len(points))
+        shape = (len(points), len(self.rest))
+        entries = (shares[each, best].ravel(), (np.repeat(each, 3), corners[each, best].ravel()))
+        return sparse.csr_array(sparse.csr_array(entries, shape=shape) @ self.rows.weights)
+
+
+def _shares(corners: Floats, points: Floats) -> Floats:
+    """Barycentric coordinates (p, k, 3) of points (p, 3) m in triangles (p, k, 3, 3) m, within
+    them."""
+    start = corners[..., 0, :]
+    u, v = corners[..., 1, :] - start, corners[..., 2, :] - start
+    w = points[:, None] - start
+    uu, uv, vv = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1)
+    wu, wv = (w * u).sum(-1), (w * v).sum(-1)
+    area = np.maximum(uu * vv - uv**2, np.finfo(float).tiny)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    inside = np.clip(np.stack([1 - s - t, s, t], axis=-1), 0, None)
+    return np.asarray(inside / inside.sum(axis=-1, keepdims=True))
+
+
+def cavity_sampler(
+    mesh: Mesh, facets: str, shape: InclusionShape | None, parts: int = 8, *, nearest: bool = False
+) -> SurfaceSampler:
+    """Samples of a cavity wall, `parts` per facet edge.
+
+    With a `shape` the samples lie on it instead of on the flat facets, so that the outline shows
+    the inclusion that was measured and not the corners of the mesh; the displacement is the mesh's,
+    interpolated, or with `nearest` that of the nearest node of the wall (paper 000, section 4.5).
+    """
+    rows, triangles = facet_samples(mesh, mesh.facets[facets], parts)
+    points = rows.apply(mesh.nodes)
+    _, first, number = np.unique(
+        np.round(points, 9), axis=0, return_index=True, return_inverse=True
+    )
+    rows = Rows(rows.weights[first], rows.outside[first])
+    rest = points[first] if shape is None else shape.project(points[first])
+    if nearest:
+        rows = nearest_node_rows(mesh, rest, mesh.facet_nodes(facets))
+    return SurfaceSampler(rest, rows, number.ravel()[triangles])
+
+
+def to_image(pose: Floats, points: Floats) -> Floats:
+    """Scene points (n, 3) m as image x, y and distance from the plane (n, 3) m."""
+    return (points - pose[:3, 3]) @ pose[:3, :3]
+
+
+def from_image(pose: Floats, points: Floats) -> Floats:
+    """Image points (n, 2) m as scene points (n, 3) m."""
+    return points @ pose[:3, :2].T + pose[:3, 3]
+
+
+def require_rigid(pose: Floats, name: str) -> None:
+    """Raises `RegistrationError` when a pose is not a proper rotation and translation."""
+    R = pose[:3, :3]
+    off = float(np.abs(R.T @ R - np.eye(3)).max())
+    if off > 1e-6 or np.linalg.det(R) < 0 or not np.allclose(pose[3], [0, 0, 0, 1]):
+        kind = (
+            "mirrors the image" if np.linalg.det(R) < 0 else f"is not orthogonal: error {off:.1e}"
+        )
+        raise RegistrationError(f"pose '{name}' {kind}; give T_frame_from_image, right-handed")
+
+
+def section(points: Floats, triangles: Ints, pose: Floats) -> Floats:
+    """The closed outline (k, 2) m, image coordinates, where a surface crosses the image plane.
+
+    Raises `RegistrationError` when the plane misses the surface.
+    """
+    local = to_image(pose, points)
+    height = local[:, 2]
+    above = height[triangles] >= 0
+    crossed = triangles[above.any(axis=1) & ~above.all(axis=1)]
+    if len(crossed) == 0:
+        low, high = 1e3 * height.min(), 1e3 * height.max()
+        raise RegistrationError(
+            f"the image plane misses the inclusion, which spans {low:.2f}..{high:.2f} mm from it; "
+            "check the pose of the images"
+        )
+    rings = shapely.polygonize([shapely.line_merge(_segments(local, crossed))]).geoms
+    if not rings:
+        raise RegistrationError("the section with the image plane is not a closed outline")
+    ring = max(rings, key=lambda polygon: float(polygon.area))
+    return np.asarray(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1])
+
+
+def _segments(local: Floats, crossed: Ints) -> shapely.MultiLineString:
+    pairs = np.sort(crossed[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
+    above = local[:, 2] >= 0
+    cut = pairs[above[pairs[..., 0]] != above[pairs[..., 1]]]  # two edges of every triangle
+    start, end = local[cut[:, 0]], local[cut[:, 1]]
+    s = start[:, 2] / (start[:, 2] - end[:, 2])
+    places = start[:, :2] + s[:, None] * (end - start)[:, :2]
+    return shapely.multilinestrings(shapely.linestrings(places.reshape(-1, 2, 2)))

@@ -1,0 +1,205 @@
+"""Where the image plane of a tracked probe lies, from points that were seen in its images.
+
+A point at pixel (u, v) of image k lies at R_k (T (s_x u, s_y v, 0)) + t_k in the tracker's frame, T
+the rigid transform from the image to the probe, (R_k, t_k) the tracked pose of the probe. It must
+meet a known place, or a known straight wire, from which only its distance is known (N-wires and any
+other phantom of wires). Were T any affine map, the equations would be linear in nine unknowns:
+their least squares is the start. As T is rigid there are eight, found by Gauss-Newton.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from validate.arrays import Floats, Ints, rms
+from validate.errors import RegistrationError
+from validate.register.markers.transform import Similarity
+
+_UNKNOWN = 8
+_TIGHT = 1e-14
+_STEP = 1e-6  # rad, m, 1
+_FLAT = 1e-6  # smallest over largest singular value below which the points leave something open
+
+
+@dataclass(frozen=True)
+class KnownTarget:
+    """A known place m in the tracker's frame; with `along` (3,) of length 1 a wire through it."""
+
+    name: str
+    place: Floats
+    along: Floats | None = None
+
+    @property
+    def seen_along(self) -> Floats:
+        """What of a distance counts: projector (3, 3)."""
+        return np.eye(3) if self.along is None else np.eye(3) - np.outer(self.along, self.along)
+
+
+@dataclass(frozen=True)
+class SeenPoints:
+    """Points at `px` (n, 2) px of images `image` (n,), of `targets`; R (n, 3, 3) and t (n, 3) m are
+    the probe's poses then."""
+
+    px: Floats
+    image: Ints
+    targets: tuple[KnownTarget, ...]
+    R: Floats
+    t: Floats
+
+    @cached_property
+    def projectors(self) -> Floats:
+        return np.array([target.seen_along for target in self.targets])
+
+    @cached_property
+    def places(self) -> Floats:
+        return np.array([target.place for target in self.targets])
+
+    def some(self, chosen: Floats | Ints) -> "SeenPoints":
+        at = np.flatnonzero(chosen)
+        return SeenPoints(self.px[at], self.image[at], tuple(self.targets[i] for i in at),
+                          self.R[at], self.t[at])  # fmt: skip
+
+    @property
+    def equations(self) -> int:
+        """Independent numbers that the points tell."""
+        return sum(3 if target.along is None else 2 for target in self.targets)
+
+
+@dataclass(frozen=True)
+class ImagePlane:
+    """T_probe_from_image and m_per_px (x, y); `off` (n, 3) m by which the points miss, `left_out`
+    (n,) m by how much those of each image do when it does not serve; `covariance` (8, 8) of turn
+    (rad), shift (m) and logarithms of the scales."""
+
+    pose: Similarity
+    m_per_px: tuple[float, float]
+    off: Floats
+    left_out: Floats
+    covariance: Floats
+
+    @property
+    def rms(self) -> float:
+        """m, of the points that served."""
+        return rms(np.linalg.norm(self.off, axis=1))
+
+    @property
+    def predicted(self) -> float:
+        """m, of points of images that did not serve; NaN where there is one image."""
+        known = self.left_out[np.isfinite(self.left_out)]
+        return rms(known) if len(known) else float("nan")
+
+    def sd(self, px: Floats) -> float:
+        """Standard uncertainty m (root mean square of three axes) of the place of a pixel (2,)."""
+        x = np.array([*(np.asarray(self.m_per_px) * px), 0.0])
+        arm = self.pose.R @ x
+        turn = -np.cross(np.eye(3), arm)
+        scales = self.pose.R[:, :2] * x[:2]
+        J = np.hstack([turn, np.eye(3), scales])
+        return float(np.sqrt(np.trace(J @ self.covariance @ J.T) / 3))
+
+
+def image_plane(seen: SeenPoints) -> ImagePlane:
+    """Raises `RegistrationError` for too few points, and for ones that leave a motion of the plane
+    open, as wires seen from one direction do."""
+    pose, scale, J = _fitted(seen)
+    off = _misses(seen, pose, scale)
+    freedom = max(seen.equations - _UNKNOWN, 1)
+    covariance = np.linalg.inv(J.T @ J) * float((off**2).sum()) / freedom
+    return ImagePlane(pose, scale, off, _left_out(seen), covariance)
+
+
+def _left_out(seen: SeenPoints) -> Floats:
+    away = np.full(len(seen.px), np.nan)
+    for image in np.unique(seen.image):
+        there = seen.image == image
+        if there.all():
+            continue
+        try:
+            pose, scale, _ = _fitted(seen.some(~there))
+        except RegistrationError:
+            continue  # the others alone leave something open
+        away[there] = np.linalg.norm(_misses(seen.some(there), pose, scale), axis=1)
+    return away
+
+
+def _fitted(seen: SeenPoints) -> tuple[Similarity, tuple[float, float], Floats]:
+    if seen.equations <= _UNKNOWN:
+        raise RegistrationError(
+            f"{len(seen.px)} points give {seen.equations} equations for {_UNKNOWN} unknowns; mark "
+            f"more points, in more images"
+        )
+    start = _started(seen)
+
+    def left(by: Floats) -> Floats:
+        return _residuals(seen, start, by)
+
+    none = np.zeros(_UNKNOWN)
+    found = least_squares(left, none, xtol=_TIGHT, ftol=_TIGHT, gtol=_TIGHT, x_scale="jac")
+    pose, scale = _moved(start, found.x)
+    J = _slopes(seen, (pose, scale))
+    singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
+    if singular[-1] < _FLAT * singular[0]:
+        raise RegistrationError(
+            "the points do not fix the image plane: turn the probe further between images, or "
+            "mark targets at larger distances"
+        )
+    return pose, scale, J
+
+
+Plane = tuple[Similarity, tuple[float, float]]
+
+
+def _started(seen: SeenPoints) -> Plane:
+    """From the least squares in the nine entries of the affine map pixel -> probe."""
+    size = np.abs(seen.px).max()
+    u, v = (seen.px / size).T
+    base = np.stack([u, v, np.ones_like(u)], axis=1)
+    rows = np.einsum("nij,njk,nc->nick", seen.projectors, seen.R, base).reshape(-1, 9)
+    right = np.einsum("nij,nj->ni", seen.projectors, seen.places - seen.t).ravel()
+    found, _, rank, _ = np.linalg.lstsq(rows, right, rcond=1e-9)
+    across, down, shift = found.reshape(3, 3)
+    if rank < 9 or not (np.linalg.norm(across) and np.linalg.norm(down)):
+        raise RegistrationError(
+            f"the points fix {rank} of 9 numbers of the image plane: mark targets at larger "
+            f"distances, in images between which the probe was turned and moved"
+        )
+    scale = float(np.linalg.norm(across) / size), float(np.linalg.norm(down) / size)
+    axes = np.stack([across, down], axis=1) / (size * np.array(scale))
+    U, _, V = np.linalg.svd(axes, full_matrices=False)
+    x, y = (U @ V).T
+    return Similarity(np.stack([x, y, np.cross(x, y)], axis=1), shift), scale
+
+
+def _moved(plane: Plane, by: Floats) -> Plane:
+    pose, (sx, sy) = plane
+    turned = Rotation.from_rotvec(by[:3]).as_matrix() @ pose.R
+    return Similarity(turned, pose.t + by[3:6]), (sx * np.exp(by[6]), sy * np.exp(by[7]))
+
+
+def _misses(seen: SeenPoints, pose: Similarity, scale: tuple[float, float]) -> Floats:
+    """Where points lie less where they should (n, 3) m, along wires not counted."""
+    flat = np.column_stack([seen.px * np.array(scale), np.zeros(len(seen.px))])
+    there = np.einsum("nij,nj->ni", seen.R, pose.apply(flat)) + seen.t
+    return np.asarray(np.einsum("nij,nj->ni", seen.projectors, there - seen.places))
+
+
+def _residuals(seen: SeenPoints, plane: Plane, by: Floats) -> Floats:
+    return _misses(seen, *_moved(plane, by)).ravel()
+
+
+def _slopes(seen: SeenPoints, plane: Plane) -> Floats:
+    """Central differences of the residuals about a plane, (3 n, 8)."""
+    steps = np.eye(_UNKNOWN) * _STEP
+    ways = [_residuals(seen, plane, s) - _residuals(seen, plane, -s) for s in steps]
+    return np.stack(ways, axis=1) / (2 * _STEP)
+
+
+def by_target(seen: SeenPoints, off: Floats) -> Sequence[tuple[str, int, float]]:
+    """Name, count of points and rms m of each target."""
+    names = np.array([target.name for target in seen.targets])
+    away = np.linalg.norm(off, axis=1)
+    return [(str(n), int((names == n).sum()), rms(away[names == n])) for n in np.unique(names)]

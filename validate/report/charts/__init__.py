@@ -1,0 +1,4 @@
+"""Charts as pictures: axes, looks, heats, intervals.
+
+Start with `chart`.
+"""

@@ -1,0 +1,201 @@
+"""One axes of a chart: lines, points, bands, named levels, and ticks that can be read."""
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import (
+    FixedLocator,
+    FuncFormatter,
+    LogFormatterSciNotation,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    NullLocator,
+)
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Series
+from validate.report.charts.looks import Drawn, is_jagged
+from validate.report.charts.style import MEASURED
+
+_LEVELS = (("#4A4A4A", (4, 2)), ("#6E6E6E", (1, 1.5)), ("#8C8C8C", (6, 2, 1, 2)))
+_FEW = 16  # points of a line that are marked, so that a sweep shows what was run
+_MANY = 400  # points drawn smaller from here on
+_SPARSE = 60  # points that lie on the lines; more of them would hide these
+_NAME = 13  # letters of a level's name in one line
+_LINE = 0.042  # height of one line of such a name, share of the axes'
+_ROUNDING = 1e-9  # share of the size of things below which a difference is rounding
+_ABOUT = 0.01  # of a constant: what an axis shows about it
+_DIP = 0.02  # of a line's median: what lies lower is on its way through zero
+_SHORT = 3.0  # a logarithmic axis shorter than this factor has ticks as a linear one
+
+
+def fill_axes(ax: Axes, chart: Chart, drawn: Sequence[Drawn]) -> None:
+    """Everything but titles and legend; levels have their names for it."""
+    if "x" in chart.log:
+        ax.set_xscale("log", nonpositive="mask")
+    if "y" in chart.log:
+        ax.set_yscale("log", nonpositive="mask")
+    if chart.linear:
+        ax.set_yscale("symlog", linthresh=chart.linear, linscale=1.0)
+        ax.axhline(0, color=MEASURED, lw=0.8)
+    floor = floor_of(chart)
+    for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
+        _draw_one(ax, d, floor)
+    for i, (name, y) in enumerate(levels(chart)):
+        colour, dash = _LEVELS[i % len(_LEVELS)]
+        ax.axhline(y, color=colour, lw=1.0, ls=(0, dash), zorder=1.5, label=name)
+
+
+def levels(chart: Chart) -> list[tuple[str, float]]:
+    """The levels that the axis can show, the lowest first."""
+    shown = [(name, y) for name, y in chart.levels if y > 0 or "y" not in chart.log]
+    return sorted(shown, key=lambda pair: pair[1])
+
+
+def _layer(series: Series) -> int:
+    """Bands lie lowest, then crowded points, lines, single points."""
+    if series.style == "points":
+        return 3 if len(series.x) <= _SPARSE else 1
+    return 0 if series.style == "band" else 2
+
+
+def _draw_one(ax: Axes, drawn: Drawn, floor: float) -> None:
+    s, look = drawn.series, drawn.look
+    y = np.where(s.y < floor, np.nan, s.y) if floor else s.y
+    if s.style == "band":
+        shade: dict[str, Any] = {"color": look.colour, "alpha": 1.0 if look.width == 0 else 0.2}
+        ax.fill_between(s.x, s.y, _upper(s), lw=0, label=s.name, **shade)
+    elif s.style == "points":
+        size = 4.5 if len(s.x) <= _SPARSE else 3.0 if len(s.x) <= _MANY else 1.6
+        sign, size = (f"${drawn.number}$", 7.0) if drawn.number else (look.point, size)
+        ax.plot(s.x, y, ls="none", marker=sign, color=look.colour, ms=size, mew=0.6,
+                label=s.name)  # fmt: skip
+    else:
+        marker = look.point if len(s.x) <= _FEW else ""
+        thin = is_jagged(s) and not drawn.one_of
+        dash, width = ("-", min(look.width, 0.9)) if thin else (look.dash, look.width)
+        ring: dict[str, Any] = {"mfc": "none", "ms": 9} if len(s.x) == 1 else {"ms": 4.5}
+        ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, label=s.name, **ring)
+
+
+def _upper(band: Series) -> Any:
+    return band.upper if band.upper is not None else np.zeros_like(band.y)
+
+
+# --- rounding ------------------------------------------------------------------------------------
+
+
+def floor_of(chart: Chart) -> float:
+    """Below this a y on a logarithmic axis is rounding; 0 on others, and where nothing is above."""
+    if "y" not in chart.log:
+        return 0.0
+    tops = [float(s.y.max()) for s in chart.series if len(s.y)]
+    return _ROUNDING * max(chart.scale, *tops, 0.0) if tops else 0.0
+
+
+def beneath(chart: Chart) -> tuple[str, ...]:
+    """The names of what lies there altogether."""
+    floor = floor_of(chart)
+    low = [s for s in chart.series if floor and s.style != "band" and (s.y < floor).all()]
+    return tuple(dict.fromkeys(s.name for s in low))
+
+
+def cut_dips(ax: Axes, chart: Chart) -> None:
+    """Ends a logarithmic axis below where lines only pass through zero, and above rounding."""
+    floor = floor_of(chart)
+    if not floor:
+        return
+    found = [0.7 * y for _, y in levels(chart)]
+    for s in chart.series:
+        y = s.y[s.y >= floor]
+        if len(y):
+            long = s.style == "line" and len(y) > _FEW
+            found.append(float(_DIP * np.median(y) if long else 0.7 * y.min()))
+    if found:
+        ax.set_ylim(max(min(found), floor), ax.get_ylim()[1])
+
+
+# --- levels --------------------------------------------------------------------------------------
+
+
+def name_levels(ax: Axes, chart: Chart) -> None:
+    """The names of horizontal lines, to the right of the axes where no data are hidden."""
+    shown = [(fill(name, _NAME), y) for name, y in levels(chart)]
+    if not shown:
+        return
+    ax.set_ylim(*ax.get_ylim())  # the names belong to these limits
+    to_axes = (ax.transData + ax.transAxes.inverted()).transform
+    at = _apart([(float(to_axes((1.0, y))[1]), name.count("\n") + 1) for name, y in shown])
+    for (name, _), height in zip(shown, at, strict=True):
+        ax.text(1.012, height, name, transform=ax.transAxes, va="center", fontsize=8.5,
+                linespacing=1.05, color="#404040")  # fmt: skip
+
+
+def _apart(names: list[tuple[float, int]]) -> list[float]:
+    """Rising heights of names of so many lines, each above the one below."""
+    found: list[float] = []
+    for i, (height, lines) in enumerate(names):
+        gap = _LINE * (lines + names[i - 1][1]) / 2 + 0.02 if i else 0.0
+        found.append(max(height, found[-1] + gap) if found else height)
+    return found
+
+
+# --- ticks ---------------------------------------------------------------------------------------
+
+
+def readable(ax: Axes, chart: Chart, most: int = 6) -> None:
+    """Plain numbers on logarithmic axes of ordinary size; at most some `most` ticks an axis."""
+    _about_constants(ax)
+    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+        if name == "y" and chart.linear:
+            _both_signs(axis, chart.linear, most)
+        elif name in chart.log:
+            _logarithmic(axis, most)
+        else:
+            axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
+
+
+def _about_constants(ax: Axes) -> None:
+    """A y that differs by rounding only is constant: it gets room about it, no digits to differ."""
+    low, high = ax.get_ylim()
+    size = max(abs(low), abs(high))
+    if high - low < _ROUNDING * size:
+        ax.set_ylim(low - _ABOUT * size, high + _ABOUT * size)
+
+
+def _logarithmic(axis: Axis, most: int) -> None:
+    low, high = sorted(axis.get_view_interval())
+    decades = float(np.log10(high / low))
+    if high < _SHORT * low:
+        axis.set_major_locator(MaxNLocator(min(most, 4), steps=[1, 2, 5, 10]))
+    elif decades < 2:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    else:
+        axis.set_major_locator(LogLocator(numticks=most + 1))
+    axis.set_minor_formatter(NullFormatter())
+    if high < _SHORT * low:
+        axis.set_minor_locator(NullLocator())
+    plain = (low >= 1e-3 and high <= 1e5) or decades < 2
+    axis.set_major_formatter(FuncFormatter(_plain) if plain else LogFormatterSciNotation())
+
+
+def _plain(value: float, _: int) -> str:
+    return f"{value:g}".replace("-", "−")
+
+
+def _both_signs(axis: Axis, linear: float, most: int) -> None:
+    """Zero and powers of ten beyond the linear part, of both signs where there are both."""
+    low, high = axis.get_view_interval()
+    first = int(np.ceil(np.log10(linear) + 1e-9))
+    last = int(np.floor(np.log10(max(-low, high, linear))))
+    every = max(1, -(-2 * (last - first + 1) // most))
+    powers: Floats = 10.0 ** np.arange(last, first - 1, -every, dtype=np.float64)
+    ticks = [0.0, *(p for p in powers if p <= high), *(-p for p in powers if -p >= low)]
+    axis.set_major_locator(FixedLocator(sorted(ticks)))
+    axis.set_major_formatter(FuncFormatter(_plain))
+    axis.set_minor_locator(NullLocator())

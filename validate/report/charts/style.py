@@ -1,0 +1,183 @@
+"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
+
+Figures are `WIDTH` wide where they can be: a telephone and a printed page show that much with
+letters that can be read.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+
+from validate.compare.exhibit import Pixels
+
+MEASURED = "#000000"
+ACCEPTED = "#0072B2"
+NOISE = "#D9D9D9"
+_RIVALS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+PALETTE = (ACCEPTED, *_RIVALS)  # Okabe and Ito, without their yellow
+_DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 3)), (0, (2, 3)))
+_POINTS = ("s", "^", "D", "v", "P", "X")
+_SETTINGS: Mapping[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.titlesize": 10.0,
+    "axes.labelsize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E5E5E5",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.fontsize": 9.0,
+    "legend.handlelength": 2.6,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "savefig.facecolor": "white",
+}
+_DPI = 130
+WIDTH = 5.6  # inches
+_LETTER = 0.07  # inches of a legend's letter, about
+_HANDLE = 0.6  # inches of a legend's line and the room beside it
+
+
+Drawing = tuple[Callable[[Figure], None], float, float]  # fills a figure of these inches
+
+
+@dataclass(frozen=True)
+class Style:
+    """The colour, dash and point of a method, the same in every figure of a report."""
+
+    colour: str
+    dash: Any
+    point: str
+    width: float
+
+
+class NamedMethod(Protocol):
+    """What figures ask of a method."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def label(self) -> str: ...
+    @property
+    def accepted(self) -> bool: ...
+
+
+class HasMethods(Protocol):
+    """A result, or a table of one, whose methods look alike in every figure."""
+
+    @property
+    def methods(self) -> Sequence[NamedMethod]: ...
+
+
+def looks(result: HasMethods) -> dict[str, Style]:
+    """By method: accepted ones blue and solid, rivals in the other colours and dashed."""
+    found: dict[str, Style] = {}
+    rivals = 0
+    for method in result.methods:
+        if method.accepted and not any(m.colour == ACCEPTED for m in found.values()):
+            found[method.name] = Style(ACCEPTED, "-", "o", 1.8)
+            continue
+        i = rivals % len(_RIVALS)
+        other = (rivals + rivals // len(_RIVALS)) % len(_DASHES)  # a second round looks different
+        found[method.name] = Style(_RIVALS[i], _DASHES[other], _POINTS[other], 1.2)
+        rivals += 1
+    return found
+
+
+def free_look(i: int, colour: str) -> Style:
+    """The look of line i that is no method: the first solid, the others dashed in turn."""
+    if i == 0:
+        return Style(colour, "-", "o", 1.5)
+    return Style(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
+
+
+def film(
+    paint: Callable[[Figure], Callable[[int], Sequence[Artist]]],
+    count: int,
+    width: float,
+    height: float,
+) -> tuple[Pixels, ...]:
+    """`count` pictures of one figure: `paint` fills it and returns what turns it to number i.
+
+    That names the artists that it changes, which alone are drawn anew, over all others. The layout
+    is that of number 0 throughout.
+    """
+    settings: Any = dict(_SETTINGS)
+    with mpl.rc_context(settings):
+        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)
+        turn, taken = paint(figure), list[Pixels]()
+        moving = turn(0)
+        canvas.draw()
+        figure.set_layout_engine("none")
+        for artist in moving:
+            artist.set_animated(True)
+        canvas.draw()
+        still = canvas.copy_from_bbox(figure.bbox)
+        for i in range(count):
+            canvas.restore_region(still)
+            for artist in turn(i):
+                figure.draw_artist(artist)
+            taken.append(_pixels(canvas))
+    return tuple(taken)
+
+
+def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels:
+    """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
+    return _pixels(painted(paint, width, height).canvas)
+
+
+def painted(paint: Callable[[Figure], None], width: float, height: float) -> Figure:
+    """The figure itself, laid out and drawn."""
+    settings: Any = dict(_SETTINGS)
+    with mpl.rc_context(settings):
+        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
+        paint(figure)
+        canvas.draw()
+    return figure
+
+
+def panels(figure: Figure, count: int, columns: int) -> tuple[list[Axes], list[Axes]]:
+    """`count` axes of common scales in rows of `columns`, and the lowest of every column, which
+    have numbers below."""
+    grid = figure.subplots(-(-count // columns), columns, sharex=True, sharey=True, squeeze=False)
+    for ax in grid.flat[count:]:
+        ax.set_axis_off()
+    shown = list(grid.flat[:count])
+    for ax in shown[-columns:]:
+        ax.tick_params(labelbottom=True)
+    return shown, shown[-columns:]
+
+
+def legend_below(figure: Figure, ax: Axes, width: float = WIDTH) -> Legend:
+    """The legend of an axes below the whole figure."""
+    handles, labels = ax.get_legend_handles_labels()
+    columns = legend_columns(labels, width)
+    return figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def legend_columns(labels: Sequence[str], width: float = WIDTH) -> int:
+    """How many columns of a legend of these labels fit below a figure."""
+    widest = max(len(line) for label in labels for line in label.splitlines())
+    return max(1, min(len(labels), int(width / (_HANDLE + _LETTER * widest))))
+
+
+def legend_height(labels: Sequence[str], width: float = WIDTH) -> float:
+    """Inches that the legend takes."""
+    lines = max(len(label.splitlines()) for label in labels)
+    return 0.21 * lines * -(-len(labels) // legend_columns(labels, width)) + 0.1
+
+
+def _pixels(canvas: Any) -> Pixels:
+    return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()

@@ -1,0 +1,85 @@
+"""Tables of numbers: how an entry reads on the page, and tables and charts as CSV files."""
+
+import csv
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
+from validate.files import safe_name
+from validate.report.views.numbers import MISSING, shown_unit, significant, text
+
+Row = Iterable[Entry | TableCell]
+_SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
+
+
+def shown(entry: Entry | TableCell) -> str:
+    """An entry as read: three significant digits, whole numbers whole, a dash for None."""
+    if isinstance(entry, TableCell):
+        return _SIGNS.get(entry.emphasis, "") + (entry.text or _measured(entry.value, entry.unit))
+    if entry is None:
+        return MISSING
+    if isinstance(entry, str):
+        return entry
+    return text(float(entry)) if isinstance(entry, int) else significant(entry)
+
+
+def _measured(value: Entry, unit: str) -> str:
+    return text(value, unit) if unit and isinstance(value, float) else shown(value)
+
+
+def unit_cell(unit: str) -> TableCell:
+    """An SI unit in a table whose numbers are SI: it reads as the unit that they are shown in."""
+    return TableCell(unit, text=shown_unit(unit))
+
+
+def word_columns(table: NumberTable) -> tuple[int, ...]:
+    """The columns that hold text; the others hold numbers."""
+    columns = list(zip(*table.rows, strict=True))
+    return tuple(i for i, c in enumerate(columns) if any(isinstance(plain(v), str) for v in c))
+
+
+def across(table: NumberTable) -> tuple[int, ...]:
+    """The columns beside each other: all but the one whose texts stand below the rows."""
+    return tuple(i for i, h in enumerate(table.headings) if not table.below or h != table.below)
+
+
+def caption(table: NumberTable) -> str:
+    """Title and note as sentences."""
+    title = table.title if table.title.endswith(".") else f"{table.title}."
+    return f"{title} {table.note}".strip()
+
+
+def write_table(table: NumberTable, folder: Path) -> None:
+    """The table as a CSV file of its name, entries as they are, empty where there is none."""
+    if table.name and table.rows:
+        write_csv(folder / f"{safe_name(table.name)}.csv", table.headings, table.rows)
+
+
+def write_chart(chart: Chart, folder: Path) -> None:
+    """Every point of every series as a CSV file."""
+    head = ("series", "style", f"x: {chart.x}", f"y: {chart.y}", f"upper: {chart.y}")
+    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", head, _points(chart))
+
+
+def write_csv(path: Path, head: tuple[str, ...], rows: Iterable[Row]) -> None:
+    """One header line; numbers in full precision."""
+    with path.open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out)
+        writer.writerow(head)
+        writer.writerows([_written(plain(entry)) for entry in row] for row in rows)
+
+
+def _written(value: Entry) -> str | int:
+    if value is None:
+        return ""
+    return repr(float(value)) if isinstance(value, float) else value
+
+
+def _points(chart: Chart) -> Iterator[Row]:
+    """Every point of every series and, as one row without x, every level."""
+    for s in chart.series:
+        upper = s.upper.tolist() if s.upper is not None else [None] * len(s.x)
+        for x, y, top in zip(s.x.tolist(), s.y.tolist(), upper, strict=True):
+            yield s.name, s.style, x, y, top
+    for name, y in chart.levels:
+        yield name, "level", None, float(y), None

@@ -1,0 +1,180 @@
+"""replay.mcap: measurement and simulation in one timeline, to be opened in Foxglove or Rerun.
+
+Topics, after /<recording> where there are several; X is `measured` or `simulated`:
+
+    /<drive>/measured      validate.Signal           what drives, m or N
+    /<signal>/X            validate.Signal           every sample as compared, every step
+    /outline/X             validate.Contour          image plane, as judged; simulated at the loads
+    /outline/X/scene       foxglove.SceneUpdate      the same as lines, the simulated one moving
+    /outline/X/points      foxglove.PointCloud       the same as points
+    /markers/X             validate.Markers          with names; simulated at the loads
+    /markers/X/scene       foxglove.SceneUpdate      the same as spheres, the simulated ones moving
+    /markers/X/points      foxglove.PointCloud       the same as points
+    /surface/simulated/scene   foxglove.SceneUpdate  coloured by displacement, moving
+    /surface/simulated/points  foxglove.PointCloud   its nodes
+    /image/measured        foxglove.CompressedImage  where the recording has images
+    /tf                    foxglove.FrameTransforms  image and marker frames in the scene's
+
+Every message is Protobuf. Rerun draws points, images and transforms, and gives the fields of the
+others; Foxglove draws all (`replay_layout` writes which panels show them).
+
+Time is the recording's own clock, t0_ns + t. Simulated numbers are those of the method that the
+report shows, with sd 0. What is interpolated, thinned or left out stands in the metadata record
+`validate.pipeline`; a run over time gives its output frames at their own times in place of loads.
+The file stays under `MAX_BYTES` by thinning everything more.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validate.compare.result import MethodResult, Result
+from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
+from validate.recording.mcap.own_protobuf import protobuf_schema
+from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL
+from validate.report.replay import foxglove
+from validate.report.replay.layout import Shown, layout
+from validate.report.replay.signals import images, signals
+from validate.report.replay.space import markers, outlines, surface, transforms
+from validate.report.replay.view import ReplayView, Track, over_time
+from validate.report.scenes.loads import HOW
+from validate.report.sections.observed import shown_method
+from validate.report.stored.environment import file_name
+
+MAX_BYTES = 5_000_000
+RECORD = "validate.pipeline"
+INPUT = "input/"  # metadata record INPUT + name of every recording
+_NUMBERS = (SIGNAL, CONTOUR, MARKERS)
+_COARSEST = 64
+_ALL = {**foxglove.SCHEMAS, **{name: protobuf_schema(name) for name in _NUMBERS}}
+
+
+def write_replay(result: Result, path: Path) -> None:
+    """Write the replay of `result` to `path`, and its layout beside it (`.layout.json`).
+
+    Without recordings it holds metadata only, and has no layout.
+    """
+    coarse = 1
+    while True:
+        shown = [(view, tracks(view)) for view in views(result, coarse)]
+        _write(result, path, shown, coarse)
+        if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
+            break
+        coarse *= 2
+    if shown:
+        path.with_suffix(".layout.json").write_text(layout(shown), "utf-8")
+
+
+def _write(result: Result, path: Path, shown: Shown, coarse: int) -> None:
+    found = tuple(t for _, tracks in shown for t in tracks)
+    channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
+    metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
+    metadata |= {name: values for t in found for name, values in t.records}
+    write_channels(path, channels, _in_time(found), metadata)
+
+
+def views(result: Result, coarse: int = 1) -> tuple[ReplayView, ...]:
+    """One view per recording, of the accepted method or the first that finished."""
+    method = shown_method(result)
+    registered = method.registered if method else result.registered
+    runs = method.runs if method else (None,) * len(registered)
+    return tuple(
+        ReplayView(recording, seen, method, run, prefix, coarse)
+        for recording, seen, run, prefix in zip(
+            result.recordings, registered, runs, _prefixes(result), strict=True
+        )
+    )
+
+
+def _prefixes(result: Result) -> list[str]:
+    names = [r.name for r in result.recordings]
+    if len(names) == 1:
+        return [""]
+    count = Counter(names)
+    return [f"/{n}" if count[n] == 1 else f"/{i}_{n}" for i, n in enumerate(names, start=1)]
+
+
+def tracks(view: ReplayView) -> tuple[Track, ...]:
+    """Every topic of one recording, transforms first."""
+    found = [
+        *images(view),
+        *signals(view),
+        *outlines(view),
+        *markers(view),
+        *surface(view),
+    ]
+    return tuple(t for t in (*transforms(view, found), *found) if not _too_late(t))
+
+
+def _too_late(track: Track) -> bool:
+    """Foxglove's stamps end in 2106; ours do not."""
+    return track.schema in foxglove.SCHEMAS and int(track.ns[-1]) > foxglove.LAST_NS
+
+
+def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
+    """All messages in order of time, topics in their order when equal."""
+    if not found:
+        return
+    ns = np.concatenate([t.ns for t in found])
+    which = np.repeat(np.arange(len(found)), [len(t.ns) for t in found])
+    number = np.concatenate([np.arange(len(t.ns)) for t in found])
+    for k in np.argsort(ns, kind="stable"):
+        track = found[which[k]]
+        yield WrittenMessage(track.topic, int(ns[k]), track.message(int(number[k])))
+
+
+def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, str]:
+    method = shown_method(result)
+    thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
+    if coarse > 1:
+        thinned.append(f"interpolated instants: one in {coarse}")
+    return {
+        "format": "1",
+        "experiment": result.name,
+        "method": method.name if method else "",
+        "method_label": method.label if method else "",
+        "quick": "yes" if result.quick else "no",
+        "kind": result.kind,
+        "interpolated": _interpolated(result),
+        "thinned": "; ".join(thinned) or "nothing",
+        "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
+    }
+
+
+def _interpolated(result: Result) -> str:
+    if any(over_time(view) for view in views(result)):
+        return "nothing: output frames keep their times"
+    return f".../simulated/scene and points: {HOW}"
+
+
+def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
+    if method is None:
+        yield "everything simulated: no method finished"
+        return
+    others = [m.name for m in result.methods if m is not method]
+    if others:
+        yield f"other methods: {', '.join(others)}"
+    topics = [t.topic for t in found if t.schema in _NUMBERS and not t.given]
+    for topic in topics:
+        other = topic.replace("/measured", "/simulated")
+        if other not in topics:
+            yield f"{other}: the run does not predict it"
+    if any(int(t.ns[-1]) > foxglove.LAST_NS for t in found):
+        yield "all but numbers: Foxglove's stamps end in 2106"
+    if method.scene.mesh.dimension != 3:
+        yield "surface: the mesh is planar"
+
+
+def _inputs(result: Result) -> dict[str, dict[str, str]]:
+    prefixes = _prefixes(result) if result.recordings else []
+    return {
+        INPUT + (prefix[1:] or r.name): {
+            "path": file_name(r.source.path),
+            "sha256": r.source.sha256,
+            "bytes": str(r.source.bytes),
+            "integrity": r.source.integrity,
+        }
+        for r, prefix in zip(result.recordings, prefixes, strict=True)
+    }

@@ -1,0 +1,237 @@
+"""Topics of a replay that lie in space: outlines, markers, the simulated surface, transforms.
+
+Numbers (`validate.Contour`, `validate.Markers`) are those of the comparison, at the measured times
+and at the loads; `.../scene` and `.../points` are to look at and add interpolated instants: the
+same as lines, spheres and a surface, and as points for viewers that draw no scenes.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import matplotlib as mpl
+import numpy as np
+
+from validate.arrays import Floats
+from validate.recording.mcap.own_protobuf import protobuf_message
+from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
+from validate.recording.types import Markers
+from validate.report.replay import foxglove
+from validate.report.replay.foxglove import CLOUD, SCENE, TRANSFORMS, Entity, Rgba
+from validate.report.replay.signals import one_in, thinned
+from validate.report.replay.view import ReplayView, Track, load_of, pose_records
+from validate.report.scenes.skin import OUTSIDE, SurfacePart, skins
+from validate.report.sections import observed
+
+Who = Literal["measured", "simulated"]
+Times = Floats | list[float]
+COLOURS: dict[Who, Rgba] = {  # both seen on dark and on light
+    "measured": Rgba(0.902, 0.624, 0.0),
+    "simulated": Rgba(0.337, 0.706, 0.914),
+}
+_TRIANGLES = 4000  # of the surface, at most
+_SEE_THROUGH = 0.3  # opacity of the outside, so that the cavity is seen
+_BALL = 0.015  # diameter of a marker over the size of their layout
+_ONE_BALL = 0.002  # m: diameter of a marker that stands alone
+_MARKER_FRAMES = 1500  # instants of measured markers, at most
+
+
+def transforms(view: ReplayView, others: Sequence[Track]) -> list[Track]:
+    """Image and marker frames in the scene's, once, at the first time of the `others`."""
+    children = list[tuple[str, Floats]]()
+    image, seen = observed.outline(view.registered), observed.markers(view.registered)
+    if image is not None:
+        children.append((view.local("image"), image.pose))
+    recorded = _recorded(view)
+    if recorded is not None and seen is not None:
+        children.append((view.local(recorded.frame), seen.registration.transform.matrix))
+    if not children:
+        return []
+    start = min(int(t.ns[0]) for t in others)
+
+    def message(_: int) -> bytes:
+        return foxglove.frame_transforms(start, view.frame, children)
+
+    return [Track(f"{view.prefix}/tf", TRANSFORMS, np.array([start]), message)]
+
+
+# --- outlines and markers ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What becomes six topics: `t` (n,) s and the measured samples, and how a run is sampled.
+
+    `number` makes the message of a sample from (ns, frame, sample, sd), `look` the entity that
+    shows it from (ns, frame, name, sample, colour).
+    """
+
+    name: str
+    schema: str
+    t: Floats
+    measured: Sequence[Floats]
+    simulated: Callable[[Floats], Floats]
+    sd: float
+    number: Callable[[int, str, Floats, float], Json]
+    look: Callable[..., Entity]
+    frames: tuple[tuple[str, str], tuple[str, str]]  # measured, simulated; of numbers, to look at
+    note: str = ""
+    pose: Floats | None = None
+
+
+def outlines(view: ReplayView) -> list[Track]:
+    """All measured outlines; the simulated ones at the loads; both as lines, simulated moving."""
+    seen = observed.outline(view.registered)
+    if seen is None:
+        return []
+    frames = view.frame, view.local("image")
+    kind = _Kind(
+        "outline", CONTOUR, seen.t, seen.outlines, seen.simulated, seen.sd, contour_message,
+        foxglove.outline, (frames, frames), pose=seen.pose,
+    )  # fmt: skip
+    return _tracks(view, kind)
+
+
+def markers(view: ReplayView) -> list[Track]:
+    """Measured markers in their own frame where it is known; the simulated ones in the scene's."""
+    seen = observed.markers(view.registered)
+    if seen is None:
+        return []
+    recorded, names = _recorded(view), seen.names
+    own = view.local(recorded.frame) if recorded else view.frame
+    every = one_in(len(seen.t), _MARKER_FRAMES // view.coarse)
+    x = (recorded.x if recorded else seen.x)[::every]
+    size = _BALL * float(np.ptp(seen.rest, axis=0).max()) or _ONE_BALL
+    kind = _Kind(
+        "markers", MARKERS, seen.t[::every], list(x), seen.simulated, seen.sd,
+        lambda ns, frame, x, sd: markers_message(ns, frame, names, x, sd),
+        partial(foxglove.spheres, diameter=size), ((own, own), (view.frame, view.frame)),
+        thinned(every, len(seen.t), "instants"),
+    )  # fmt: skip
+    return _tracks(view, kind)
+
+
+def _tracks(view: ReplayView, kind: _Kind) -> list[Track]:
+    """Measured samples as numbers and to look at; simulated ones at the loads, and moving."""
+    (numbers, look), (simulated, moving) = kind.frames
+    words = ["as measured"] * len(kind.t)
+    found = [
+        _numbers(view, kind, "measured", numbers, kind.t, kind.measured),
+        *_looks(view, kind, "measured", look, kind.t, kind.measured, words),
+    ]
+    if at := view.held():
+        between = view.moving()
+        judged, drawn = ([kind.simulated(i.u) for i in instants] for instants in (at, between))
+        words = [load_of(i) for i in between]
+        found += [
+            _numbers(view, kind, "simulated", simulated, [i.t for i in at], judged),
+            *_looks(view, kind, "simulated", moving, [i.t for i in between], drawn, words),
+        ]
+    return found
+
+
+def _numbers(
+    view: ReplayView, kind: _Kind, who: Who, frame: str, t: Times, x: Sequence[Floats]
+) -> Track:
+    topic, known = f"/{kind.name}/{who}", who == "measured"
+    sd, note = (kind.sd, kind.note) if known else (0.0, "")
+    records = () if kind.pose is None else pose_records(view.prefix + topic, kind.pose)
+
+    def message(ns: int, i: int) -> bytes:
+        return protobuf_message(kind.schema, kind.number(ns, frame, x[i], sd))
+
+    return view.track(topic, kind.schema, t, message, note, records)
+
+
+def _looks(
+    view: ReplayView,
+    kind: _Kind,
+    who: Who,
+    frame: str,
+    t: Times,
+    x: Sequence[Floats],
+    loads: list[str],
+) -> list[Track]:
+    name, colour = f"{kind.name} {who}", COLOURS[who]
+    note = kind.note if who == "measured" else ""
+    shade = np.array([[colour.r, colour.g, colour.b, colour.a]])
+
+    def scene(ns: int, i: int) -> bytes:
+        return foxglove.scene_update(kind.look(ns, frame, name, x[i], colour, load=loads[i]))
+
+    def points(ns: int, i: int) -> bytes:
+        return foxglove.cloud(ns, frame, x[i], shade)
+
+    topic = f"/{kind.name}/{who}"
+    return [
+        view.track(f"{topic}/scene", SCENE, t, scene, note),
+        view.track(f"{topic}/points", CLOUD, t, points, note),
+    ]
+
+
+def _recorded(view: ReplayView) -> Markers | None:
+    """The markers as recorded, in their own frame; None when no shift and turn leads from it."""
+    seen = observed.markers(view.registered)
+    if seen is None or seen.registration.transform.s != 1.0:  # a transform of Foxglove has no scale
+        return None
+    for stream in view.recording.markers.values():
+        if stream.names == seen.names and np.array_equal(stream.t, seen.t):
+            return stream if stream.x.shape == seen.x.shape else None
+    return None
+
+
+# --- the simulated surface -----------------------------------------------------------------------
+
+
+def surface(view: ReplayView) -> list[Track]:
+    """Outside (see-through) and cavity walls, deformed; none without a run or of a 2-D mesh."""
+    moving = view.moving()
+    parts = skins(view.method.scene, _TRIANGLES // view.coarse) if view.method and moving else ()
+    if view.method is None or not parts:
+        return []
+    scene, top = view.method.scene, max(float(np.linalg.norm(i.u, axis=1).max()) for i in moving)
+    notes = {"colour": f"displacement, viridis from 0 to {1e3 * top:.3g} mm"}
+    if scene.copies > 1:
+        notes["part"] = f"one of {scene.copies} symmetric parts"
+
+    def scenes(ns: int, i: int) -> bytes:
+        u, said = moving[i].u, {"load": load_of(moving[i])} | notes
+        return foxglove.scene_update(
+            *(
+                foxglove.surface(
+                    ns, view.frame, f"surface {part.name}",
+                    scene.mesh.nodes[part.nodes] + u[part.nodes], part.triangles,
+                    _shades(u[part.nodes], top, part.name), **said,
+                )
+                for part in parts
+            )
+        )  # fmt: skip
+
+    shown = np.unique(np.concatenate([part.nodes for part in parts]))
+
+    def points(ns: int, i: int) -> bytes:
+        u = moving[i].u[shown]
+        return foxglove.cloud(ns, view.frame, scene.mesh.nodes[shown] + u, _shades(u, top))
+
+    note, t = ", ".join(_left_out(parts, len(moving), len(view.held()))), [i.t for i in moving]
+    return [
+        view.track("/surface/simulated/scene", SCENE, t, scenes, note),
+        view.track("/surface/simulated/points", CLOUD, t, points, note),
+    ]
+
+
+def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator[str]:
+    drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
+    if drawn < whole:
+        yield f"{drawn} of {whole} triangles"
+    if shown < frames:
+        yield f"{shown} of {frames} output frames"
+
+
+def _shades(u: Floats, top: float, part: str = "") -> Floats:
+    """Colours (v, 4) of displacements (v, 3) m between 0 and `top` m."""
+    size = np.linalg.norm(u, axis=1) / (top or 1.0)
+    shades = np.asarray(mpl.colormaps["viridis"](size))
+    shades[:, 3] = _SEE_THROUGH if part == OUTSIDE else 1.0
+    return shades

@@ -1,0 +1,209 @@
+"""The images of a recording with what was found in them: the outline, the circle through a round
+one, and the section that a run has there."""
+
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Picture
+from validate.errors import RegistrationError
+from validate.recording.types import Contours, Frames, Recording
+from validate.register.observation import nearest_sample
+from validate.register.outlines.circle import Circle, fit_circle
+from validate.report.charts.style import WIDTH, draw, legend_below
+from validate.report.scenes.animation import closed
+from validate.report.sections.observed import Held
+from validate.report.views.numbers import spaced, with_unit
+
+_MM = 1e3
+_COLUMNS = 2
+_ROOM = 1.1  # inches of labels and legend
+_FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
+_SIMULATED = "#FF9F1C"
+_ROUND = 0.05  # rms distance over radius to which an outline is round
+_SAID = "#FF77BB"
+_DASH, _DOTS = (0, (4, 3)), (0, (1, 1.5))
+_ANGLES = np.linspace(0, 2 * np.pi, 121)
+_AROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+
+
+@dataclass(frozen=True)
+class PlaceSaid:
+    """A place in the first image: centre (2,) m, and a radius m about it where one is known;
+    `certain` where a user said it."""
+
+    label: str
+    centre: Floats
+    radius: float | None
+    certain: bool = False
+
+
+@dataclass(frozen=True)
+class _ImageLine:
+    """Points (2, k) mm of a line; of one point a cross."""
+
+    label: str
+    colour: str
+    dash: Any
+    points: Floats
+
+
+def outline_images(
+    recording: Recording,
+    topic: str,
+    holds: tuple[Held, ...],
+    sections: tuple[Floats, ...],
+    label: str,
+) -> tuple[Picture, ...]:
+    """One picture of the images at the loads with the `sections` (k, 2) m of the method `label`;
+    none where outlines `topic` were not found in any."""
+    contours = recording.contours.get(topic)
+    frames = recording.frames.get(contours.images) if contours is not None else None
+    if contours is None or frames is None:
+        return ()
+    words = f"Dotted, orange: the section of {label}, which is compared with the outline."
+    simulated = (f"simulated: {label}", sections)
+    return (outlines_over(frames, contours, holds, "at the loads", words, simulated),)
+
+
+def outlines_over(
+    frames: Frames,
+    contours: Contours,
+    holds: tuple[Held, ...],
+    which: str,
+    words: str,
+    simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
+    marks: tuple[PlaceSaid, ...] = (),
+) -> Picture:
+    """The images nearest to the holds in time, with outlines, with circles where the first outline
+    is round, with what was `simulated` at the holds, and with `marks` in the first; `which` they
+    are, and `words` on what they are for, stand in the caption."""
+    circles = _circles(contours, holds)
+    lines = [
+        [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]
+        + (
+            []
+            if circle is None
+            else [_ImageLine("circle through it", _FITTED, _DASH, _round(circle))]
+        )
+        for hold, circle in zip(holds, circles, strict=True)
+    ]
+    for drawn, section in zip(lines, simulated[1], strict=False):
+        drawn.append(_ImageLine(simulated[0], _SIMULATED, ":", closed(section).T))
+    lines[0] += [_marked(mark) for mark in marks]
+    rows = -(-len(holds) // _COLUMNS)
+    tall = frames.images[0].shape[0] * frames.m_per_px[1]
+    wide = frames.images[0].shape[1] * frames.m_per_px[0]
+    panel = float(np.clip(0.42 * WIDTH * tall / wide, 1.2, 4.0)) + 0.35
+    return Picture(
+        "outline_images",
+        f"The images '{contours.images}' {which}, image coordinates in mm, with the outline that "
+        f"was found in each (solid, yellow){_of_circles(holds, circles)}. {words}",
+        f"{len(holds)} images with the outline found in each"
+        + (" and the circle fitted to it." if any(circles) else "."),
+        draw(
+            lambda f: _panels(f, frames, holds, lines),
+            WIDTH,
+            panel * rows + _ROOM,
+        ),
+        photo=True,
+    )
+
+
+def _outline(contours: Contours, hold: Held) -> Floats:
+    return contours.outlines[nearest_sample(contours.t, hold.t, "outlines")]
+
+
+def _circle(contours: Contours, hold: Held) -> Circle | None:
+    try:
+        return fit_circle(_outline(contours, hold), contours.sd)
+    except RegistrationError:
+        return None  # an outline pressed flat is none
+
+
+def _circles(contours: Contours, holds: tuple[Held, ...]) -> list[Circle | None]:
+    found = [_circle(contours, hold) for hold in holds]
+    first = found[0]
+    if first is None or first.rms > _ROUND * first.radius:
+        return [None] * len(holds)
+    return found
+
+
+def _of_circles(holds: tuple[Held, ...], circles: list[Circle | None]) -> str:
+    if not any(circles):
+        return ""
+    told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
+    return (
+        " and the circle through it (dashed, blue). Radius of that circle and rms distance of the "
+        f"outline from it: {told}"
+    )
+
+
+def _told(circle: Circle | None) -> str:
+    if circle is None:
+        return "no circle"
+    return f"{with_unit(circle.radius, 'm')} ({with_unit(circle.rms, 'm', 2)})"
+
+
+def _panels(
+    figure: Figure,
+    frames: Frames,
+    holds: tuple[Held, ...],
+    lines: list[list[_ImageLine]],
+) -> None:
+    rows = -(-len(holds) // _COLUMNS)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+    for ax, hold, drawn in zip(grid.flat, holds, lines, strict=False):
+        at = nearest_sample(frames.t, hold.t, "images")
+        _image(ax, frames, at)
+        for line in drawn:
+            _line(ax, line)
+        ax.set_title(fill(f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s", 36),
+                     loc="left", fontsize=8.5)  # fmt: skip
+        ax.set(xlabel="image x / mm", ylabel="image y / mm")
+        ax.label_outer()
+    for ax in grid.flat[len(holds) :]:
+        ax.set_axis_off()
+    legend = legend_below(figure, grid[0, 0])
+    legend.set_frame_on(True)
+    legend.get_frame().set(facecolor="#303030", edgecolor="#303030")
+    for text in legend.get_texts():
+        text.set_color("white")
+
+
+def _line(ax: Axes, line: _ImageLine) -> None:
+    """With a dark seam, to be seen on light and dark pixels and on grey paper; a cross of a place
+    without a size."""
+    if line.points.shape[1] == 1:
+        ax.plot(*line.points, "+", color=line.colour, ms=9, mew=1.8, label=line.label)
+        return
+    known = ax.get_legend_handles_labels()[1]
+    label = line.label if line.label not in known else None
+    ax.plot(*line.points, color="black", lw=2.8, alpha=0.6)
+    ax.plot(*line.points, color=line.colour, ls=line.dash, lw=1.4, label=label)
+
+
+def _image(ax: Axes, frames: Frames, i: int) -> None:
+    """Pixel centres at their image metres; rows count downward."""
+    x, y = (_MM * side for side in frames.m_per_px)
+    height, width = frames.images[i].shape
+    extent = (-0.5 * x, (width - 0.5) * x, (height - 0.5) * y, -0.5 * y)
+    ax.imshow(frames.images[i], cmap="gray", vmin=0, vmax=255, extent=extent, aspect="equal")
+    ax.grid(visible=False)
+
+
+def _marked(mark: PlaceSaid) -> _ImageLine:
+    points = _MM * mark.centre[:, None]
+    if mark.radius is not None:
+        points = points + _MM * mark.radius * _AROUND
+    return _ImageLine(mark.label, _SAID if mark.certain else _SIMULATED, _DOTS, points)
+
+
+def _round(circle: Circle) -> Floats:
+    """A closed line (2, k) mm."""
+    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * _AROUND))

@@ -1,0 +1,76 @@
+"""Points, a path and small errors in space."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Picture
+from validate.report.charts.style import ACCEPTED, PALETTE, WIDTH, draw
+
+_PATH = "#9E9E9E"
+_ROOM = 0.3  # of the places' extent: what of the path lies further off is not drawn
+
+
+@dataclass(frozen=True)
+class Place:
+    """A named point (3,) mm, and the error (3,) mm that is drawn from it."""
+
+    label: str
+    at: Floats
+    error: Floats
+
+
+def points_picture(
+    name: str,
+    caption: str,
+    path: Floats,
+    parts: Sequence[Floats],
+    places: Sequence[Place],
+    longer: float,
+) -> Picture:
+    """A path (n, 3) mm, its parts, and places with errors `longer` times as long as they are."""
+    pixels = draw(lambda f: _fill(f, path, parts, places, longer), WIDTH + 0.8, WIDTH)
+    alt = f"Path of {len(path)} samples in space with {len(parts)} dwells and {len(places)} points."
+    return Picture(name, caption, alt, pixels)
+
+
+def _fill(
+    figure: Figure, path: Floats, parts: Sequence[Floats], places: Sequence[Place], longer: float
+) -> None:
+    ax: Any = figure.add_subplot(projection="3d")
+    at = np.array([p.at for p in places])
+    low, high = at.min(axis=0), at.max(axis=0)
+    room = _ROOM * float((high - low).max())
+    path, *parts = (_inside(x, low - room, high + room) for x in (path, *parts))
+    ax.plot(*path.T, color=_PATH, linewidth=0.5, label="path of the tip")
+    for i, part in enumerate(parts):
+        label = "dwell" if i == 0 else None
+        ax.plot(*part.T, ".", color=PALETTE[4], markersize=2.5, label=label)
+    ax.plot(*at.T, "o", color=ACCEPTED, markersize=5, label="landmark, touched")
+    error = longer * np.array([p.error for p in places])
+    ax.quiver(
+        *at.T,
+        *error.T,
+        color=PALETTE[1],
+        linewidth=1.5,
+        label="to the position predicted by the others",
+    )
+    for p in places:
+        ax.text(*p.at, f"  {p.label}", fontsize=9)
+    ax.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+    ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
+    ax.set(zlim=(low[2] - room, high[2] + room))
+    ax.set_box_aspect(high - low + 2 * room, zoom=0.85)
+    ax.locator_params(nbins=5)
+    ax.view_init(elev=22, azim=-52)
+    figure.legend(loc="outside lower center", ncols=2)
+
+
+def _inside(x: Floats, low: Floats, high: Floats) -> Floats:
+    """Samples (n, 3), NaN where they lie outside a box."""
+    inside = np.asarray((x >= low) & (x <= high)).all(axis=1)
+    return np.where(np.reshape(inside, (-1, 1)), x, np.nan)

@@ -1,0 +1,4 @@
+"""Sections of the report page, in their order.
+
+Start with `sections`.
+"""

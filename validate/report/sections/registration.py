@@ -1,0 +1,114 @@
+"""How the measurement was brought into the scene's frame, and what that leaves."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from validate.arrays import rms
+from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
+from validate.compare.residual import Residual
+from validate.compare.result import Result
+from validate.compare.score import max_length
+from validate.register.markers.declared import AsDeclared
+from validate.register.markers.markers import MarkerObservation
+from validate.register.markers.quality import Registration
+from validate.report.scenes.residual_arrows import residual_arrows
+from validate.report.sections.observed import markers
+from validate.report.views.numbers import shown_unit, with_unit
+from validate.report.views.records import Shown, sized, table
+
+_DECLARED = ("Nothing was fitted: the markers were recorded in the body's frame, as declared.",)
+_CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)
+
+
+def registration(result: Result) -> Exhibit:
+    """Method, FRE, FLE, predicted TRE, residuals of every marker; rest residuals."""
+    seen = markers(result.registered[0]) if result.registered else None
+    rest = (_rest(result.rest),) if result.rest else ()
+    declared = seen is not None and isinstance(seen.registration, AsDeclared)
+    if seen is None:
+        return Exhibit("registration", "Registration", (), rest)
+    return Exhibit(
+        "registration",
+        "Registration",
+        _said(seen.registration),
+        (_quality(result, seen), *rest, *(() if declared else (_residuals(result),))),
+        pictures=() if declared else (residual_arrows(seen.registration),),
+    )
+
+
+def _said(found: Registration) -> tuple[str, ...]:
+    return _DECLARED if isinstance(found, AsDeclared) else found.findings or _CLEAN
+
+
+def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
+    found = seen.registration
+    noise = ("declared noise", with_unit(found.expected_sd, "m"), "standard deviation per axis")
+    if isinstance(found, AsDeclared):
+        markers_ = ("markers", str(found.k_effective), "in the body's frame as recorded")
+        return NumberTable("", "Markers as recorded.", ("", "value", "meaning"), (markers_, noise))
+    rows = (
+        ("method", found.method, "fitted once, on the rest state, then frozen"),
+        ("markers in the fit", str(found.k_effective), f"{len(found.missing)} not visible, "
+         f"{len(found.excluded)} excluded, {len(found.outliers)} outliers ("
+         f"{len(found.rejected)} left out by a robust fit); all visible markers are compared"),
+        ("fitted scale", f"{found.scale.value:.5f} ± {found.scale.half:.2g}",
+         f"markers over layout, 99.9 %; {'not ' * (found.transform.s == 1)}used"),
+        noise,
+        ("FRE", with_unit(found.fre, "m"), "rms residual at the markers; not a measure of "
+                                           "accuracy"),
+        ("FLE", with_unit(found.fle, "m"), "rms localisation error of one marker, from the FRE"),
+        ("TRE at the markers", with_unit(float(rms(seen.tre[:, None])), "m"), "predicted, rms"),
+        *_target(result, found),
+    )  # fmt: skip
+    return NumberTable("", "Marker registration.", ("", "value", "meaning"), rows)
+
+
+def _target(result: Result, found: Registration) -> Iterator[tuple[str, str, str]]:
+    """The error predicted at the centre of every cavity of the first scene."""
+    scene = result.methods[0].scene
+    for cavity in scene.cavities:
+        nodes = scene.mesh.nodes[scene.mesh.facet_nodes(cavity.facets)]
+        tre = float(found.tre_at(nodes.mean(axis=0)[None])[0])
+        yield f"TRE at {cavity.name}", with_unit(tre, "m"), "predicted at the cavity's centre"
+
+
+def _rest(rest: tuple[Residual, ...]) -> NumberTable:
+    columns: Mapping[str, Shown] = {
+        "residual": "name", "unit": lambda r: shown_unit(r.unit),
+        "rms": sized(lambda r: rms(r.values)), "max": sized(lambda r: max_length(r.values)),
+        "noise": sized(lambda r: float(np.sqrt(r.values.shape[1])) * r.sd), "values": "count",
+    }  # fmt: skip
+    title = (
+        "Errors of registration and geometry at rest, before any load; noise: the rms of a "
+        "perfect model."
+    )
+    return table("", title, rest, columns)
+
+
+def _residuals(result: Result) -> NumberTable:
+    """Where every marker lies and what its registration leaves, of every recording."""
+    return NumberTable(
+        "registration",
+        "Registration residual of every marker.",
+        ("recording", "marker", "x", "y", "z", "residual_x", "residual_y", "residual_z", "length",
+         "unit", "finding"),
+        tuple(
+            row
+            for recording, registered in zip(result.recordings, result.registered, strict=False)
+            if (seen := markers(registered)) is not None
+            for row in _rows(recording.name, seen.registration)
+        ),
+        folded=True,
+    )  # fmt: skip
+
+
+def _rows(recording: str, found: Registration) -> Iterator[tuple[Entry | TableCell, ...]]:
+    outliers = {o.name for o in found.outliers}
+    for name, at, off in zip(found.names, found.markers, found.residuals, strict=True):
+        three = (v for vector in (at, off) for v in (*vector.tolist(), None)[:3])
+        lengths = (*three, float(np.linalg.norm(off)))
+        bad = name in outliers
+        said = TableCell("outlier" if bad else "", emphasis="bad" if bad else "")
+        unit = TableCell("m", text=shown_unit("m"))
+        yield recording, name, *(TableCell(v, "m") for v in lengths), unit, said

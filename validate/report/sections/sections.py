@@ -1,0 +1,109 @@
+"""What every report shows, in order: views of the long table, and parts drawn from the result."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+from validate.compare.exhibit import Exhibit
+from validate.compare.result import Result
+from validate.report.long_table import LongTable
+from validate.report.scenes.bodies import body
+from validate.report.scenes.markers import markers
+from validate.report.scenes.outlines import outlines
+from validate.report.sections.discrimination import discrimination
+from validate.report.sections.observed import drive
+from validate.report.sections.provenance import parameters, recording
+from validate.report.sections.registration import registration
+from validate.report.sections.verdicts import found_besides, verdicts
+from validate.report.views.filled import filled
+from validate.report.views.standard import VIEWS
+
+Made = Callable[[Result], Exhibit | None]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page: views by their names, before what `also` makes of the result.
+
+    Views are shown where `when` says so.
+    """
+
+    anchor: str
+    title: str
+    views: tuple[str, ...] = ()
+    also: Made | None = None
+    when: Callable[[Result], bool] = lambda result: True
+
+
+def _over_displacement(result: Result) -> bool:
+    """Whether displacements drive: then what was measured is drawn over them."""
+    return bool(result.registered) and all(drive(r).unit == "m" for r in result.registered)
+
+
+SECTIONS: tuple[Section, ...] = (
+    Section("checks", "Checks", ("limits", "checks"), verdicts, lambda r: bool(r.checks)),
+    Section("outlines", "Outlines", also=outlines),
+    Section("markers", "Markers", also=markers),
+    Section("curves", "Load and displacement", ("curve", "difference"), None, _over_displacement),
+    Section(
+        "discrimination",
+        "Which effects this recording can distinguish",
+        ("effects", "budget"),
+        discrimination,
+    ),
+    Section("body", "The simulated body", also=body),
+    Section("methods", "Models side by side", ("methods", "speeds", "errors", "errors_of_truth")),
+    Section("published", "Published figures", ("published", "settings")),
+    Section("identified", "Identified parameters and notes", ("identified",), found_besides),
+    Section("scores", "All scores", ("scores", "scores_by_load")),
+    Section("registration", "Registration", also=registration),
+    Section("recording", "Recording", also=recording),
+    Section("parameters", "Parameters and environment", also=parameters),
+)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A section whose views are filled; called with the result it is whole, or None without any
+    content. Workers call it: `also` draws."""
+
+    anchor: str
+    title: str
+    views: tuple[Exhibit, ...]
+    also: Made | None
+
+    def __call__(self, result: Result) -> Exhibit | None:
+        joined: Any = dict.fromkeys(_LISTS, ())
+        for part in (*self.views, self.also(result) if self.also else None):
+            for name in _LISTS if part is not None else ():
+                joined[name] += getattr(part, name)
+        return Exhibit(self.anchor, self.title, **joined) if any(joined.values()) else None
+
+
+def parts(result: Result, table: LongTable) -> tuple[Begun | Exhibit, ...]:
+    """The sections, and the experiment's own exhibits and views after the checks, with the views
+    that plug-ins and scripts added."""
+    known = {view.name: view for view in VIEWS}
+    found: list[Begun | Exhibit] = []
+    for s in SECTIONS:
+        views = s.views if s.when(result) else ()
+        filled_ = tuple(filled(known[name], table) for name in views)
+        found.append(Begun(s.anchor, s.title, filled_, s.also))
+        if s.anchor == "checks":
+            own = [filled(view, table) for view in result.views]
+            own += [
+                VIEWS.answer(v, lambda v: filled(v, table), Exhibit("", "")) for v in VIEWS.further
+            ]
+            found += [*result.exhibits, *(e for e in own if any(getattr(e, n) for n in _LISTS))]
+    return tuple(found)
+
+
+def exhibits(result: Result, table: LongTable) -> Iterator[Exhibit]:
+    """What the parts show, where they apply."""
+    for part in parts(result, table):
+        made = part if isinstance(part, Exhibit) else part(result)
+        if made is not None:
+            yield made
+
+
+_LISTS = tuple(f.name for f in fields(Exhibit) if f.name not in ("anchor", "title"))

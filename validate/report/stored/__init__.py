@@ -1,0 +1,4 @@
+"""Folders of results: written, exchanged, compared with what was there, read again.
+
+Start with `folder`.
+"""

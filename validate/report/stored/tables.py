@@ -1,0 +1,80 @@
+"""Queries over the tables of all stored runs below a folder, read one run at a time.
+
+from validate.report import open_store
+open_store("reports").where(part="score", quantity="marker.*", statistic="rms").to_pandas()
+"""
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from validate.compare.row import LongRow, Wanted, require_columns
+from validate.errors import RecordingError, UsageError
+from validate.report.export.table_file import stored_table
+from validate.report.long_table import LongTable, frame
+from validate.report.stored.folder import MARK
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StoredTables:
+    """The stored runs below `reports`, and the conditions `labels` on their rows.
+
+    Nothing is read before rows are asked for; then one run is in memory at a time.
+    """
+
+    reports: Path
+    labels: Mapping[str, Wanted] = field(default_factory=dict)
+
+    def where(self, **labels: Wanted) -> "StoredTables":
+        """Return the same runs with more conditions (as `LongTable.where`)."""
+        require_columns(labels, LongRow._fields)
+        return replace(self, labels={**self.labels, **labels})
+
+    def __iter__(self) -> Iterator[LongTable]:
+        """Yield the table of every run by name; warn of one that cannot be read and pass it."""
+        for folder in report_folders(self.reports):
+            try:
+                table = stored_table(folder, **self.labels)
+            except RecordingError as error:
+                LOG.warning(str(error))
+                continue
+            except (KeyError, TypeError, AttributeError) as error:
+                LOG.warning(f"{folder.name}: its results cannot be read: {error!r:.60}")
+                continue
+            if table.of_run or table.rows:  # a study has tables only
+                yield table
+
+    def rows(self) -> Iterator[LongRow]:
+        """Yield the rows of all runs, one run after the other."""
+        for table in self:
+            yield from table.rows
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the rows of all runs as a DataFrame; raises `UsageError` without pandas."""
+        return frame(self.rows())
+
+
+def open_store(folder: Path | str) -> StoredTables:
+    """Return the stored runs below a folder of reports, or the one run that it holds.
+
+    Raises `UsageError` where there is no such folder.
+    """
+    reports = Path(folder)
+    if not reports.is_dir():
+        raise UsageError(f"no folder of stored runs at {reports}; `validate run NAME` makes one")
+    return StoredTables(reports)
+
+
+def report_folders(reports: Path) -> list[Path]:
+    """Return the folders of results of a folder, by name; itself where it is one."""
+    if (reports / MARK).is_file():
+        return [reports]
+    folders = (f for f in reports.iterdir() if f.is_dir() and not f.name.startswith("."))
+    return sorted(f for f in folders if (f / MARK).is_file())

@@ -1,0 +1,176 @@
+"""Drawers: a filled view, or any exhibit, as a file, static figures, a page, text for a terminal.
+
+Each takes an exhibit, and the run whose methods have their colours.
+"""
+
+from itertools import cycle
+from pathlib import Path
+from string import ascii_lowercase
+from typing import TYPE_CHECKING
+
+import numpy as np
+import plotille
+
+from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
+from validate.errors import UsageError
+from validate.report.export.tables import across, shown, write_csv
+from validate.report.views.bars import bar, legend
+from validate.report.views.layout import laid, wrapped
+from validate.report.views.numbers import significant
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from validate.report.charts.style import HasMethods
+
+
+# --- A chart in characters. The only file that imports plotille.
+
+_HIGH, _AXIS = 14, 24  # lines of a chart; columns that its axis and the margin take
+_LEAST = 20  # columns of the area
+
+
+def plotted(chart: Chart, width: int) -> list[str]:
+    """Lines of at most about `width` characters; levels are lines of =, bands are left out."""
+    figure = plotille.Figure()
+    figure.width, figure.height = max(_LEAST, width - _AXIS), _HIGH
+    figure.with_colors, figure.origin = False, False
+    figure.x_label, figure.y_label = chart.x, chart.y
+    figure.register_label_formatter(float, _tick)
+    several = sum(s.style == "line" for s in chart.series) > 1
+    signs, letters = cycle("xo+*#@%&"), cycle(ascii_lowercase)
+    for series in chart.series:
+        if series.style == "points":
+            figure.scatter(series.x, series.y, label=series.name, marker=next(signs))
+        elif series.style == "line":
+            marker = next(letters) if several else None
+            figure.plot(series.x, series.y, label=series.name, marker=marker)
+    for name, y in chart.levels:
+        ends = [s.x for s in chart.series if len(s.x)] or [np.array([0.0, 1.0])]
+        low, high = min(x.min() for x in ends), max(x.max() for x in ends)
+        figure.plot([low, high], [y, y], label=name, marker="=")
+    return [str(line).rstrip() for line in figure.show(legend=True).splitlines()]
+
+
+def _tick(value: float, chars: int, *_: object, **__: object) -> str:
+    return f"{significant(value, 4):<{chars}}"[:chars]
+
+
+# -------------------------------------------------------------------------------------------------
+
+_NOTHING = "No row fits."
+_FIGURES = (".svg", ".pdf", ".png")
+_SUFFIXES = (*_FIGURES, ".csv", ".tex", ".html")
+
+
+# --- a file ---------------------------------------------------------------------------------------
+
+
+def save(found: Exhibit, run: "HasMethods", path: Path) -> None:
+    """Write an exhibit as its file's suffix says: a chart as .svg, .pdf or .png, a table as .csv or
+    .tex, anything as .html.
+
+    Raises `UsageError` for another suffix, and for several charts or tables in one file.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise UsageError(f"{path.name}: a view is written as {', '.join(_SUFFIXES)}")
+    if suffix == ".html":
+        path.write_text(page(found, run), encoding="utf-8")
+        return
+    parts = found.tables if suffix in (".csv", ".tex") else drawable(found)
+    if len(parts) != 1:
+        what = "tables" if suffix in (".csv", ".tex") else "charts"
+        raise UsageError(f"{path.name}: '{found.anchor}' has {len(parts)} {what}; write .html")
+    if suffix in _FIGURES:
+        figures(found, run)[0].savefig(path)
+    elif suffix == ".csv":
+        write_csv(path, found.tables[0].headings, found.tables[0].rows)
+    else:
+        from validate.report.export.outside import tabular
+
+        path.write_text(tabular(found.tables[0]), encoding="utf-8")
+
+
+# --- a static picture -----------------------------------------------------------------------------
+
+
+def figures(found: Exhibit, run: "HasMethods") -> list["Figure"]:
+    """Charts, heats and intervals as matplotlib figures; none of an exhibit that is a table."""
+    return [figure_of(part, run) for part in drawable(found)]
+
+
+def drawable(found: Exhibit) -> tuple[Chart | Heat | Intervals, ...]:
+    """What of an exhibit is drawn from numbers."""
+    return *found.charts, *found.heats, *found.intervals
+
+
+def figure_of(part: Chart | Heat | Intervals, run: "HasMethods") -> "Figure":
+    """A chart, a heat or intervals as a matplotlib figure."""
+    from validate.report.charts import chart as charts
+    from validate.report.charts import heat, intervals
+    from validate.report.charts.style import painted
+
+    match part:
+        case Chart():
+            return painted(*charts.drawing(run, part))
+        case Heat():
+            return painted(*heat.drawing(part))
+        case Intervals():
+            return painted(*intervals.drawing(part))
+
+
+# --- a page ---------------------------------------------------------------------------------------
+
+
+def page(found: Exhibit, run: "HasMethods") -> str:
+    """The exhibit as a page of its own in HTML: one text without a request."""
+    from validate.report.exhibits import draw_all
+    from validate.report.html import fragment
+
+    return fragment(draw_all(run, [found]))
+
+
+def part(found: Exhibit, run: "HasMethods") -> str:
+    """The exhibit in HTML for a page that has a head and a style of its own."""
+    from validate.report.exhibits import draw_all
+    from validate.report.html import sections
+
+    return sections(draw_all(run, [found]))
+
+
+# --- a terminal -----------------------------------------------------------------------------------
+
+
+def terminal(found: Exhibit, width: int) -> list[str]:
+    """The exhibit in lines of at most `width` characters, its title first."""
+    lines = [*wrapped(found.title, width)]
+    for text in found.words:
+        lines += wrapped(text, width, "  ")
+    for part in found.tables:
+        lines += ["", *wrapped(part.title, width)] if part.title != found.title else []
+        heads = [part.headings[i] for i in across(part)]
+        lines += laid(heads, [[shown(row[i]) for i in across(part)] for row in part.rows], width)
+    for chart in found.charts:
+        title = [chart.title] if chart.title != found.title else []
+        lines += ["", *title, *plotted(chart, width)]
+    for one in found.intervals:
+        lines += _bars(one, width)
+    for heat in found.heats:
+        heads = [heat.y, *heat.columns]
+        rows = [[name, *(significant(v) if np.isfinite(v) else "" for v in values)]
+                for name, values in zip(heat.rows, heat.values.tolist(), strict=True)]  # fmt: skip
+        lines += [f"{heat.quantity} over {heat.x}", *laid(heads, rows, width)]
+    notes = [part.note for part in found.tables] + [chart.caption for chart in found.charts]
+    lines += [line for note in dict.fromkeys(filter(None, notes)) for line in wrapped(note, width)]
+    return lines if len(lines) > 1 else [*lines, _NOTHING]
+
+
+def _bars(one: Intervals, width: int) -> list[str]:
+    """A line an interval, with a bar up to its limit, or, without one, up to 2 u_val."""
+    bars = [
+        bar(value, half, limit) if limit > 0 else bar(value, 0.0, half) if half > 0 else ""
+        for value, half, limit in zip(one.values, one.halves, one.limits, strict=True)
+    ]
+    rows = [list(row) for row in zip(one.labels, bars, one.texts, one.answers, strict=True)]
+    return [legend("limit, or 2 u_val without one"), *laid([""] * 4, rows, width)]

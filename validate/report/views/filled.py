@@ -1,0 +1,437 @@
+"""A view filled with the rows of a table: number tables, charts, heats, intervals, sentences.
+
+These are plain data that every drawer takes; nothing here draws.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from validate.compare.exhibit import (
+    Chart,
+    Emphasis,
+    Exhibit,
+    Heat,
+    Intervals,
+    NumberTable,
+    Series,
+    TableCell,
+    plain,
+)
+from validate.compare.row import MEASURED, VALUE, LongRow
+from validate.compare.view import View, texts
+from validate.errors import ComparisonError, UsageError
+from validate.parameters import nearest_names
+from validate.report.long_table import LongTable
+from validate.report.views.numbers import MISSING, scale, shown_unit, spaced, with_unit
+from validate.units import in_si, si_of, split
+
+_TWO = 2.0  # standard uncertainties of an interval
+_ON_ANOTHER = 0.01  # share of the largest range below which two lines draw one
+_KPA = 1000.0  # Pa above which a chart's axis is in kPa
+_NUMBERS = ("value", "sd", "expanded")  # in the unit of their row
+_COUNTS = ("n", "point", "at")
+_HEADINGS = {"label": "method", "method": "name"}
+#: How words that answer something stand out, in every table.
+WORDS: Mapping[str, Emphasis] = {
+    "good enough": "good", "not good enough": "bad", "undecided": "open", "differs": "bad",
+    "not distinguishable": "good", "no answer": "open", "nothing compared": "bad",
+    "reproduced": "good", "not reproduced": "bad", "not reproducible as printed": "open",
+    "not comparable": "open", "moved": "bad", "not computed": "bad", "other data": "open",
+    "outlier": "bad",
+}  # fmt: skip
+Grid = dict[tuple[str, ...], dict[str, list[LongRow]]]
+
+
+def filled(view: View, table: LongTable) -> Exhibit:
+    """The view as an exhibit of its name and title; empty where no row fits.
+
+    Raises `ComparisonError` where several rows are in one cell and the view does not say which
+    counts, where units of one chart are mixed, or the unit to show is of another kind.
+    """
+    found = table.where(**view.rows).rows
+    groups: dict[str, list[LongRow]] = {}
+    for row in found:
+        groups.setdefault(_label(row, view.each, table) if view.each else "", []).append(row)
+    parts = [(_named(view, key), rows) for key, rows in groups.items()]
+    one = Exhibit(view.name, view.title)
+    match view.form:
+        case "table":
+            return replace(one, tables=tuple(_table(v, rows, table) for v, rows in parts))
+        case "lines" | "points":
+            charts = (_chart(v, rows, table) for v, rows in parts)
+            return replace(one, charts=tuple(c for c in charts if c is not None))
+        case "heat":
+            return replace(one, heats=tuple(_heat(v, rows, table) for v, rows in parts))
+        case "intervals":
+            return replace(one, intervals=tuple(_intervals(v, rows, table) for v, rows in parts))
+        case "sentences":
+            return replace(one, words=tuple(_sentence(view, row, table) for row in found))
+
+
+def _named(view: View, key: str) -> View:
+    """The view of one of several groups: its name and title with the group's."""
+    if not key:
+        return view
+    name = f"{view.name}_{key.replace('.', '_')}"
+    return replace(view, name=name, title=f"{view.title}: {key}")
+
+
+# --- labels and units -----------------------------------------------------------------------------
+
+
+def _label(row: LongRow, column: str, table: LongTable) -> str:
+    """A column of a row as people read it: methods by their labels, loads with a space."""
+    if column == "label":
+        return next((m.label for m in table.methods if m.name == row.method), row.method)
+    found = getattr(row, column)
+    if column == "condition":
+        return spaced(found)
+    if column == "statistic" and found == VALUE:
+        return ""
+    return "" if found is None else str(found)
+
+
+def _key(row: LongRow, columns: Iterable[str], table: LongTable) -> tuple[str, ...]:
+    return tuple(_label(row, c, table) for c in columns)
+
+
+def _number(row: LongRow, column: str) -> float | None:
+    if column == "expanded":
+        return None if row.sd is None else _TWO * row.sd
+    found: float | None = getattr(row, column)
+    return found
+
+
+def _shown(unit: str, wanted: str) -> tuple[str, Callable[[float], float]]:
+    """The unit that is shown of an SI unit, and what turns a number into it."""
+    if not wanted:
+        factor = scale(unit)
+        return shown_unit(unit), lambda v: factor * v
+    size = in_si(1.0, wanted, unit)
+    if size is not None:
+        return wanted, lambda v: v / size
+    factor, inverse = si_of(wanted)
+    if {unit, inverse} == {"s", "Hz"}:  # a rate is one over a time
+        return wanted, lambda v: 1 / (factor * v) if v else float("inf")
+    raise ComparisonError(f"a number in {unit} is not shown in {wanted}")
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable:
+    """Lines by the labels `x`, columns by the labels `by`; units in headings where one column has
+    one, else in a column of their own, else beside each number."""
+    labels, grid = texts(view.x), _grid(view, rows, table)
+    across = _across(view, rows, table)
+    cells = [[_cell(view, line.get(key, []), column) for _, key, column in across]
+             for line in grid.values()]  # fmt: skip
+    kept = [j for j in range(len(across)) if any(plain(c[j]) not in (None, "") for c in cells)]
+    units = [_units(c[j] for c in cells) for j in kept]
+    by_line = [_units(c[j] for j in kept) for c in cells]
+    in_heads = all(len(u) <= 1 for u in units)
+    in_lines = not in_heads and all(len(u) <= 1 for u in by_line)
+    heads = [_HEADINGS.get(c, c) if "label" in labels else c for c in labels]
+    heads += ["unit"] if in_lines else []
+    for j, found in zip(kept, units, strict=True):
+        unit = shown_unit(next(iter(found))) if in_heads and found else ""
+        heads.append(f"{across[j][0]} / {view.unit or unit}".removesuffix(" / "))
+    lines: list[tuple[TableCell | str, ...]] = []
+    for (key, line), own, found in zip(grid.items(), cells, by_line, strict=True):
+        first = next(r for rs in line.values() for r in rs)
+        unit = shown_unit(next(iter(found), "1"))
+        lines.append((
+            *(TableCell(t, emphasis="" if i else "strong") for i, t in enumerate(key)),
+            *([unit] if in_lines else []),
+            *(_written(view, own[j], in_cell=not (in_heads or in_lines)) for j in kept),
+            *(_also(line, name, first) for name in view.also),
+        ))  # fmt: skip
+    also = ["values" if name == "n" else name for name in view.also]
+    return NumberTable(
+        "", view.title, (*heads, *also), tuple(lines), view.caption, view.folded, view.below
+    )
+
+
+def _grid(view: View, rows: Sequence[LongRow], table: LongTable) -> Grid:
+    labels, by = texts(view.x), texts(view.by)
+    grid: Grid = {}
+    for row in rows:
+        line = grid.setdefault(_key(row, labels, table), {})
+        line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
+    return grid
+
+
+def _across(view: View, rows: Sequence[LongRow], table: LongTable) -> list[tuple[str, str, str]]:
+    """Heading, label and column of what each column shows."""
+    y = texts(view.y)
+    keys = dict.fromkeys(" ".join(filter(None, _key(r, texts(view.by), table))) for r in rows)
+    if view.columns:
+        parts = [(head, *text.partition(":")[::2]) for head, text in view.columns.items()]
+        return [(head.replace("*", star), key, column or y[0])
+                for head, label, column in parts
+                for key, star in _matched(label, keys)]  # fmt: skip
+    told = len(y) > 1 or "" in keys
+    return [(" ".join(filter(None, (key, column if told else ""))), key, column)
+            for key in keys for column in y]  # fmt: skip
+
+
+def _matched(label: str, keys: Iterable[str]) -> list[tuple[str, str]]:
+    """The label itself, or the keys that fit one with a star, and what the star stands for."""
+    if "*" not in label:
+        return [(label, "")]
+    before, _, behind = label.partition("*")
+    return [(k, k[len(before) : len(k) - len(behind)]) for k in keys
+            if k.startswith(before) and k.endswith(behind)]  # fmt: skip
+
+
+def _cell(view: View, rows: list[LongRow], column: str) -> TableCell:
+    row = _chosen(view, rows, column)
+    if row is None:
+        return TableCell(None)
+    if column in _NUMBERS:
+        return TableCell(_number(row, column), row.unit)
+    found = getattr(row, column)
+    if column in _COUNTS:
+        return TableCell(found)
+    text = str(found or "")
+    decides = column != "validation" or row.acceptance in ("", "no requirement")
+    return TableCell(text, emphasis=WORDS.get(text.partition(" (")[0], "") if decides else "")
+
+
+def _chosen(view: View, rows: list[LongRow], column: str) -> LongRow | None:
+    if len(rows) > 1 and not view.several:
+        first = rows[0]
+        raise ComparisonError(
+            f"view '{view.name}': {len(rows)} rows are in one cell ({first.method} {first.name}); "
+            "name more columns in x or by, narrower rows, or `several`"
+        )
+    if view.several == "largest":
+        return max(rows, key=lambda r: abs(_number(r, column) or 0.0), default=None)
+    return rows[-1] if rows else None
+
+
+def _units(cells: Iterable[TableCell]) -> set[str]:
+    return {c.unit for c in cells if c.unit and c.value is not None}
+
+
+def _written(view: View, cell: TableCell, *, in_cell: bool) -> TableCell:
+    """The number in the unit that heading or line names, or, where neither does, with its own."""
+    if cell.value is None or not cell.unit:
+        return cell
+    value = float(cell.value)
+    if in_cell and not view.unit:
+        return TableCell(with_unit(value, cell.unit))
+    return TableCell(_shown(cell.unit, view.unit)[1](value))
+
+
+def _also(line: Mapping[str, list[LongRow]], name: str, first: LongRow) -> TableCell:
+    values = list(dict.fromkeys(getattr(r, name) for rs in line.values() for r in rs))
+    if len(values) == 1:
+        return TableCell(values[0])
+    return TableCell(getattr(first, name), text=", ".join(str(v) for v in values if v is not None))
+
+
+# --- charts ---------------------------------------------------------------------------------------
+
+
+def _chart(view: View, rows: Sequence[LongRow], table: LongTable) -> Chart | None:
+    """y over x, a series for each label of `by`; the one row of a label that has no x is a level.
+    Rows without a number are left out; None where none is left."""
+    rows = [r for r in (_less(view, rows, table) if view.less else rows) if r.value is not None]
+    if not rows:
+        return None
+    unit, turn = _axis(view, rows)
+    x_name, x_unit, x_of = _abscissa(view, rows, table)
+    first, *others = _telling(view, rows) or ("",)
+    lines: dict[tuple[str, str], list[tuple[float, float, float | None]]] = {}
+    levels = []
+    for row in rows:
+        at, value = x_of(row), turn(row.value or 0.0)
+        label = _label(row, first, table) if first else view.title
+        if at is None:
+            levels.append((label, value))
+            continue
+        half = None if row.sd is None else _TWO * abs(turn(row.sd))
+        of = ", ".join(filter(None, _key(row, others, table)))
+        lines.setdefault((label, of), []).append((at, value, half))
+    counts = Counter(label for label, _ in levels)
+    levels = [(label, y) for label, y in levels if counts[label] == 1]
+    series: list[Series] = []
+    widest = 0.0
+    for (label, of), points in lines.items():
+        x, y = np.array([p[:2] for p in points], dtype=float).T
+        halves = [p[2] for p in points]
+        if "sd" in texts(view.y) and all(h is not None for h in halves):
+            band = np.array(halves, dtype=float)
+            widest = max(widest, float(band.max()))
+            series.append(Series(label, x, y - band, "band", y + band, of))
+        marked = view.form == "points" or label == MEASURED
+        series.append(Series(label, x, y, "points" if marked else "line", of=of))
+    drawn, hidden = _apart(series)
+    quantity = _common(r.quantity for r in rows) or "value"
+    quantity = f"{quantity} − {view.less}" if view.less else quantity
+    return Chart(
+        view.name, view.title, f"{x_name} / {x_unit}".removesuffix(" / "),
+        f"{quantity} / {unit}".removesuffix(" / "), drawn, tuple(levels), view.log,
+        caption=f"{view.caption}{hidden}", linear=widest if view.less else 0.0,
+    )  # fmt: skip
+
+
+def _apart(series: list[Series]) -> tuple[tuple[Series, ...], str]:
+    """The series without lines that lie on another, and a sentence that names these."""
+    lines = [s for s in series if s.style == "line"]
+    span = max((float(np.ptp(s.y)) for s in lines), default=0.0)
+    drawn: list[Series] = []
+    hidden = []
+    for s in lines:
+        on = next((o for o in drawn if o.of == s.of and np.array_equal(o.x, s.x)
+                   and np.abs(o.y - s.y).max() <= _ON_ANOTHER * span), None)  # fmt: skip
+        if on is None:
+            drawn.append(s)
+        else:
+            hidden.append(f"{s.label} (on {on.label})")
+    gone = {id(s) for s in lines} - {id(s) for s in drawn}
+    names = {s.name for s in lines if id(s) in gone}
+    kept = tuple(s for s in series if s.name not in names)
+    said = f" Not drawn, as they coincide with another line: {'; '.join(dict.fromkeys(hidden))}."
+    return kept, said if hidden else ""
+
+
+def _less(view: View, rows: Sequence[LongRow], table: LongTable) -> Iterator[LongRow]:
+    """Rows minus those of one method at the same time; what that one lacks is left out."""
+
+    def place(row: LongRow) -> tuple[object, ...]:
+        return row.recording, row.quantity, row.statistic, row.condition, row.at, row.point
+
+    of = {place(r): r.value for r in table.where(**{**view.rows, "method": view.less}).rows}
+    for row in rows:
+        reference = of.get(place(row))
+        if row.value is not None and reference is not None:
+            sd = row.sd if row.method == view.less else None
+            yield row._replace(value=row.value - reference, sd=sd)
+
+
+def _telling(view: View, rows: Sequence[LongRow]) -> tuple[str, ...]:
+    """The labels of `by` that tell rows apart; the first one always does."""
+    by = texts(view.by)
+    column = {"label": "method"}
+    return tuple(b for i, b in enumerate(by)
+                 if i == 0 or len({getattr(r, column.get(b, b)) for r in rows}) > 1)  # fmt: skip
+
+
+def _axis(view: View, rows: Sequence[LongRow]) -> tuple[str, Callable[[float], float]]:
+    units = list(dict.fromkeys(r.unit for r in rows if r.value is not None))
+    if len(units) > 1:
+        raise ComparisonError(
+            f"view '{view.name}': units {' and '.join(units)} on one axis; choose rows of one, or "
+            'each="unit"'
+        )
+    unit = units[0] if units else "1"
+    largest = max((abs(r.value) for r in rows if r.value is not None), default=0.0)
+    wanted = view.unit or ("kPa" if unit == "Pa" and largest >= _KPA else "")
+    return _shown(unit, wanted)
+
+
+def _abscissa(
+    view: View, rows: Sequence[LongRow], table: LongTable
+) -> tuple[str, str, Callable[[LongRow], float | None]]:
+    """Name and unit of what lies across, and a row's number there: a column of numbers, or the
+    value of a quantity at the same time."""
+    (name,) = texts(view.x)
+    if name in _COUNTS:
+        if name != "at":
+            return name, "", lambda row: getattr(row, name)
+        units = {_unit_of(row.condition) for row in rows}
+        unit = units.pop() if len(units) == 1 else "1"
+        shown, turn = ("s", float) if unit == "s" else _shown(unit, "")
+        return ("time" if unit == "s" else "load"), shown, lambda row: (
+            None if row.at is None else turn(row.at))  # fmt: skip
+    if name in _NUMBERS:
+        unit, turn = _axis(view, rows)
+        return name, unit, lambda row: (
+            None if (v := _number(row, name)) is None else turn(v))  # fmt: skip
+    parts = tuple({row.part for row in rows})
+    found = [r for r in table.where(part=parts).rows if name in (r.quantity, r.role)]
+    if not found:
+        known = {r.quantity for r in table.rows if r.part in parts}
+        if name in LongRow._fields:
+            raise UsageError(f"view '{view.name}': '{name}' holds no numbers; x may be 'at'")
+        raise UsageError(f"view '{view.name}': no quantity '{name}'; {nearest_names(name, known)}")
+    found = [r for r in found if r.quantity == found[0].quantity]
+    held = {(r.recording, r.method, r.at, r.point): r.value for r in found}
+    shared = {(r.recording, r.at, r.point): r.value for r in found if r.method in ("", MEASURED)}
+    shown, turn = _shown(found[0].unit if found else "1", "")
+
+    def value(row: LongRow) -> float | None:
+        place = (row.recording, row.at, row.point)
+        x = held.get((row.recording, row.method, row.at, row.point), shared.get(place))
+        return None if x is None else turn(x)
+
+    return found[0].quantity, shown, value
+
+
+def _unit_of(condition: str) -> str:
+    """The SI unit of a time or load such as 9mm; seconds where it is none."""
+    found = split(condition)
+    return si_of(found[1])[1] if found and found[1] else "s"
+
+
+def _common(names: Iterable[str]) -> str:
+    found = list(dict.fromkeys(names))
+    return found[0] if len(found) == 1 else ""
+
+
+def _heat(view: View, rows: Sequence[LongRow], table: LongTable) -> Heat:
+    unit, turn = _axis(view, rows)
+    across, down = texts(view.x), texts(view.by)
+    columns = list(dict.fromkeys(" ".join(_key(r, across, table)) for r in rows))
+    lines = list(dict.fromkeys(" ".join(_key(r, down, table)) for r in rows))
+    values = np.full((len(lines), len(columns)), np.nan)
+    for row in rows:
+        if row.value is not None:
+            i, j = (lines.index(" ".join(_key(row, down, table))),
+                    columns.index(" ".join(_key(row, across, table))))  # fmt: skip
+            values[i, j] = turn(row.value)
+    quantity = f"{_common(r.quantity for r in rows) or 'value'} / {unit}".removesuffix(" / ")
+    return Heat(view.name, view.title, " ".join(across), " ".join(down), tuple(columns),
+                tuple(lines), values, quantity)  # fmt: skip
+
+
+def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Intervals:
+    """Each row's value ± 2 sd, and its limit where it has one."""
+    limits = {_place(r): r.value for r in table.where(part="check.limit").rows}
+    names, numbers, words = [], [], []
+    for row in rows:
+        if row.value is None or row.sd is None:
+            continue
+        limit = limits.get(_place(row))
+        names.append(": ".join(filter(None, _key(row, texts(view.x), table))))
+        numbers.append((row.value, _TWO * row.sd, limit))
+        words.append((with_unit(row.value, row.unit), with_unit(_TWO * row.sd, row.unit),
+                      with_unit(limit, row.unit) if limit else MISSING,
+                      row.acceptance if limit else row.validation))  # fmt: skip
+    value, half, most = np.array(numbers, dtype=float).reshape(-1, 3).T  # None becomes NaN
+    return Intervals(view.name, view.title, tuple(names), value, half, most,
+                     tuple(f"{v} ± {u} of {most}" for v, u, most, _ in words),
+                     tuple(w[3] for w in words), view.caption)  # fmt: skip
+
+
+def _place(row: LongRow) -> tuple[str, ...]:
+    return row.recording, row.method, row.quantity, row.statistic, row.condition
+
+
+# --- sentences ------------------------------------------------------------------------------------
+
+
+def _sentence(view: View, row: LongRow, table: LongTable) -> str:
+    columns = (*LongRow._fields, "name", "label")
+    fields: dict[str, Any] = {c: _label(row, c, table) for c in columns}
+    fields |= {c: with_unit(_number(row, c), row.unit) for c in _NUMBERS}
+    try:
+        return view.text.format_map(fields)
+    except (KeyError, ValueError, IndexError, AttributeError) as error:
+        raise UsageError(f"view '{view.name}': text '{view.text}' ({error})") from None

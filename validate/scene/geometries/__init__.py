@@ -1,0 +1,4 @@
+"""Geometries of bodies and the meshes made from them.
+
+Start with `specification`.
+"""

@@ -1,0 +1,4 @@
+"""Explicit dynamics: central difference, linear and at large strain.
+
+Start with `central`.
+"""

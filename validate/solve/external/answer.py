@@ -1,0 +1,286 @@
+"""What a guest answered: `answer.json` and its fields, read as a stranger's files are.
+
+Nothing in them is believed unchecked: sizes and shapes before memory is taken, mesh and times
+against the job, law and parameters against what was asked, forces against each other.
+"""
+
+import json
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validate.arrays import Floats
+from validate.errors import RecordingError, UsageError, ValidateError
+from validate.files import npz_arrays
+from validate.recording.formats.apart import decoded
+from validate.scene.scene import Weight
+from validate.solve.external.job import GuestJob
+from validate.solve.external.program import plain
+
+# --- The fields of a guest's answer: `fields.npz`, or .vtu files listed in `fields.pvd`.
+
+_HEADER_BYTES = 4096
+_NUMBER_BYTES = 32  # of a number in a .vtu, as text
+_LIST_BYTES = 1_000_000
+_SAME = 1e-9  # of the body's size: points that are the job's
+_SECONDS = 300  # of reading a series, whose files are beside the list
+
+
+class NoAnswerError(ValidateError):
+    """Files that are no answer to the job."""
+
+
+def fields_of(folder: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+    """t (k,), u (k, n, 3) and, where given, reactions of that shape, with k at most the job's."""
+    npz, pvd = folder / "fields.npz", folder / "fields.pvd"
+    if pvd.exists() and not npz.exists():
+        return _shaped(_series(pvd, job), pvd.name, job)
+    return _shaped(_arrays(npz, job), npz.name, job)
+
+
+def _series(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+    """Of the files beside the list, whose points are the job's nodes in their order."""
+    regular(path, _LIST_BYTES)
+    mesh = job.scene.mesh
+    most = _NUMBER_BYTES * (4 * mesh.nodes.size + 2 * mesh.cells.size) + _LIST_BYTES
+    for file in sorted(path.parent.glob("*.vtu")):
+        regular(file, max(most, (path.parent / "mesh.vtu").stat().st_size))
+    try:
+        found = decoded("validate.scene.mesh_files.vtu_series", path, None, _SECONDS)
+    except (RecordingError, UsageError) as error:
+        raise NoAnswerError(plain(str(error))) from None
+    points = found.pop("points")
+    slack = _SAME * float(np.ptp(mesh.nodes, axis=0).max())
+    if points.shape != mesh.nodes.shape or np.abs(points - mesh.nodes).max() > slack:
+        raise NoAnswerError(
+            f"{path.name}: {len(points)} points that differ from the {len(mesh.nodes)} nodes "
+            "of the job's mesh; expected its nodes at rest in the same order"
+        )
+    return found
+
+
+def _arrays(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+    nodes, most = job.scene.mesh.nodes.size, len(job.times)
+    room = 8 * most * (2 * nodes + 1) + 3 * _HEADER_BYTES
+    regular(path, room + _HEADER_BYTES)
+    try:
+        found = npz_arrays(path, room)
+    except RecordingError as error:
+        raise NoAnswerError(plain(str(error))) from None
+    wanted = [name for name in ("t", "u", "reactions") if name in found]
+    return {name: _number_array(found[name], name) for name in wanted}
+
+
+def _shaped(found: dict[str, NDArray[Any]], file: str, job: GuestJob) -> dict[str, NDArray[Any]]:
+    """Raises `NoAnswerError` for arrays that are missing or of other shapes than the job's."""
+    if not {"t", "u"} <= set(found):
+        raise NoAnswerError(f"{file}: arrays {sorted(found)}, expected t and u")
+    k = len(np.atleast_1d(found["t"]))
+    for name, array in found.items():
+        shape = (k,) if name == "t" else (k, *job.scene.mesh.nodes.shape)
+        if array.shape != shape or k > len(job.times):
+            raise NoAnswerError(f"{file}: {name} of shape {array.shape}, expected {shape}")
+    return found
+
+
+def _number_array(array: NDArray[Any], name: str) -> Floats:
+    if array.dtype.kind not in "fiu":
+        raise NoAnswerError(f"fields.npz: {name} of type {array.dtype}, expected numbers")
+    return array.astype(np.float64)
+
+
+def regular(path: Path, most: int) -> Path:
+    """The path of an ordinary file of so many bytes: no link, pipe or device is opened."""
+    try:
+        found = path.lstat()
+    except OSError:
+        raise NoAnswerError(f"{path.name} was not written") from None
+    if not stat.S_ISREG(found.st_mode) or found.st_size > most:
+        raise NoAnswerError(
+            f"{path.name}: {found.st_size} bytes: expected an ordinary file of at most {most} bytes"
+        )
+    return path
+
+
+# -------------------------------------------------------------------------------------------------
+
+ANSWER_SCHEMA = "validate-guest-answer/1"
+_STATES = ("finished", "cannot_run", "diverged", "not_converged")
+_JSON_BYTES = 4_000_000
+_LINES = 20  # of what it could not do
+_ECHO = 1e-6  # relative difference of a parameter that is the same
+_UNBALANCED = 1e-3  # of the largest force
+_HUGE = 1e12  # m or N
+
+
+@dataclass(frozen=True)
+class GuestAnswer:
+    """`state` and `why` in the guest's words; u (k, n, 3) m and reactions (k, n, 3) N, or None, of
+    the times done; seconds as it says; `findings`: what is odd, in words."""
+
+    name: str
+    state: str
+    why: str
+    u: Floats
+    reactions: Floats | None
+    setup_s: float
+    step_s: Floats | None
+    findings: tuple[str, ...]
+
+
+def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
+    """Raises `NoAnswerError` with the reason where there is no answer to this job."""
+    said = _document(folder)
+    name = f"{_text(said, 'name') or 'a guest'} {_text(said, 'version') or '(no version)'}"
+    state, why = _text(said, "state"), _text(said, "reason")
+    if state not in _STATES:
+        raise NoAnswerError(f"answer.json: state '{state}', expected {', '.join(_STATES)}")
+    if state == "cannot_run":
+        nothing = np.zeros((0, *job.scene.mesh.nodes.shape))
+        why = why or "no reason given"
+        return GuestAnswer(name, state, why, nothing, None, 0.0, None, _limits(said))
+    if said.get("mesh_sha256") != job.document["mesh"]["sha256"]:
+        raise NoAnswerError("answer.json: mesh_sha256 differs from that of the job's mesh.vtu")
+    arrays = fields_of(folder, job)
+    u, reactions, step = arrays["u"], arrays.get("reactions"), _times_done(arrays["t"], job, state)
+    finite = np.all([_usable(a) for a in (u, reactions) if a is not None], axis=0)
+    if not finite.all():
+        step = int(np.argmin(finite))
+        state, why = "diverged", f"no finite field at step {step}" + (f"; {why}" if why else "")
+    setup, seconds = _seconds(said, step)
+    reactions = None if reactions is None else reactions[:step]
+    findings = (
+        *_limits(said), *echoed(job.document["material"], said.get("used")),
+        *_kept_still(job, u[:step]), *_balance(job, reactions),
+    )  # fmt: skip
+    return GuestAnswer(name, state, why, u[:step], reactions, setup, seconds, findings)
+
+
+def echoed(asked: Mapping[str, Any], used: Any) -> tuple[str, ...]:
+    """Law and parameters that were ignored or changed, a line each."""
+    if not isinstance(used, dict):
+        return ("does not report which law and parameters it used",)
+    found = []
+    for name, value in asked.items():
+        if name not in used:
+            found.append(f"ignored parameter {name} = {value}")
+        elif not _same(value, used[name]):
+            found.append(f"used {name} = {plain(str(used[name]), 60)} instead of {value}")
+    return tuple(found)
+
+
+def _same(asked: Any, used: Any) -> bool:
+    if isinstance(asked, str):
+        return bool(asked == used)
+    try:
+        a, b = np.array(asked, dtype=np.float64), np.array(used, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return a.shape == b.shape and bool(np.allclose(a, b, rtol=_ECHO, atol=0.0))
+
+
+def _document(folder: Path) -> dict[str, Any]:
+    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
+    try:
+        said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
+    if not isinstance(said, dict) or said.get("schema") != ANSWER_SCHEMA:
+        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
+    return said
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is not a number in JSON")
+
+
+def _text(said: Mapping[str, Any], key: str) -> str:
+    value = said.get(key, "")
+    return plain(value) if isinstance(value, str) else ""
+
+
+def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
+    lines = said.get("could_not", [])
+    if not isinstance(lines, list):
+        return ("gives no list of what it could not do",)
+    return tuple(f"could not: {plain(line)}" for line in lines[:_LINES] if isinstance(line, str))
+
+
+def _usable(values: Floats) -> NDArray[np.bool_]:
+    """Of every time (k,): whether all its numbers are finite, and none beyond what can be squared
+    and summed."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.abs(values) < _HUGE).all(axis=(1, 2)))
+
+
+def _times_done(t: Floats, job: GuestJob, state: str) -> int:
+    """How many of the job's times were done: all of them, or the first ones if it gave up."""
+    asked = job.times[: len(t)]
+    slack = 1e-9 * max(float(job.times[-1]), 1e-30)
+    if not np.allclose(t, asked, rtol=0.0, atol=slack):
+        odd = int(np.argmin(np.isclose(t, asked, rtol=0.0, atol=slack)))
+        raise NoAnswerError(f"fields.npz: time {odd} is {t[odd]:g} s, requested {asked[odd]:g} s")
+    if state == "finished" and len(t) < len(job.times):
+        raise NoAnswerError(
+            f"fields.npz: {len(t)} of {len(job.times)} times, although its state is 'finished'"
+        )
+    return len(t)
+
+
+def _seconds(said: Mapping[str, Any], steps: int) -> tuple[float, Floats | None]:
+    """Set-up and steps, as it says; zero and None where it says nothing usable."""
+    setup, each = said.get("setup_s"), said.get("step_s")
+    ready = float(setup) if setup is not None and _is_time(setup) else 0.0
+    if not isinstance(each, list) or not all(map(_is_time, each)) or len(each) < steps:
+        return ready, None
+    return ready, np.array(each[:steps], dtype=np.float64)
+
+
+def _is_time(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return 0 < value < 1e9
+
+
+def _kept_still(job: GuestJob, u: Floats) -> tuple[str, ...]:
+    """Whether what is held and driven is where the job has it."""
+    system = job.system
+    asked = job.inputs[: len(u), : system.moves.shape[1]] @ system.moves.T
+    off = np.abs(u.reshape(len(u), asked.shape[1]) - asked)[:, system.held]
+    largest = max(float(np.abs(u).max(initial=0.0)), float(np.abs(asked).max(initial=0.0)))
+    if off.max(initial=0.0) <= _UNBALANCED * largest:
+        return ()
+    return (
+        f"held or driven nodes are up to {1e3 * off.max():.3g} mm away from their "
+        "prescribed position",
+    )
+
+
+def _balance(job: GuestJob, reactions: Floats | None) -> tuple[str, ...]:
+    """In statics what supports and drives push is what loads and weight pull."""
+    if reactions is None:
+        return (
+            "gives no reaction forces: forces of drives are unknown and the balance is not checked",
+        )
+    if job.document["inertia"]:
+        return ()
+    system, k = job.system, len(reactions)
+    pulls = system.loads if system.scene.loads else np.zeros((system.moves.shape[0], 0))
+    given = job.inputs[:k, system.moves.shape[1] :] @ pulls.T
+    held = np.zeros(len(system.moves), dtype=bool)
+    held[system.held] = True
+    pushed = np.where(held, reactions.reshape(k, len(held)), 0.0)
+    total = (pushed + given).reshape(k, len(held) // 3, 3).sum(axis=1)
+    scale = max(float(np.abs(x).sum(axis=1).max(initial=0.0)) for x in (pushed, given))
+    worst = float(np.abs(total).max(initial=0.0))
+    mesh, E = system.scene.mesh, system.scene.material.E
+    rounding = job.document["tolerance"] * E * float(np.ptp(mesh.nodes)) ** 2
+    if worst <= max(_UNBALANCED * scale, rounding):
+        return ()
+    name = "weight" if any(isinstance(p, Weight) for p in system.scene.loads) else "loads"
+    return (f"reactions and {name} are out of balance by {worst:.3g} N of {scale:.3g} N",)

@@ -1,0 +1,25 @@
+"""A guest's body that is let go: its swing from one job, the rest that it comes to from another."""
+
+from dataclasses import dataclass, fields, replace
+
+from validate.arrays import Floats
+from validate.scene.scene import Scene
+from validate.solve.dynamic.let_go import joined
+from validate.solve.external.scheme import Guest, at_rest
+from validate.solve.types import Run
+
+
+@dataclass(frozen=True)
+class GuestLetGo(Guest):
+    """As `LetGo`: even steps of time, then statics at the last instant."""
+
+    def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
+        """Under inputs (nt, k) at t (nt,) s; refused as a guest is."""
+        plain = Guest(**{f.name: getattr(self, f.name) for f in fields(Guest)})
+        moving = replace(plain, inertia=True).solve(scene, t[:-1], inputs[:-1])
+        if not moving.finished:
+            return moving
+        still = replace(plain, inertia=False).solve(at_rest(scene), t[-1:], inputs[-1:])
+        both = joined(moving, still, t)
+        said = dict.fromkeys((*both.said, *(f"at rest: {w}" for w in still.said[1:])))
+        return replace(both, said=tuple(said), memory=max(moving.memory, still.memory))

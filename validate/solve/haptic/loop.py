@@ -1,0 +1,354 @@
+"""A probe at haptic rate on a body that is simulated at a rate of its own (paper 003, section 3.5).
+
+The body is St. Venant-Kirchhoff (or another law at large strain) by central difference, with as
+many substeps as its critical step needs. It reads the probe at every n-th tick and answers by a
+force some ticks later; in between the force is extrapolated in time from the last answers. Of a
+body that is computed in the `background`, a tick takes what is there, and waits at the tick at
+which the answer is due: what comes out never depends on how fast it was.
+
+Departures: the paper's own forces are those of displaced nodes (eq 32) and its extrapolation is a
+reference; here the hand feels the spring of a probe (virtual coupling), and `extrapolates` "place"
+predicts where that spring hangs, not its force. A force begins and ends with its contact: what was
+answered before does not count, and no hand is pulled harder than the body grips.
+"""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from threading import get_native_id
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError, UsageError
+from validate.fem.critical import critical_step
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.scene.places import nodes_of
+from validate.scene.scene import Scene
+from validate.scene.tool import Needle
+from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.haptic.spring_probe import SpringProbe
+from validate.solve.haptic.touched_body import Read, TouchableBody, TouchedBody
+from validate.solve.types import State, Stepper
+
+# --- A force between the answers of a slower simulation: the polynomial through the last of
+# them.
+#
+# Paper 003, section 3.5, names "force extrapolation" for tissues too large for 1 kHz and leaves
+# the rule to others. Of order p (0 held, 1 linear, 2 quadratic) it is exact for a force that is
+# such a polynomial of time, and else off by f^(p+1) times the distances in time over (p+1)!.
+
+Extrapolation = Literal["hold", "linear", "quadratic"]
+NAMES: tuple[Extrapolation, ...] = get_args(Extrapolation)
+
+
+def answers_of(name: Extrapolation) -> int:
+    """How many of the last answers it takes; as long as there are fewer, those that are there."""
+    return NAMES.index(name) + 1
+
+
+def extrapolated(t: Floats, y: Floats, at: float) -> Floats:
+    """The polynomial through y (m, d) at distinct times t (m,) s, at the time `at` s: (d,)."""
+    return np.asarray(_weights(t, at) @ y)
+
+
+def _weights(t: Floats, at: float) -> Floats:
+    """Lagrange's, (m,); they add up to one."""
+    apart = t[:, None] - t
+    np.fill_diagonal(apart, 1.0)
+    beyond = np.tile(at - t, (len(t), 1))
+    np.fill_diagonal(beyond, 1.0)
+    return np.asarray((beyond / apart).prod(axis=1))
+
+
+def between_answers(y: Floats, every: int, late: int, name: Extrapolation) -> Floats:
+    """What ticks 0, 1, .. give of a force y (nt, d) that is read at every so many of them and
+    answered `late` ticks after; the first answer stands before it is there.
+
+    Raises `UsageError` for an answer that is later than the next reading.
+    """
+    require_schedule(every, late)
+    given, most = np.empty_like(y), answers_of(name)
+    for k in range(len(y)):
+        last = max(k - late, 0) // every
+        read = every * np.arange(max(0, last + 1 - most), last + 1)
+        given[k] = extrapolated(read.astype(np.float64), y[read], float(k))
+    return given
+
+
+def require_schedule(every: int, late: int) -> None:
+    """Raises `UsageError` for ticks between readings and of answers that do not fit."""
+    if not (every >= 1 and 0 <= late <= every):
+        raise UsageError(
+            f"a reading every {every} ticks that is answered {late} ticks later: expected at "
+            "least 1, and an answer no later than the next reading"
+        )
+
+
+# -------------------------------------------------------------------------------------------------
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class HapticLoop:
+    """Settings. `every` 1 and `late` 0: the body answers every tick, at once.
+
+    `margin` is the share of the critical step kept as a margin for how the limit falls as the body
+    deforms; `damping` and `watch` (of answers) are those of `CentralDifference`, and the spring's
+    those of `AsyncRegions`. `limit` N: no larger force is given to the hand.
+    """
+
+    handles: ClassVar[Handles] = Handles(
+        LARGE, inertia=True, cavities=False, loads=False, contact=("foundations", "needle")
+    )
+
+    dt: float = quantity(1e-3, "s", "a tick of the hand")
+    every: int = quantity(10, "1", "ticks between two readings of the probe by the simulation")
+    late: int = quantity(10, "1", "ticks from a reading to its answer")
+    extrapolation: Extrapolation = quantity("linear", "1", "hold, linear, quadratic")
+    extrapolates: Literal["force", "place"] = quantity(
+        "force", "1", "quantity that is extrapolated in time"
+    )
+    background: bool = quantity(False, "1", "simulate in a separate thread")
+    margin: float = quantity(0.25, "1", "share of the critical step kept as a margin")
+    damping: Damping = quantity("mass", "1", "none, alpha M, or beta K too at the last half step")
+    watch: int = quantity(20, "1", "answers between checks of energy, det F, critical step")
+    spring: float = quantity(1000.0, "N/m", "between probe and contact")
+    reach: float = quantity(2e-3, "m", "distance at which the probe makes contact")
+    pad: float = quantity(
+        0.01, "m", "distance from the contact within which surface nodes share the spring"
+    )
+    grip: float | None = quantity(0.0, "N", "pulling force at which contact ends; none: never")
+    slides: bool = quantity(False, "1", "the contact moves to the node nearest to the probe")
+    limit: float = quantity(5.0, "N", "largest force on the hand")
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.dt) and self.dt > 0):
+            raise SceneError(f"tick of {self.dt:g} s: expected a finite number above 0")
+        require_schedule(self.every, self.late)
+        if not 0 <= self.margin < 1:
+            raise SceneError(
+                f"margin {self.margin:g}: expected a share of the critical step, 0 to 1"
+            )
+        if not (self.spring > 0 and self.reach > 0 and self.pad >= 0):
+            raise SceneError(
+                f"spring {self.spring:g} N/m, reach {self.reach:g} m, pad {self.pad:g} m: "
+                "expected spring and reach above 0, and a pad of 0 or more"
+            )
+        if not (np.isfinite(self.limit) and self.limit > 0):
+            raise SceneError(f"force limit {self.limit:g} N: expected a finite number above 0")
+        if not (self.grip is None or self.grip >= 0):
+            raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for a scene without one probe, with drives, or held where it may be
+        touched."""
+        scene = system.scene
+        require_handled(scene, self)
+        if len(scene.tools) != 1 or scene.drives:
+            raise SceneError(
+                f"{len(scene.tools)} probes and {len(scene.drives)} drives: the haptic loop "
+                "needs one probe and no drive"
+            )
+        tool, bare = scene.tools[0], replace(system, scene=replace(scene, tools=()))
+        touchable = TouchableBody(bare, _free_surface(system, tool))
+        substeps = self._substeps(bare, touchable)
+        rule = CentralDifference(
+            self.every * self.dt, self.every * substeps, self.damping, margin=0.0, watch=self.watch
+        )
+        body = rule.prepare(bare)
+        assert isinstance(body, CentralStepper)
+        probe = SpringProbe(touchable, np.array(tool.axis), self.spring, self.reach, self.pad,
+                            self.grip, self.slides)  # fmt: skip
+        jobs = Background() if self.background else None
+        return HapticStepper(self, system, tool, TouchedBody(body, probe, {}), substeps, jobs)
+
+    def _substeps(self, system: System, body: TouchableBody) -> int:
+        """Explicit steps in a tick: stable with the spring on any one node, by Weyl's bound."""
+        found = critical_step(system).lanczos
+        least = float(system.masses.reshape(body.places.shape)[body.surface].min())
+        limit = 2 / np.sqrt((2 / found) ** 2 + self.spring / least)
+        return int(np.ceil(self.dt / ((1 - self.margin) * limit)))
+
+
+def _free_surface(system: System, tool: Needle) -> Ints:
+    """Nodes that may be touched and of which nothing is held."""
+    mesh = system.scene.mesh
+    nodes, held = nodes_of(mesh, tool.facets), np.unique(system.held // mesh.dimension)
+    free = np.setdiff1d(nodes, held)
+    if not len(free):
+        raise SceneError(
+            f"probe '{tool.name}': all {len(nodes)} nodes that it may touch are held; choose a "
+            "free face"
+        )
+    return free
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The probe as it was read at the tick `k`: force (d,) N on the hand, the place (d,) m at which
+    it would feel nothing, and whether it holds the body."""
+
+    k: int
+    force: Floats
+    place: Floats
+    holds: bool
+
+
+@dataclass(frozen=True)
+class HapticTick:
+    """The last body that was answered, the one that is computed and since which tick, and the last
+    answers in rising time, of one contact."""
+
+    body: Read
+    answers: tuple[Answer, ...]
+    running: Callable[[], Read] | None = None
+    since: int = 0
+
+
+class Background:
+    """One thread, begun with its first job; `numbers` are the system's of it."""
+
+    def __init__(self) -> None:
+        self.numbers: list[int] = []
+        self._pool = ThreadPoolExecutor(1, "simulation", self._begun)
+
+    def _begun(self) -> None:
+        self.numbers.append(get_native_id())
+
+    def result_of(self, job: Callable[[], Read]) -> Callable[[], Read]:
+        """Begins a job; what waits for its result."""
+        return self._pool.submit(job).result
+
+
+@dataclass(frozen=True)
+class HapticStepper:
+    """Steps through displacements (d,) m of the probe, a tick each; see `HapticLoop`.
+
+    `substeps` explicit steps are made in every tick's time.
+    """
+
+    settings: HapticLoop
+    system: System
+    tool: Needle
+    body: TouchedBody
+    substeps: int
+    jobs: Background | None
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+    @property
+    def rate(self) -> float:
+        """Ticks a second."""
+        return 1 / self.settings.dt
+
+    @property
+    def limit(self) -> float:
+        return self.settings.limit
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        name = self.tool.name
+        forces = {f"{name}.force.{a}": "N" for a in _AXES[: len(self.tool.tip)]}
+        own = {
+            f"{name}.contact": "1", f"{name}.changed": "1", f"{name}.clipped": "1",
+            f"{name}.answered": "1", f"{name}.jump": "N", f"{name}.stretch": "J",
+        }  # fmt: skip
+        return {**forces, **own, **self.body.untouched.units}
+
+    @property
+    def threads(self) -> tuple[int, ...]:
+        """The simulation's own, once it has begun."""
+        return tuple(self.jobs.numbers) if self.jobs else ()
+
+    def warm(self) -> None:
+        """A touch that is forgotten: kernels compiled, and the spring at the nearest node."""
+        places, tip = self.body.probe.body.places, np.array(self.tool.tip)
+        surface = places[self.body.probe.body.surface]
+        onto = surface[np.argmin(np.linalg.norm(surface - tip, axis=1))] - tip
+        state = self.rest()
+        for _ in range(3 * self.settings.every + 1):
+            state = self.step(state, onto)
+
+    def rest(self) -> State:
+        read = self.body.rest(np.array(self.tool.tip))
+        return self._told(0, HapticTick(read, (_answer(0, read),)), np.array(self.tool.tip), 0.0)
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """One tick: what is due is taken, the probe is read where it is time, the force given."""
+        last: HapticTick = state.inner
+        k, tip = state.k + 1, np.array(self.tool.tip) + inputs
+        tick = self._begun(self._taken(last, k), k, tip)
+        tick = self._taken(tick, k)  # what is answered at once
+        if tick.body.state.failure:
+            return replace(state, k=k, inner=tick, failure=tick.body.state.failure)
+        jump = float(np.linalg.norm(self._force(tick, k, tip) - self._force(last, k, tip)))
+        return self._told(k, tick, tip, jump, last)
+
+    def _begun(self, tick: HapticTick, k: int, tip: Floats) -> HapticTick:
+        """The simulation sent on its way to the probe, at the ticks that are read."""
+        if k % self.settings.every:
+            return tick
+        to = partial(self.body.to, tick.body, tip)
+        return replace(tick, running=self.jobs.result_of(to) if self.jobs else to, since=k)
+
+    def _taken(self, tick: HapticTick, k: int) -> HapticTick:
+        """The answer, at the tick at which it is due."""
+        if tick.running is None or k < tick.since + self.settings.late:
+            return tick
+        read = tick.running()
+        new, last = _answer(tick.since, read), tick.answers[-1]
+        most = answers_of(self.settings.extrapolation)
+        same = (*tick.answers, new)[-most:] if new.holds == last.holds else (new,)
+        return HapticTick(read, same)
+
+    def _force(self, tick: HapticTick, k: int, tip: Floats) -> Floats:
+        """On the hand (d,) N, extrapolated to tick k with the probe at `tip`, before its limit."""
+        if not tick.answers[-1].holds:
+            return np.zeros(len(tip))
+        times = np.array([a.k for a in tick.answers], dtype=np.float64)
+        if self.settings.extrapolates == "place":
+            places = np.array([a.place for a in tick.answers])
+            force = self.settings.spring * (extrapolated(times, places, k) - tip)
+        else:
+            force = extrapolated(times, np.array([a.force for a in tick.answers]), k)
+        return self._let_go(force)
+
+    def _let_go(self, force: Floats) -> Floats:
+        """Without what would pull the hand into the body harder than the body grips."""
+        if self.settings.grip is None:
+            return force
+        axis = self.body.probe.axis
+        return np.asarray(force - max(float(force @ axis) - self.settings.grip, 0.0) * axis)
+
+    def _told(
+        self, k: int, tick: HapticTick, tip: Floats, jump: float, last: HapticTick | None = None
+    ) -> State:
+        hand, s, body = self._force(tick, k, tip), self.settings, tick.body
+        size = float(np.linalg.norm(hand))
+        clipped = size > s.limit
+        if clipped:
+            hand = hand * (s.limit / size)
+        answered = last is not None and tick.body is not last.body
+        changed = last is not None and tick.answers[-1].holds != last.answers[-1].holds
+        stretch = float(body.force @ body.force) / (2 * s.spring)
+        found = (*hand.tolist(), float(tick.answers[-1].holds), float(changed), float(clipped),
+                 float(answered), jump if answered else 0.0, stretch)  # fmt: skip
+        own = dict(zip(self.units, found, strict=False))
+        return State(k, tick, None, self.substeps, own | dict(body.state.numbers))
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes, as last answered."""
+        tick: HapticTick = state.inner
+        return self.body.untouched.field(tick.body.state)
+
+
+def _answer(k: int, read: Read) -> Answer:
+    return Answer(k, read.force, read.place, read.held is not None)

@@ -1,0 +1,344 @@
+"""Static contact with rigid bodies by Newton's method, linear or at large strain.
+
+R(u) - f = r at the end of a step, with the contact forces r of `solve.static.touching`: no penalty,
+and nothing penetrates in the end.
+
+Departure: a node that comes to touch within a step is anchored where it stood at the step's
+beginning: rub in steps.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats, Ints
+from validate.errors import SceneError
+from validate.fem.large_strain.elastic import Elastic, elastic
+from validate.fem.linear_solvers.factor import (
+    elimination_order,
+    factorise_general,
+    factorise_indefinite,
+)
+from validate.fem.rigid import require_held
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.scene.contact import INSIDE
+from validate.scene.scene import Scene
+from validate.solve.handles import LARGE, Handles, require_handled
+from validate.solve.static.touching import (
+    OPEN,
+    SLIP,
+    STICK,
+    Candidates,
+    Constraints,
+    Frame,
+    candidates,
+    constraints,
+    entered,
+    frame,
+    rub,
+    updated,
+)
+from validate.solve.types import Ending, State, Stepper
+
+# --- What a contact tells at every step: force, friction, area, penetration, nodes, work.
+
+_EACH = {"force": "N", "friction": "N", "area": "m^2", "penetration": "m", "touching": "1",
+         "slipping": "1", "work": "J"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Touched:
+    """Places x (n, d) m of all nodes under the inputs, forces (c, d) N on the candidates, whose
+    `status` (c,) is; `work` (contacts,) J of the rigid bodies' motion so far."""
+
+    x: Floats
+    inputs: Floats
+    forces: Floats
+    status: Ints
+    work: Floats
+
+
+def contact_units(scene: Scene) -> dict[str, str]:
+    """`<contact>.force` against the motion (of one that stands, along its normals), `.friction`,
+    `.area` that touches, `.penetration` of the deepest node, nodes `.touching` and `.slipping`,
+    `.work` that the rigid body has done. In 2-D an area is per metre of thickness."""
+    return {f"{c.name}.{name}": unit for c in scene.contacts for name, unit in _EACH.items()}
+
+
+def contact_numbers(parts: Candidates, scene: Scene, now: Touched) -> dict[str, float]:
+    """The numbers of `contact_units`, on the whole body; what presses is positive."""
+    numbers: dict[str, float] = {}
+    for k, part in enumerate(scene.contacts):
+        found = _numbers(parts, scene.copies, k, now)
+        numbers |= {f"{part.name}.{name}": float(x) for name, x in found.items()}
+    return numbers
+
+
+def _numbers(parts: Candidates, copies: int, k: int, now: Touched) -> dict[str, float]:
+    of, part = parts.owner == k, parts.contacts[k]
+    offset = parts.offset(k, now.inputs)
+    normals = part.shape.outward(now.x[parts.nodes[of]] - offset)
+    forces, status = now.forces[of], now.status[of]
+    normal = (forces * normals).sum(axis=1)
+    rubbing = (forces - normal[:, None] * normals).sum(axis=0)
+    along = normal.sum() if part.direction is None else forces.sum(axis=0) @ part.direction
+    least = float(part.shape.gap(now.x[parts.facets[k]] - offset).min())
+    return {
+        "force": copies * along,
+        "friction": copies * float(np.linalg.norm(rubbing)),
+        "area": copies * parts.areas[of][status != OPEN].sum(),
+        "penetration": max(0.0, -least),
+        "touching": float((status != OPEN).sum()),
+        "slipping": float((status == SLIP).sum()),
+        "work": copies * now.work[k],
+    }
+
+
+# -------------------------------------------------------------------------------------------------
+
+_ROUNDING = 1e-15  # of the body's unit force: below it a residual is nothing but rounding
+
+
+@dataclass(frozen=True)
+class ContactNewton:
+    """Settings."""
+
+    handles: ClassVar[Handles] = Handles(
+        ("linear", *LARGE), inertia=False, cavities=False, contact=("foundations", "rigid")
+    )
+
+    tolerance: float = quantity(
+        1e-9, "1", "residual relative to the acting forces; gaps relative to the body"
+    )
+    max_iterations: int = quantity(
+        40, "1", "iterations of Newton and of the sets of touching nodes in a step"
+    )
+    cuts: int = quantity(6, "1", "number of halvings of a load step without equilibrium")
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0 and self.max_iterations >= 1 and self.cuts >= 0):
+            raise SceneError(
+                f"tolerance {self.tolerance:g}, {self.max_iterations} iterations, {self.cuts} "
+                "cuts: all must be positive"
+            )
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for what is not handled, and for a body that nothing holds, counting
+        what touches at rest."""
+        scene = system.scene
+        require_handled(scene, self)
+        N, free = len(system.moves), system.free
+        parts = candidates(system)
+        require_held(
+            scene, system.held, _touched_rows(parts, scene), ", or place it in contact at rest"
+        )
+        node, K = free // scene.mesh.dimension, system.K[free][:, free]
+        order = elimination_order(K, node, scene.mesh.nodes)
+        rank = np.empty(N, dtype=np.int64)
+        rank[free[order]] = np.arange(len(free))
+        return ContactStepper(self, system, elastic(system), rank, parts)
+
+
+def _touched_rows(parts: Candidates, scene: Scene) -> Floats:
+    """Rows (m, N) of what the nodes that touch at rest are held along."""
+    x = scene.mesh.nodes[parts.nodes]
+    gaps, normals = parts.look(x, np.zeros_like(x))
+    rows = []
+    for i in np.flatnonzero(gaps < INSIDE * np.ptp(scene.mesh.nodes, axis=0).max()):
+        along = np.eye(x.shape[1]) if parts.friction[i] else normals[[i]]
+        full = np.zeros((len(along), scene.mesh.nodes.size))
+        full[:, parts.unknowns[i]] = along
+        rows.append(full)
+    return np.concatenate([*rows, np.zeros((0, scene.mesh.nodes.size))])
+
+
+@dataclass(frozen=True)
+class InTouch:
+    """Displacements (N,) in balance under the inputs (k + l + m,); which nodes touch, the contact
+    forces (c, d) N on them, and the work (contacts,) J of the tools."""
+
+    u: Floats
+    inputs: Floats
+    status: Ints
+    forces: Floats
+    work: Floats
+
+
+@dataclass(frozen=True)
+class ContactStepper:
+    """`rank` (N,) orders elimination."""
+
+    settings: ContactNewton
+    system: System
+    body: Elastic
+    rank: Ints
+    parts: Candidates
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Forces of drives, numbers of contacts (`contact_units`), energy of the mesh."""
+        forces = {f"{d.name}.force": "N" for d in self.scene.drives}
+        return forces | contact_units(self.scene) | {"energy.strain": "J"}
+
+    @property
+    def _size(self) -> float:
+        return float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+
+    def rest(self) -> State:
+        u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
+        x, c = self._places(u), len(self.parts.nodes)
+        gaps, normals = self.parts.look(x, np.zeros_like(x))
+        able = np.abs(normals * self.parts.free).max(axis=1, initial=0.0) > INSIDE
+        touches = (gaps < INSIDE * self._size) & able
+        status = np.where(touches, np.where(self.parts.friction > 0, STICK, SLIP), OPEN)
+        inner = InTouch(u, inputs, status, np.zeros((c, x.shape[1])),
+                        np.zeros(len(self.scene.contacts)))  # fmt: skip
+        return State(0, inner, numbers=self._numbers(inner))
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """To the inputs (k + l + m,) at the end of the step: drives, loads, rigid bodies."""
+        at, k = replace(state, updates=0), state.k + 1
+        done, size, begin = 0.0, 1.0, state.inner.inputs
+        while done < 1:
+            share = min(done + size, 1.0)
+            new = self._solved(at, begin + share * (inputs - begin))
+            if new.failure is None:
+                at, done = replace(new, updates=at.updates + new.updates), share
+            elif size > 0.5**self.settings.cuts:
+                size /= 2
+            else:
+                return replace(state, failure=_stopped(new, k, done))
+        return replace(at, k=k, inner=replace(at.inner, inputs=inputs))
+
+    def _solved(self, state: State, inputs: Floats) -> State:
+        """One step by Newton and changes of the sets, from the state's displacements."""
+        last: InTouch = state.inner
+        drives = len(self.scene.drives)
+        f, move = self._loads(inputs), self.system.moves @ (inputs - last.inputs)[:drives]
+        at = frame(self.parts, self._places(last.u), last.inputs, inputs, self._stiff)
+        u, status, changed, pressures = last.u, last.status, True, None
+        residual, acting = self._residual(u, f)
+        deep = self.settings.tolerance * self._size
+        status = entered(at, status, self._places(u), deep)
+        for iteration in range(self.settings.max_iterations + 1):
+            held = constraints(at, status, self._places(u), residual, move, self.system.free)
+            off = float(np.linalg.norm(held.off))
+            # What is still to be moved: prescribed motion, gaps to be closed.
+            if (
+                not changed
+                and off <= self._small(acting)
+                and np.abs(held.du).max(initial=0.0) <= deep
+            ):
+                return self._found(state, u, inputs, at, status, residual, iteration)
+            if iteration == self.settings.max_iterations:
+                break
+            try:
+                step = self._correction(u, pressures, held)
+            except SceneError as vanished:
+                return replace(state, failure=("not_converged", _singular(status, vanished)))
+            pressures, u = self.body.extrapolated(u, step), u + step
+            move = np.zeros_like(move)
+            bad = self.body.inverted(u)
+            if bad:
+                words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
+                return replace(state, failure=("invalid", words))
+            residual, acting = self._residual(u, f)
+            new = updated(at, status, self._places(u), residual, self._small(acting), deep)
+            changed, status = bool((new != status).any()), new
+        words = f"residual {off / acting if acting else np.inf:.1e} after {iteration} iterations"
+        more = "; the sets of touching nodes still change" if changed else ""
+        return replace(state, failure=("not_converged", words + more))
+
+    def _small(self, acting: float) -> float:
+        """The residual N that counts as none beside the forces that act."""
+        return self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
+
+    @property
+    def _stiff(self) -> Floats:
+        """Stiffness (c,) N/m of the candidates' own unknowns."""
+        return np.asarray(self.system.K.diagonal()[self.parts.unknowns].mean(axis=1))
+
+    def _places(self, u: Floats) -> Floats:
+        """Where the candidates are (c, d) m."""
+        nodes = self.scene.mesh.nodes
+        return np.asarray((nodes + u.reshape(nodes.shape))[self.parts.nodes])
+
+    def _loads(self, inputs: Floats) -> Floats:
+        return np.asarray(self.system.loads @ inputs[len(self.scene.drives) :])
+
+    def _residual(self, u: Floats, f: Floats) -> tuple[Floats, float]:
+        """R - f (N,) N, contact forces among it, and the size of what acts."""
+        R = self.body.force(u)
+        return R - f, max(float(np.linalg.norm(x)) for x in (R, f))
+
+    def _correction(self, u: Floats, pressures: Floats | None, held: Constraints) -> Floats:
+        """The Newton correction (N,) that the constraints admit."""
+        J = self.body.tangent(u, pressures)
+        A = sparse.csr_array(held.L.T @ (J @ held.T))
+        order = np.argsort(self.rank[held.kept])
+        if held.S is None:
+            factor = factorise_indefinite(A, order)
+        else:
+            factor = factorise_general(sparse.csr_array(A + held.S), order)
+        if factor.negative_pivots:
+            words = f"tangent not positive definite ({factor.negative_pivots} negative pivots)"
+            raise SceneError(words)
+        return np.asarray(held.T @ factor.solve(-held.off - held.L.T @ (J @ held.du)) + held.du)
+
+    def _found(
+        self, state: State, u: Floats, inputs: Floats, at: Frame, status: Ints, residual: Floats,
+        iterations: int,
+    ) -> State:  # fmt: skip
+        last: InTouch = state.inner
+        _, normals = at.look(self._places(u))
+        found = rub(at, self._places(u), residual)
+        r = found.normal[:, None] * normals * self.parts.free + found.along
+        forces = np.where((status != OPEN)[:, None], r, 0.0)
+        mean = (forces + last.forces) / 2
+        moved = at.offsets - self.parts.offsets(last.inputs)
+        done = np.bincount(self.parts.owner, (mean * moved).sum(axis=1), len(last.work))
+        inner = InTouch(u, inputs, status, forces, last.work + done)
+        return State(state.k, inner, None, iterations, self._numbers(inner))
+
+    def _numbers(self, now: InTouch) -> Mapping[str, float]:
+        """Forces N on the whole body, compression positive, energy J of the mesh."""
+        scene, copies = self.scene, self.scene.copies
+        acting = self.body.force(now.u) - self._loads(now.inputs)
+        forces = copies * (acting @ self.system.moves)
+        numbers = {f"{d.name}.force": float(x) for d, x in zip(scene.drives, forces, strict=True)}
+        numbers |= contact_numbers(self.parts, scene, self._now(now))
+        return numbers | {"energy.strain": self.body.energy(now.u)}
+
+    def _now(self, now: InTouch) -> Touched:
+        x = self.scene.mesh.nodes + now.u.reshape(self.scene.mesh.nodes.shape)
+        return Touched(x, now.inputs, now.forces, now.status, now.work)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        u: Floats = state.inner.u
+        return u.reshape(self.scene.mesh.nodes.shape)
+
+
+def _singular(status: Ints, why: SceneError) -> str:
+    """Why there is no correction: contact may hold what no support holds."""
+    touching = int((status != OPEN).sum())
+    if not touching or (status == STICK).any():
+        return str(why)
+    return (
+        f"the body slides off: it is held only by {touching} touching nodes, and all of them "
+        "slip; add a support, or more friction"
+    )
+
+
+def _stopped(failed: State, k: int, done: float) -> tuple[Ending, str]:
+    assert failed.failure is not None
+    ending, why = failed.failure
+    return ending, f"step {k}: {why}; {100 * done:.3g} % of the step's load was reached"

@@ -1,0 +1,343 @@
+"""Static Newton for large strain: load steps with cut-back, whole corrections, reused
+factorisations, under drives, dead loads and the fluid in cavities.
+
+The pressures of the volumetric law are unknowns of the iteration (`Body.extrapolated`). A
+correction of size d changes volumes by d^2, which near nu = .5 raises the residual of the
+displacements a thousandfold and says nothing: it is taken whole, halved only while it inverts
+cells; what does not converge is cut.
+
+Departures from a textbook Newton: a factorisation is kept, across steps too, while every iteration
+shrinks the error by `contraction` or better (Shamanskii 1967); the last one is remembered together
+with the state it led to, so that stepping on from there needs no new one. Results depend on that
+memory within the tolerance only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.large_strain.hyperelastic import BEYOND_LAW
+from validate.fem.system import System
+from validate.parameters import quantity
+from validate.scene.scene import Load, Pressure, Scene, Weight
+from validate.solve.candidates import Asked, Rival, StillBody
+from validate.solve.handles import LARGE_STATICS, Handles, require_handled
+from validate.solve.static.equilibrium import Balance, Equilibrium, Tangent, equilibrium
+from validate.solve.types import Ending, State, Stepper
+
+_VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
+_NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
+_UNITS = {Load: "N", Weight: "m/s^2", Pressure: "Pa"}
+_FEW = 6  # iterations after which the next load step is twice as large
+_HALVINGS = 6  # of a Newton correction that inverts cells
+
+
+@dataclass(frozen=True)
+class StaticNewton:
+    """Settings. `fluid` "exact" keeps every cavity at volume_ratio V0, "none" leaves it empty.
+
+    `contraction` 0 makes a new factorisation at every iteration. `watch`: negative pivots of the
+    tangent are counted anew when the body has moved so far, and in every load step under loads,
+    where an unstable equilibrium is none.
+    """
+
+    handles: ClassVar[Handles] = LARGE_STATICS
+
+    fluid: Literal["exact", "none"] = quantity(
+        "exact", "1", "fluid of constant volume, or no fluid"
+    )
+    volume_ratio: float = quantity(1.0, "1", "volume of the fluid over that of the cavity at rest")
+    tolerance: float = quantity(1e-9, "1", "residual relative to the acting forces")
+    max_iterations: int = quantity(25, "1", "Newton iterations in a load step")
+    max_cuts: int = quantity(6, "1", "number of halvings of a load step without equilibrium")
+    contraction: float = quantity(
+        0.2, "1", "ratio of successive errors up to which a factorisation is kept"
+    )
+    watch: float = quantity(
+        0.01, "1", "motion between checks of the inertia, relative to the body's size"
+    )
+
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, StillBody):
+            return ()
+        return (
+            Rival("large strain, Newton every step", "large strain", lambda dt: StaticNewton(),
+                   law=asked.law, finest=asked.coarse, shortest=asked.increment),
+        )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        if not self.volume_ratio > 0:
+            raise SceneError(
+                f"volume ratio {self.volume_ratio:g}: expected a positive fluid volume"
+            )
+        if not (self.tolerance > 0 and self.max_iterations >= 1 and self.max_cuts >= 0):
+            raise SceneError(
+                f"Newton with tolerance {self.tolerance:g}, {self.max_iterations} iterations, "
+                f"{self.max_cuts} cuts: tolerance and iterations must be positive"
+            )
+
+    def prepare(self, system: System) -> Stepper:
+        """Raises `SceneError` for a linear law or a body that can move rigidly."""
+        scene = system.scene
+        require_handled(scene, self)
+        if not (scene.cavities or scene.inputs):
+            raise SceneError("scene without drive, load and cavity: nothing moves; add one")
+        problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
+        rest = _rest(problem)
+        return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
+
+
+@dataclass(frozen=True)
+class Found:
+    """An equilibrium, the tangent near it, and what it took."""
+
+    balance: Balance
+    tangent: Tangent
+    iterations: int = 0
+    factorisations: int = 0
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Why a load step found none; `negative` is the most that a tangent on the way had."""
+
+    ending: Ending
+    why: str
+    negative: int = 0
+
+
+class _Memory:
+    """The last equilibrium that was found: a step from it needs no new tangent. Only one is kept,
+    because a factorisation of a large body takes gigabytes."""
+
+    def __init__(self, last: Found) -> None:
+        self.last = last
+
+
+def _rest(problem: Equilibrium) -> Found:
+    """The body at rest; `SceneError` where it can move rigidly."""
+    cavities, inputs = len(problem.rest_volumes), np.zeros(len(problem.system.scene.inputs))
+    u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
+    balance = problem.balance(u, np.zeros(cavities), inputs, ones)
+    tangent = problem.tangent(balance)
+    if tangent.factor.negative_pivots:
+        raise SceneError(
+            f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an element "
+            "is inverted; refine the mesh"
+        )
+    return Found(balance, tangent, factorisations=1)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Displacements u (N,) m and pressures (c,) Pa in equilibrium under inputs (k + l,): drives in
+    m, then loads in N and weights in m/s^2; at nu = 0.5 the multipliers (e, q) Pa of the cells."""
+
+    u: Floats
+    pressures: Floats
+    inputs: Floats
+    multipliers: Floats | None = None
+
+
+@dataclass(frozen=True)
+class NewtonStepper:
+    settings: StaticNewton
+    problem: Equilibrium
+    start: Found
+    memory: _Memory
+
+    @property
+    def scene(self) -> Scene:
+        return self.problem.system.scene
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Plate forces, pressures, volumes, and what Newton did."""
+        cavities = [c.name for c in self.scene.cavities]
+        return (
+            {f"{d.name}.force": "N" for d in self.scene.drives}
+            | {f"{name}.pressure": "Pa" for name in cavities}
+            | {f"{name}.volume_ratio": "1" for name in cavities}
+            | {_NEGATIVE: "1", _MADE: "1"}
+        )
+
+    def rest(self) -> State:
+        return self._state(0, self.start)
+
+    def step(self, state: State, inputs: Floats) -> State:
+        """From the state's load to the inputs (k + l,), at once or in parts of the way.
+
+        A failure keeps the last load that was reached and says what stopped the body there.
+        """
+        target = np.full(len(state.inner.pressures), self.settings.volume_ratio)
+        good = self._known(state.inner, target)
+        kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
+        if kept and (inputs == state.inner.inputs).all():
+            numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
+            return replace(state, k=state.k + 1, updates=0, numbers=numbers)
+        return self._walked(state.k, good, np.array(inputs, dtype=np.float64), target)
+
+    def _known(self, at: Loaded, target: Floats) -> Found:
+        """The equilibrium of a state: remembered, or its forces and tangent made again."""
+        if self.memory.last.balance.u is at.u:
+            return replace(self.memory.last, iterations=0, factorisations=0)
+        balance = self.problem.balance(at.u, at.pressures, at.inputs, target, None, at.multipliers)
+        return Found(balance, self.problem.tangent(balance), factorisations=1)
+
+    def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:
+        """Load steps to `inputs`; each failure halves them, to 2^-max_cuts of the way at least,
+        and each that takes few iterations doubles them again."""
+        begin, ratios = good.balance.inputs, good.balance.ratios
+        done, size = 0.0, 1.0
+        while done < 1:
+            share = min(done + size, 1.0)
+            load = inputs if share == 1 else begin + share * (inputs - begin)
+            found = self._load_step(good, load, ratios + share * (target - ratios))
+            if isinstance(found, Found):
+                good, done = _added(good, found), share
+                size *= 2 if found.iterations <= _FEW else 1
+            elif size > 2.0**-self.settings.max_cuts:
+                size /= 2
+            else:
+                why = _stopped(found, self._load_words(good.balance.inputs), done)
+                return self._state(k, good, why)
+        self.memory.last = good
+        return self._state(k + 1, good)
+
+    def _load_step(self, good: Found, inputs: Floats, target: Floats) -> Found | Failed:
+        """One load step: linear prediction, corrections, and what the result must satisfy."""
+        move = inputs - good.balance.inputs
+        guess = self.problem.predicted(good.balance, good.tangent, move, target)
+        at = self._forces(good.balance, replace(guess, inputs=inputs), target)
+        if isinstance(at, Failed):
+            return replace(at, negative=good.tangent.negative)
+        try:
+            found = self._corrected(replace(good, balance=at), target)
+            return found if isinstance(found, Failed) else self._checked(found)
+        except SceneError as vanished:
+            return Failed("not_converged", str(vanished), negative=1)
+
+    def _corrected(self, start: Found, target: Floats) -> Found | Failed:
+        """Newton: a new tangent only where the old one no longer contracts."""
+        at, tangent, made, negative = start.balance, start.tangent, 0, 0
+        force, own, renew = at.acting, False, self.settings.contraction == 0
+        for iteration in range(self.settings.max_iterations):
+            if self._settled(at):
+                return Found(at, tangent, iteration, made)
+            if renew:
+                tangent, made, own = self.problem.tangent(at), made + 1, True
+                negative = max(negative, tangent.negative)
+            new = self._taken(at, tangent, target)
+            if isinstance(new, Failed) and own:
+                return replace(new, negative=negative)
+            shrinks = not isinstance(new, Failed) and new.merit(force) < at.merit(force)
+            if isinstance(new, Balance) and (own or shrinks):
+                renew = new.merit(force) > self.settings.contraction * at.merit(force)
+                at, own = new, False
+            else:
+                renew = True
+        if self._settled(at):
+            return Found(at, tangent, self.settings.max_iterations, made)
+        why = (
+            f"residual {at.unbalanced / at.acting:.1e} after {self.settings.max_iterations} "
+            f"iterations, tolerance {self.settings.tolerance:.1e}"
+        )
+        return Failed("not_converged", why, negative)
+
+    def _taken(self, at: Balance, tangent: Tangent, target: Floats) -> Balance | Failed:
+        """The correction, halved while it inverts cells."""
+        full = self.problem.correction(at, tangent, target)
+        for share in 0.5 ** np.arange(_HALVINGS + 1):
+            u = at.u + share * (full.u - at.u)
+            pressures = at.pressures + share * (full.pressures - at.pressures)
+            new = self._forces(at, replace(full, u=u, pressures=pressures), target)
+            if isinstance(new, Balance):
+                break
+        return new
+
+    def _forces(self, last: Balance, at: Balance, target: Floats) -> Balance | Failed:
+        """The balance at the unknowns of `at`, reached from `last`, unless cells are inverted."""
+        body = self.problem.body
+        bad = body.inverted(at.u)
+        if bad:
+            words = f"{bad.count} of {bad.points} quadrature points inverted (det F <= 0)"
+            return Failed("invalid", f"{words}, first in element {bad.first}")
+        stresses = body.holding(last.multipliers).extrapolated(last.u, at.u - last.u)
+        multipliers = body.kept_pressures(stresses)
+        return self.problem.balance(at.u, at.pressures, at.inputs, target, stresses, multipliers)
+
+    def _settled(self, at: Balance) -> bool:
+        return at.unbalanced <= self.settings.tolerance * at.acting and at.gap <= _VOLUME
+
+    def _checked(self, found: Found) -> Found | Failed:
+        """The law must hold there; the tangent is renewed where the body has moved on."""
+        beyond = self.problem.body.beyond_the_law(found.balance.u)
+        if beyond:
+            return Failed("invalid", beyond)
+        size = float(np.ptp(self.scene.mesh.nodes, axis=0).max())
+        # Under dead loads a body may stand where it would not stay: looked at in every load step.
+        watch = 0.0 if self.scene.loads else self.settings.watch * size
+        if np.abs(found.balance.u - found.tangent.u).max() > watch:
+            tangent = self.problem.tangent(replace(found.balance, stresses=None))
+            found = replace(found, tangent=tangent, factorisations=found.factorisations + 1)
+        if found.tangent.negative and self.scene.loads:
+            return Failed("not_converged", "the equilibrium is unstable", found.tangent.negative)
+        return found
+
+    def _load_words(self, inputs: Floats) -> str:
+        scene = self.scene
+        drives = [f"{1e3 * d:.4g} mm" for d in inputs[: len(scene.drives)]]
+        units = [_UNITS[type(x)] for x in scene.loads]
+        loads = zip(inputs[len(scene.drives) :], units, strict=True)
+        return ", ".join(drives + [f"{x:.4g} {unit}" for x, unit in loads])
+
+    def _state(self, k: int, found: Found, failure: tuple[Ending, str] | None = None) -> State:
+        at = found.balance
+        at.u.setflags(write=False)
+        numbers = (
+            *self.problem.forces(at).tolist(),
+            *at.pressures.tolist(),
+            *at.ratios.tolist(),
+            float(found.tangent.negative),
+            float(found.factorisations),
+        )
+        named = MappingProxyType(dict(zip(self.units, numbers, strict=True)))
+        reached = Loaded(at.u, at.pressures, at.inputs, at.multipliers)
+        return State(k, reached, failure, found.iterations, named)
+
+    def field(self, state: State) -> Floats:
+        """Displacements (n, d) m of all nodes."""
+        u: Floats = state.inner.u
+        return u.reshape(self.scene.mesh.nodes.shape)
+
+
+def _added(before: Found, found: Found) -> Found:
+    """`found` with the work of the load steps before it."""
+    return replace(
+        found,
+        iterations=before.iterations + found.iterations,
+        factorisations=before.factorisations + found.factorisations,
+    )
+
+
+def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:
+    """The outcome of a step whose smallest load step failed, with the last good load."""
+    reached = f"{load} ({100 * done:.3g} % of the step)"
+    if BEYOND_LAW in failed.why:
+        return failed.ending, (
+            f"{failed.why}; last good load {reached}; use a law that is valid for such strains"
+        )
+    if failed.negative:
+        words = f"tangent not positive definite ({failed.negative} negative pivots)"
+        why = f"no static solution was found beyond {reached}: {words}; {failed.why}"
+        return "not_converged", f"{why}; if the body snaps through there, use NewtonDynamics"
+    helps = "more cuts or smaller steps"
+    if failed.ending == "invalid":
+        helps += ", or a finer mesh there"
+    return failed.ending, f"{failed.why}; last good load {reached}; take {helps}"

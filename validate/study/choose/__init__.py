@@ -1,0 +1,4 @@
+"""The cheapest method that meets an error and a rate.
+
+Start with `study`.
+"""

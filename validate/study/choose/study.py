@@ -1,0 +1,306 @@
+"""The cheapest method of a scene that meets an error and a rate: a ladder, climbed by pilot runs.
+
+The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The choice is
+the fastest cell of all that meet both. Once one does, candidates are left out whose step on their
+coarsest mesh already takes longer; the bound is shown. For a scene with inertia a cell is run again
+with a new state at every tick of the rate before it is named.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from validate.errors import UsageError
+from validate.pipeline.ladder.ladder import RUNGS, Rung
+from validate.study.choose.climb import Excluded, Reached
+from validate.study.choose.facts import Fact, ShownEffects, facts
+from validate.study.tradeoff.study import ErrorUnit, Trade, TradeRow
+from validate.units import in_si
+
+_TRIES = 4  # cells that are run again at the rate's own step
+_QUANTITY = re.compile(r"\s*([0-9.eE+-]+)\s*([^\d\s.].*)?")
+
+_UNITS: tuple[ErrorUnit, ...] = ("m", "N", "Pa")
+
+Again = Callable[[Trade, TradeRow, float], TradeRow]
+Climbs = Callable[[Rung, float | None], Reached | None]  # see `Climb`
+Meets = Literal[
+    "meets both", "too slow", "too wrong", "neither", "not the scene", "nothing ran", "excluded"
+]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The largest error, in `unit`, and the least rate 1/s."""
+
+    error: float
+    rate: float
+    unit: ErrorUnit = "m"
+
+    def __post_init__(self) -> None:
+        for value, what in ((self.error, "error"), (self.rate, "rate")):
+            if not (np.isfinite(value) and value > 0):
+                raise UsageError(f"--{what} {value:g}: expected a positive number with its unit")
+
+
+@dataclass(frozen=True)
+class Climbed:
+    """One rung: cells run and scored, its row nearest to what is wanted, and the verdict."""
+
+    rung: Rung
+    run: int
+    scored: int
+    best: TradeRow | None
+    verdict: Meets
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was found; `pick` is None where nothing meets both, `nearest` is what comes nearest.
+
+    `by`: "total" counts what the declared law costs, "error" does not. `confirmed` is the pick with
+    a state at every tick of the rate, where its own step is longer.
+    """
+
+    trade: Trade
+    wanted: Wanted
+    by: str
+    facts: tuple[Fact, ...]
+    ladder: tuple[Climbed, ...]
+    excluded: tuple[Excluded, ...]
+    pick: TradeRow | None
+    confirmed: TradeRow | None
+    nearest: TradeRow
+    rejected: tuple[str, ...]
+
+
+def wanted(error: str, rate: str) -> Wanted:
+    """`0.5mm` (or `0.2N`, `300Pa`) and `1000Hz` in SI; the unit says what is judged.
+
+    Raises `UsageError`.
+    """
+    number, unit = _split(error, "--error", "0.5mm")
+    hertz, per = _split(rate, "--rate", "1000Hz")
+    factors = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+    if per.lower() not in factors:
+        raise UsageError(
+            f"--rate {rate}: unit '{per}' is not Hz, kHz or MHz; write for example 1000Hz"
+        )
+    for si in _UNITS:
+        if (factor := in_si(1.0, unit, si)) is not None:
+            return Wanted(number * factor, hertz * factors[per.lower()], si)
+    raise UsageError(
+        f"--error {error}: '{unit}' is not a unit of displacement, force or pressure; write "
+        "for example 0.5mm, 0.2N, 300Pa"
+    )
+
+
+def _split(text: str, option: str, example: str) -> tuple[float, str]:
+    found = _QUANTITY.fullmatch(text)
+    try:
+        number = float(found[1]) if found else float("nan")
+    except ValueError:
+        number = float("nan")
+    if found is None or not np.isfinite(number) or not found[2]:
+        raise UsageError(
+            f"{option} {text}: expected a number with its unit; write for example {example}"
+        )
+    return number, found[2].strip()
+
+
+# --- which ---------------------------------------------------------------------------------------
+
+
+def error_of(row: TradeRow, by: str) -> float | None:
+    value = getattr(row, by)
+    return None if value is None else float(value)
+
+
+def misses(row: TradeRow, want: Wanted, by: str, dynamic: bool) -> tuple[float, float]:
+    """Error over the one wanted, and time over the one there is: both at most 1 where it meets.
+
+    A scene with inertia must also keep up with the clock: a step within its own dt.
+    """
+    error, time = error_of(row, by), row.deadline_s
+    if error is None or time is None:
+        return np.inf, np.inf
+    late = time * want.rate
+    return error / want.error, max(late, time / row.dt) if dynamic else late
+
+
+def meeting(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> list[TradeRow]:
+    """The rows that meet both and leave nothing of the scene out, fastest first."""
+    whole = [r for r in rows if not r.solver.lacks]
+    good = [r for r in whole if max(misses(r, want, by, dynamic)) <= 1]
+    return sorted(good, key=lambda r: r.time_s or 0.0)
+
+
+def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> TradeRow:
+    """The row whose worse miss is least; raises `UsageError` when no row has an error."""
+    scored = [r for r in rows if error_of(r, by) is not None and not r.solver.lacks]
+    if not scored:
+        raise UsageError(f"none of {len(rows)} pilot runs has an error; see 'study tradeoff'")
+    return min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
+
+
+def choose(
+    climb: Climbs,
+    want: Wanted,
+    declared_law: bool,
+    again: Again,
+    effects: ShownEffects | None = None,
+) -> Choice:
+    """The choice from trades that grow rung by rung; `again` runs a row's cell with another step s.
+
+    Where large strain could not be solved, what the declared law costs is not counted either.
+    Raises `UsageError` where no rung has a cell, or no cell an error.
+    """
+    rejected, excluded = list[str](), list[Excluded]()
+    trade = pick = confirmed = None
+    for rung in RUNGS:
+        reached = climb(rung, None if pick is None else pick.time_s)
+        if reached is None:
+            continue
+        trade = reached.trade
+        excluded += reached.excluded
+        found = _picked(trade, rung, want, declared_law, again, rejected, pick)
+        if found is not None:
+            pick, confirmed = found
+    if trade is None:
+        raise UsageError(
+            "no candidate method of the ladder has a cell for this scene; see 'study tradeoff'"
+        )
+    by, rows = _by(trade, declared_law), _judged(trade, declared_law)
+    unsolved = left_out(declared_law, trade.law_words)
+    ladder = tuple(
+        _bounded(_climbed(trade, rung, rows, want, by, unsolved), excluded) for rung in RUNGS
+    )
+    closest = nearest(rows, want, by, trade.trial.dynamic)
+    return Choice(
+        trade, want, by, facts(trade, want.error, effects), ladder, tuple(excluded), pick,
+        confirmed, closest, tuple(rejected),
+    )  # fmt: skip
+
+
+def _by(trade: Trade, declared_law: bool) -> str:
+    return "error" if declared_law or trade.gap is None else "total"
+
+
+def _judged(trade: Trade, declared_law: bool) -> list[TradeRow]:
+    linear = _by(trade, declared_law) == "error"
+    return [r for r in trade.rows if not linear or r.solver.law == "linear"]
+
+
+def _picked(
+    trade: Trade, rung: Rung, want: Wanted, declared_law: bool, again: Again, rejected: list[str],
+    best: TradeRow | None,
+) -> tuple[TradeRow, TradeRow | None] | None:  # fmt: skip
+    """The rung's fastest cell that meets both and is faster than the `best` of the rungs below, and
+    its run at the rate's own step where it has a longer one; those that fail it are added to
+    `rejected`."""
+    by, dynamic = _by(trade, declared_law), trade.trial.dynamic
+    rows = [r for r in _judged(trade, declared_law) if r.solver.rung == rung]
+    faster = [
+        r for r in meeting(rows, want, by, dynamic)
+        if best is None or (r.time_s or 0.0) < (best.time_s or 0.0)
+    ]  # fmt: skip
+    for row in faster[:_TRIES]:
+        dt = _rate_step(trade, row, want)
+        tried = None if dt is None else again(trade, row, dt)
+        if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
+            return row, tried
+        rejected.append(_refusal(trade, tried, by))
+    if len(faster) > _TRIES:
+        rejected.append(f"{rung}: {len(faster) - _TRIES} slower cells were not run again")
+    return None
+
+
+def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
+    """A step s no longer than a tick, where the row's own is longer and inertia matters."""
+    if not trade.trial.dynamic or row.dt * want.rate <= 1 + 1e-9:
+        return None
+    apart = float(np.diff(trade.trial.frames).min())
+    return float(apart / np.ceil(apart * want.rate - 1e-9))
+
+
+def _refusal(trade: Trade, row: TradeRow, by: str) -> str:
+    error, time = error_of(row, by), row.time_s
+    if error is None or time is None:
+        return f"{row.label}: with a state every {1e3 * row.dt:.3g} ms: {row.failed}"
+    return (
+        f"{row.label}: with a state every {1e3 * row.dt:.3g} ms its error is "
+        f"{trade.shown(error)} and a step takes {1e6 * time:.3g} us"
+    )
+
+
+def left_out(declared_law: bool, reason: str) -> str:
+    """Why a rung at large strain has no cell: asked for, or `reason` kept it from being solved."""
+    if declared_law:
+        return "left out: --declared-law evaluates the linear law only"
+    return f"left out: large strain was not solved ({reason})"
+
+
+def _climbed(
+    trade: Trade, rung: Rung, rows: Sequence[TradeRow], want: Wanted, by: str, unsolved: str
+) -> Climbed:
+    dynamic = trade.trial.dynamic
+    mine = [r for r in rows if r.solver.rung == rung]
+    scored = [r for r in mine if error_of(r, by) is not None]
+    if not scored:
+        left = by == "error" and any(
+            s.rung == rung and s.law != "linear" for s in trade.trial.solvers
+        )
+        why = unsolved if left else _why_not(mine, dynamic)
+        return Climbed(rung, len(mine), 0, None, "nothing ran", why)
+    if all(r.solver.lacks for r in scored):
+        best = min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
+        words = f"{evidence(trade, best, by)}; never chosen: it leaves out {best.solver.lacks}"
+        return Climbed(rung, len(mine), len(scored), best, "not the scene", words)
+    good = meeting(scored, want, by, dynamic)
+    best = good[0] if good else nearest(scored, want, by, dynamic)
+    wrong, late = misses(best, want, by, dynamic)
+    verdict: Meets = "meets both"
+    if wrong > 1 or late > 1:
+        verdict = "neither" if min(wrong, late) > 1 else "too wrong" if wrong > 1 else "too slow"
+    words = f"{evidence(trade, best, by)}; {len(good)} of its cells meet both"
+    return Climbed(rung, len(mine), len(scored), best, verdict, words)
+
+
+def _bounded(climbed: Climbed, excluded: Sequence[Excluded]) -> Climbed:
+    """The rung with what bounds leave out of it."""
+    mine = [e for e in excluded if e.rung == climbed.rung]
+    if not mine:
+        return climbed
+    least = min(mine, key=lambda e: e.bound)
+    words = (
+        f"{len(mine)} candidates are left out: at least {1e6 * least.bound:.3g} us a step, more "
+        f"than {1e6 * least.pick:.3g} us of the pick"
+    )
+    if not climbed.run:
+        return replace(climbed, verdict="excluded", evidence=words)
+    return replace(climbed, evidence=f"{climbed.evidence}; {words}")
+
+
+def evidence(trade: Trade, row: TradeRow, by: str) -> str:
+    """What a rung's best row reached, and what its error is made of."""
+    error, time = error_of(row, by) or 0.0, row.time_s or np.nan
+    words = f"{row.label}: {trade.shown(error)} at {1 / time:.3g} Hz"
+    if row.solver_error is not None and row.mesh_error is not None:
+        mesh, solver = trade.shown(row.mesh_error), trade.shown(row.solver_error)
+        words += f" (mesh {mesh}, solver {solver})"
+    return words
+
+
+def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
+    if mine:
+        return f"all {len(mine)} cells failed, the first: {mine[0].failed}"
+    if dynamic:
+        return "not for this scene: it needs a plate as drive, a cavity or a touching probe"
+    return (
+        "not for this scene: it declares no density, or has fluid in cavities, which linear "
+        "schemes with inertia do not support"
+    )

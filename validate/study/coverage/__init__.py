@@ -1,0 +1,4 @@
+"""How often the verdicts of the package are wrong.
+
+Start with `study`.
+"""

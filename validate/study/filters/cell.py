@@ -1,0 +1,537 @@
+"""A filter study's cell: one method with its settings, on every seed or on the measured recordings.
+
+Seeds change the noise only: a linear filter whose gains need no data runs them all at once, every
+other method one by one.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import cast
+
+import numpy as np
+from scipy import sparse
+
+from validate.arrays import Floats
+from validate.engine.cell import Record
+from validate.errors import ComparisonError, UsageError
+from validate.estimate.filters import FilterStepper
+from validate.estimate.measurements import Measurements, timetable
+from validate.fem.assembly.locate import Rows, probe_rows
+from validate.pipeline.run.solved import KeptFields
+from validate.solve.types import Run, Stepper, StepTimes
+from validate.study.filters.bench import Bench, Ready
+from validate.study.filters.blocks import Blocks, blocks_of
+from validate.study.filters.plan import EACH, FilterCell
+from validate.study.filters.score import LOG_LOSS, NIS, FilterScores, error_scores, withheld_scores
+from validate.study.filters.withheld import (
+    Innovations,
+    MarkerTracks,
+    PredictionErrors,
+    Segments,
+    Withheld,
+    ahead_errors,
+    by_seed,
+    in_a_row,
+    innovations_of,
+    joined_innovations,
+    joined_predictions,
+    other_errors,
+    other_times,
+    outline_tracks,
+    prediction_errors,
+    read_innovations,
+)
+
+# --- Predictive likelihood of methods without one: plain FEM and the last measurement held.
+#
+# A Gaussian about the prediction, of variance R + q per measured component: R is the noise of one
+# measurement, q >= 0 the variance of the model. Its maximum-likelihood estimate over errors e is
+# q = max(0, mean(e^2) - R). It is taken on all blocks of time but the one that it scores, so a
+# baseline is shown at its best and never sees the block that is reported.
+
+Records = Mapping[str, Record[FilterScores]]
+
+
+def with_likelihoods(cells: Sequence[FilterCell], records: Records) -> Records:
+    """The records, with a likelihood for the methods without innovations of every condition."""
+    scored = dict(records)
+    for condition in dict.fromkeys(c.condition for c in cells):
+        values = {
+            c.key: value
+            for c in cells
+            if c.condition == condition and (value := records[c.key].value) is not None
+        }
+        blocks = blocks_of(values)
+        for key, value in values.items():
+            scored[key] = replace(records[key], value=with_likelihood(value, blocks))
+    return scored
+
+
+def with_likelihood(value: FilterScores, blocks: Blocks | None) -> FilterScores:
+    """The same, with the log loss of its predictive Gaussian where it has no innovations."""
+    if value.predictions is None or value.innovations is not None or blocks is None:
+        return value
+    likelihood = predictive_likelihood(value.predictions, blocks)
+    if likelihood is None:
+        return value
+    loss = -likelihood.log_likelihood.sum(axis=1) / likelihood.dof.sum(axis=1)
+    return replace(
+        value,
+        innovations=likelihood,
+        scores={**value.scores, LOG_LOSS: tuple(loss.tolist())},
+        units={**value.units, LOG_LOSS: "1"},
+    )
+
+
+def predictive_likelihood(errors: PredictionErrors, blocks: Blocks) -> Innovations | None:
+    """Log-likelihood by segment, each block under the variance that all others give; None where a
+    component has no sample outside of a block that has some, or none at all."""
+    counts, squares = blocks.sums(errors.counts), blocks.sums(errors.squares)
+    others = counts.sum(axis=-1, keepdims=True) - counts
+    if not (counts.sum(axis=(1, 2)) > 0).all() or ((counts > 0) & (others == 0)).any():
+        return None
+    outside = squares.sum(axis=-1, keepdims=True) - squares
+    mean = np.divide(outside, others, out=np.zeros_like(outside), where=others > 0)
+    variance = np.maximum(_by_segment(mean, blocks, errors.counts.shape[-1]), errors.noise)
+    density = errors.counts * np.log(2 * np.pi * variance) + errors.squares / variance
+    return Innovations(-0.5 * density.sum(axis=1), errors.counts.sum(axis=1), None, None)
+
+
+def _by_segment(values: Floats, blocks: Blocks, segments: int) -> Floats:
+    """Values (..., blocks) at the segments (..., segments) of their blocks."""
+    block = np.searchsorted(blocks.starts, np.arange(segments), side="right") - 1
+    return np.asarray(values[..., block])
+
+
+# -------------------------------------------------------------------------------------------------
+
+_TIMED = 200  # steps that are timed where the seeds run together
+_TIMED_S = 0.05  # s after which no more of them are
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Results of a method on one recording: errors at the truth's probes by score, at what was
+    withheld, its innovations, NIS with its degrees of freedom; `predictions` of a method without
+    innovations."""
+
+    truth: Mapping[str, float]
+    withheld: tuple[Withheld, ...]
+    innovations: Innovations | None = None
+    nis: float = 0.0
+    dof: int = 0
+    predictions: PredictionErrors | None = None
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One run of a method: the markers it is given, and those that score it."""
+
+    given: tuple[str, ...]
+    scores: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds of set-up, and median and 99 % quantile of a step where steps were timed."""
+
+    setup_s: float = 0.0
+    p50: list[float] = field(default_factory=list)
+    p99: list[float] = field(default_factory=list)
+
+    def add(self, times: StepTimes | None) -> None:
+        if times is not None:
+            self.p50.append(times.p50)
+            self.p99.append(times.p99)
+
+
+def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
+    """Raises what the cell's settings, its filter or its run end with."""
+    first = bench.ready(cell, cell.seeds[0])[0]
+    if cell.baseline == "persistence":
+        return _persistence(bench, cell, first)
+    folds = folds_of(cell, first)
+    if first.method.markers and not cell.baseline and len(folds) == 1:
+        ready = first.with_markers(folds[0].given)
+        start = perf_counter()
+        stepper = cast(FilterStepper, ready.stepper())
+        setup = perf_counter() - start
+        if other_times(first.registered) is None:
+            together = _all_seeds(bench, cell, stepper, ready, folds[0])
+            if together is not None:
+                p50, p99 = _step_times(stepper, ready.registered.inputs)
+                return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
+    return _one_by_one(bench, cell, folds)
+
+
+def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
+    """The runs of a cell.
+
+    Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
+    every marker is held out in turn of a method that is given two and more. One that is given a
+    single marker cannot lose it: its next samples score it.
+    """
+    moving = ready.tracks.names if ready.tracks else ()
+    given = ready.method.markers
+    if cell.hold_out and cell.hold_out != EACH:
+        return (Fold(_left(given, cell.hold_out, moving), cell.hold_out),)
+    if not given or cell.baseline:
+        return (Fold(given, cell.scored(moving)),)
+    whole = Fold(given, tuple(n for n in moving if n not in given))
+    if not cell.in_turn(moving):
+        return (whole,)
+    turns = [m for m in given if m in moving] if len(given) > 1 else []
+    return (whole, *(Fold(tuple(n for n in given if n != m), (m,)) for m in turns))
+
+
+def _left(
+    given: tuple[str, ...], held_out: tuple[str, ...], moving: Sequence[str]
+) -> tuple[str, ...]:
+    """The markers that a method keeps. Raises `UsageError` for names that do not move."""
+    absent = [n for n in held_out if n not in moving]
+    if absent:
+        raise UsageError(
+            f"--hold-out {absent[0]}: no moving marker has that name; moving "
+            f"markers are {list(moving)}"
+        )
+    left = tuple(n for n in given if n not in held_out)
+    if given and not left:
+        raise UsageError(
+            f"--hold-out {', '.join(held_out)} leaves nothing of {', '.join(given)} to the filter"
+        )
+    return left
+
+
+# --- all seeds at once ---------------------------------------------------------------------------
+
+
+def _all_seeds(
+    bench: Bench, cell: FilterCell, stepper: FilterStepper, first: Ready, fold: Fold
+) -> FilterScores | None:
+    """None where the filter cannot take all seeds in one walk."""
+    offered, inputs, t = stepper.offered, first.registered.inputs, first.registered.t
+    every = [bench.ready(cell, seed)[0].with_markers(fold.given) for seed in cell.seeds]
+    z = [_by_step(r.method.offered(r.system, r.registered), offered, t) for r in every]
+    if any(row is None for row in z):
+        return None
+    rows, places = _rows(bench, first, fold)
+    batch = stepper.batch(inputs, np.array(z), rows)
+    if batch is None:
+        return None
+    if not (np.isfinite(batch.values).all() and np.isfinite(batch.nis).all()):
+        raise ComparisonError("diverged: the estimate is not finite")
+    dof = int(batch.dof.sum())
+    if not dof:
+        raise ComparisonError(f"invalid: {_unreached(stepper, len(inputs))}")
+    measured, segments = np.isfinite(np.array(z)), first.segments
+    names = [p.name for p in first.scene.probes]
+    scored = []
+    for i, ready in enumerate(every):
+        probes = dict(zip(names, batch.values[i, :, : len(names)].T, strict=True))
+        u = batch.values[i, :, len(names) :].reshape(len(t), len(places), -1)
+        y = batch.y[i]
+        withheld = (
+            *_held_out(ready, fold, t, u, segments),
+            *ahead_errors(t, offered.names, y, measured[i], segments),
+        )
+        scaled = _scaled(y, measured[i], offered)
+        innovations = innovations_of(t, scaled, batch.log_likelihood[i], batch.dof, segments)
+        truth = _against_truth(bench, first, probes)
+        scored.append(Scored(truth, withheld, innovations, float(batch.nis[i].sum()), dof))
+    return replace(
+        _put_together(scored, segments), steps=len(inputs), frozen=batch.frozen, shared=True
+    )
+
+
+def _by_step(measurements: Measurements, offered: Measurements, t: Floats) -> Floats | None:
+    """Measurements (nt, m) m by step, NaN = none; None for other components."""
+    if measurements.names != offered.names:
+        return None
+    z = np.full((len(t), len(measurements.names)), np.nan)
+    for step, row in timetable(measurements, float(t[0])).z.items():
+        if step <= len(z):
+            z[step - 1] = row
+    return z
+
+
+def _scaled(y: Floats, measured: Floats, offered: Measurements) -> Floats:
+    """Innovations over the noise of their components (nt, m), NaN = none."""
+    return np.where(measured, y / offered.sd, np.nan)
+
+
+def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ...]]:
+    """Rows (p, N) of the probes along the experiment's axis and of the markers that score, and
+    the names of these."""
+    mesh = first.scene.mesh
+    d, axis = mesh.dimension, "xyz".index(first.experiment.axis)
+    probes = np.zeros((0, mesh.nodes.size))
+    if first.scene.probes:
+        weights = probe_rows(mesh, first.scene.probes).weights.toarray()
+        probes = np.kron(weights, np.eye(d))[axis::d]
+    tracks = _scoring(first, fold)
+    if tracks is None:
+        return probes, ()
+    markers = np.kron(tracks.rows.weights.toarray(), np.eye(d))
+    return np.vstack([probes, markers]), tracks.names
+
+
+def _unreached(stepper: FilterStepper, steps: int) -> str:
+    return cast(str, stepper.unheard([{"nis.dof": 0.0}] * steps))  # type: ignore[attr-defined]
+
+
+def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:
+    """Median and 99 % quantile (s) of the first steps, run as they are alone; the very first only
+    warms up."""
+    state, seconds = stepper.rest(), list[float]()
+    for row in inputs[: _TIMED + 1]:
+        start = perf_counter()
+        state = stepper.step(state, row)
+        seconds.append(perf_counter() - start)
+        if sum(seconds) > _TIMED_S and len(seconds) > 5:
+            break
+    p50, p99 = np.quantile(seconds[1:] or seconds, [0.5, 0.99])
+    return float(p50), float(p99)
+
+
+# --- seed by seed --------------------------------------------------------------------------------
+
+
+def _one_by_one(bench: Bench, cell: FilterCell, folds: Sequence[Fold]) -> FilterScores:
+    scored, timing, steps = list[Scored](), Timing(), 0
+    segments: Segments | None = None
+    for seed in cell.seeds:
+        on_each = []
+        for ready in bench.ready(cell, seed):
+            segments = segments or ready.segments
+            runs = [_run(cell, ready, fold, seed) for fold in folds]
+            timing.add(runs[0].step_s)
+            steps = len(runs[0].t)
+            on_each.append(_scored(bench, cell, ready, folds, runs))
+        scored.append(_in_a_row(on_each))
+    assert segments is not None
+    return replace(
+        _put_together(scored, segments),
+        step_s=float(np.median(timing.p50)) if timing.p50 else None,
+        step_p99_s=float(np.median(timing.p99)) if timing.p99 else None,
+        setup_s=runs[0].setup_s,
+        steps=steps,
+    )
+
+
+def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
+    one = ready.with_markers(fold.given)
+    one = one.given_nothing() if cell.baseline == "alone" else one
+    points = _watched(ready, cell)
+    run = one.run(cell.method, KeptFields(other_times(ready.registered), points))
+    state = run.outcome.state
+    if state == "finished" or (state == "invalid" and cell.baseline == "alone"):
+        return run
+    where = f"seed {seed}: " if cell.seed_path else ""
+    raise ComparisonError(f"{where}{state} at step {run.outcome.step}: {run.outcome.why}")
+
+
+def _watched(ready: Ready, cell: FilterCell) -> Rows | None:
+    """Rows of the markers, then of the outlines that filters are given."""
+    every = [] if ready.tracks is None else [ready.tracks.rows]
+    every += [o.distances.rows for o in outline_tracks(ready.registered, cell.given)]
+    if not every:
+        return None
+    weights = sparse.csr_array(sparse.vstack([r.weights for r in every]))
+    return Rows(weights, np.concatenate([r.outside for r in every]))
+
+
+def _scored(
+    bench: Bench, cell: FilterCell, ready: Ready, folds: Sequence[Fold], runs: Sequence[Run]
+) -> Scored:
+    """Results on one recording: held-out errors of every fold, all others of the first."""
+    segments, run = ready.segments, runs[0]
+    tracks = ready.tracks
+    held = list[Withheld]()
+    for fold, of_fold in zip(folds, runs, strict=True):
+        if tracks is not None and of_fold.points is not None and fold.scores:
+            at = [tracks.names.index(n) for n in fold.scores]
+            held += tracks.of(fold.scores).errors(
+                of_fold.t, of_fold.points[:, at], segments, ahead=False
+            )
+    held += other_errors(run, ready.registered, segments, cell.given)
+    axis = ready.experiment.axis
+    probes = {p.name: run.traces[f"{p.name}.{axis}"].y for p in ready.scene.probes}
+    truth = _against_truth(bench, ready, probes) if bench.experiment.repeats else {}
+    nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
+    if nis is None or dof is None or cell.baseline:
+        ahead = _at_given(cell, ready, run, segments)
+        predictions = _predictions(cell, ready, run, segments)
+        return Scored(truth, (*held, *ahead), predictions=predictions)
+    names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
+    names = [n.removeprefix("innovation.") for n in names]
+    y, sd = read_innovations(run, names)
+    measured = (sd > 0) | (y != 0)
+    scaled = np.where(sd > 0, y / np.where(sd > 0, sd, 1.0), np.nan)
+    innovations = innovations_of(run.t, scaled, run.traces["log_likelihood"].y, dof.y, segments)
+    ahead = ahead_errors(run.t, names, y, measured, segments)
+    return Scored(truth, (*held, *ahead), innovations, float(nis.y.sum()), int(dof.y.sum()))
+
+
+def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> tuple[Withheld, ...]:
+    """Errors at what filters are given, of a method that is given nothing."""
+    u, tracks = run.points, ready.tracks
+    if u is None:
+        return ()
+    errors, first = list[Withheld](), 0
+    if tracks is not None:
+        given, first = tracks.of(cell.given), len(tracks.names)
+        at = [tracks.names.index(n) for n in given.names]
+        errors += given.errors(run.t, u[:, at], segments, ahead=True) if at else ()
+    for outline in outline_tracks(ready.registered, cell.given):
+        last = first + len(outline.distances.normals)
+        errors += outline.errors(run.t, u[:, first:last], segments)
+        first = last
+    return tuple(errors)
+
+
+def _predictions(
+    cell: FilterCell, ready: Ready, run: Run, segments: Segments
+) -> PredictionErrors | None:
+    """Errors y - H u at what filters are given, of a method that is given nothing."""
+    if run.points is None:
+        return None
+    offered, start = ready.offered(cell.given), np.zeros(1)
+    columns: dict[str, Floats] = {}
+    markers = ready.tracks.names if ready.tracks is not None else ()
+    for i, name in enumerate(markers):
+        for c in range(run.points.shape[2]):
+            columns[f"{name}.{'xyz'[c]}"] = run.points[:, i, c]
+    first = len(markers)
+    for outline in outline_tracks(ready.registered, cell.given):
+        last = first + len(outline.distances.normals)
+        along = (run.points[:, first:last] * outline.distances.normals).sum(axis=2)
+        columns |= {f"{outline.name}.{i}": y for i, y in enumerate(along.T)}
+        first = last
+    t = np.concatenate([start, run.t])
+    predicted = [np.interp(offered.t, t, np.append(start, columns[n])) for n in offered.names]
+    errors = offered.z - np.stack(predicted, axis=1)
+    return prediction_errors(offered.t, errors, offered.sd**2, segments)
+
+
+# --- persistence ----------------------------------------------------------------------------------
+
+
+def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
+    """The last measurement, held: what was given stays as it was last measured, another marker is
+    where the nearest given one was."""
+    scored, seconds, segments = list[Scored](), list[float](), first.segments
+    for seed in cell.seeds:
+        on_each = []
+        for ready in bench.ready(cell, seed):
+            offered = ready.offered(cell.given)
+            start = perf_counter()
+            last = _last_measured(offered.z)
+            seconds.append((perf_counter() - start) / len(offered.t))
+            y, measured = offered.z - last, np.isfinite(offered.z)
+            ahead = ahead_errors(offered.t, offered.names, np.nan_to_num(y), measured, segments)
+            tracks, held = ready.tracks, tuple[Withheld, ...]()
+            truth: Mapping[str, float] = {}
+            if tracks is not None:
+                given = tracks.of(cell.given).and_outlines(
+                    outline_tracks(ready.registered, cell.given), ready.scene.mesh
+                )
+                if given.names:
+                    held = _held_markers(cell, tracks, given, segments)
+                    truth = _held_at_probes(bench, ready, given)
+            predictions = prediction_errors(offered.t, y, offered.sd**2, segments)
+            on_each.append(Scored(truth, (*held, *ahead), predictions=predictions))
+        scored.append(_in_a_row(on_each))
+    scores = _put_together(scored, segments)
+    step = float(np.median(seconds))
+    return replace(
+        scores, step_s=step, step_p99_s=float(np.max(seconds)), steps=len(first.registered.t)
+    )
+
+
+def _held_markers(
+    cell: FilterCell, tracks: MarkerTracks, given: MarkerTracks, segments: Segments
+) -> tuple[Withheld, ...]:
+    """Errors of the markers that are held out, each where the nearest other given one was."""
+    held = list[Withheld]()
+    for name in cell.scored(tracks.names):
+        marker, others = tracks.of((name,)), given.of([n for n in given.names if n != name])
+        if others.names:
+            u = marker.held(others)
+            held += marker.errors(tracks.t[1:], u[1:], segments, ahead=False)
+    return tuple(held)
+
+
+def _last_measured(z: Floats) -> Floats:
+    """The last value of every component before each row (nt, m), zero at first."""
+    last, before = np.zeros(z.shape[1]), np.zeros_like(z)
+    for i, row in enumerate(z):
+        before[i] = last
+        last = np.where(np.isfinite(row), row, last)
+    return before
+
+
+def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[str, float]:
+    truth = bench.truth(ready)
+    if not truth:
+        return {}
+    probes = [p for p in ready.scene.probes if p.name in truth]
+    rest = np.array([p.point for p in probes])
+    at = replace(given, names=tuple(p.name for p in probes), rest=rest)
+    now = at.held(given)
+    c, t = "xyz".index(ready.experiment.axis), np.concatenate([[0.0], ready.registered.t])
+    last = np.searchsorted(given.t, t[1:] + 1e-9) - 1
+    estimates = {p.name: now[last, j, c] for j, p in enumerate(probes)}
+    return error_scores(estimates, truth, ready.experiment.axis)
+
+
+# --- scores --------------------------------------------------------------------------------------
+
+
+def _scoring(ready: Ready, fold: Fold) -> MarkerTracks | None:
+    tracks = ready.tracks
+    return None if tracks is None or not fold.scores else tracks.of(fold.scores)
+
+
+def _held_out(
+    ready: Ready, fold: Fold, t: Floats, u: Floats, segments: Segments
+) -> tuple[Withheld, ...]:
+    tracks = _scoring(ready, fold)
+    return () if tracks is None else tracks.errors(t, u, segments, ahead=False)
+
+
+def _against_truth(bench: Bench, ready: Ready, traces: Mapping[str, Floats]) -> Mapping[str, float]:
+    truth = bench.truth(ready)
+    return error_scores(traces, truth, bench.experiment.axis) if truth else {}
+
+
+def _in_a_row(scored: Sequence[Scored]) -> Scored:
+    """Several measured recordings as one."""
+    if len(scored) == 1:
+        return scored[0]
+    return Scored(
+        {}, in_a_row([s.withheld for s in scored]),
+        joined_innovations([s.innovations for s in scored], 1),
+        sum(s.nis for s in scored), sum(s.dof for s in scored),
+        joined_predictions([s.predictions for s in scored], 2),
+    )  # fmt: skip
+
+
+def _put_together(scored: Sequence[Scored], segments: Segments) -> FilterScores:
+    """All seeds; steps and times are the caller's."""
+    withheld = by_seed([s.withheld for s in scored])
+    innovations = joined_innovations([s.innovations for s in scored], 0)
+    scores, units = withheld_scores(withheld, innovations)
+    truth = {name: tuple(s.truth[name] for s in scored) for name in scored[0].truth}
+    dof = sum(s.dof for s in scored)
+    nis = {NIS: tuple(s.nis / s.dof for s in scored)} if all(s.dof for s in scored) else {}
+    return FilterScores(
+        {**truth, **scores, **nis},
+        {**dict.fromkeys(truth, "m"), **units, **dict.fromkeys(nis, "1")},
+        nis=sum(s.nis for s in scored) if dof else None,
+        nis_dof=dof,
+        withheld=withheld,
+        innovations=innovations,
+        predictions=joined_predictions([s.predictions for s in scored], 0),
+        segment_s=segments.length,
+    )

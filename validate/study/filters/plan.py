@@ -1,0 +1,294 @@
+"""What a filter study will run: every method with every set of values, over common seeds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from validate.engine.store import key_of
+from validate.errors import UsageError
+from validate.parameters import describe, nearest_names, with_values
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import RECORDED, Options, configure, require_case
+from validate.pipeline.run.job import Job, job_of
+from validate.study.sweep import Axis, grid, named
+
+METHODS = "methods."
+CASE = "case"  # a condition: the truth is a case of the experiment, by its name
+SEEDS = 10  # common samples of the noise: a t interval of them is 2.3 standard errors wide
+EACH = ("each",)  # of hold_out: every marker in turn
+
+
+@dataclass(frozen=True)
+class FilterCell:
+    """One method, its `settings` and the twin's `condition` as texts by path, over all `seeds`.
+
+    `seed_path` is the seed's parameter; "" where there is none. `key` names all that makes its
+    numbers. `given` are the markers that any filter of the study is given, `spared` those of them
+    that a filter can lose, having another one. `hold_out` are kept from all filters. `baseline`
+    compares filters with the method's model, given "nothing" ("alone"), or with the last
+    measurement ("persistence"). Markers are registered as for the method `tracker`, a filter.
+    """
+
+    method: str
+    settings: tuple[tuple[str, str], ...]
+    condition: tuple[tuple[str, str], ...]
+    seed_path: str = ""
+    seeds: tuple[int, ...] = (0,)
+    key: str = ""
+    timed: bool = False
+    given: tuple[str, ...] = ()
+    spared: tuple[str, ...] = ()
+    hold_out: tuple[str, ...] = ()
+    baseline: Literal["", "alone", "persistence"] = ""
+    tracker: str = ""
+
+    @property
+    def name(self) -> str:
+        """What a ranking calls it."""
+        if self.baseline == "persistence":
+            return "last measurement, held"
+        return f"{self.method}, given nothing" if self.baseline else self.method
+
+    @property
+    def label(self) -> str:
+        given = f" ({named(self.values)})" if self.values else ""
+        seeds = f", {len(self.seeds)} seeds" if self.seed_path else ""
+        return f"{self.name}{given}{seeds}"
+
+    def in_turn(self, moving: Sequence[str]) -> bool:
+        """Whether every marker is held out in turn: `--hold-out each`, or no marker is free."""
+        return self.hold_out == EACH or set(moving) <= set(self.given)
+
+    def scored(self, moving: Sequence[str]) -> tuple[str, ...]:
+        """The markers at which a method that is given none is scored as held out."""
+        if self.hold_out and self.hold_out != EACH:
+            return self.hold_out
+        turns = self.spared if self.in_turn(moving) else ()
+        return tuple(n for n in moving if n not in self.given or n in turns)
+
+    @property
+    def values(self) -> dict[str, str]:
+        return dict(self.condition) | dict(self.settings)
+
+
+@dataclass(frozen=True)
+class FilterPlan:
+    """The job and its cells, method by method in the order of the grid; `single` are the filters
+    of one marker where every marker is held out in turn."""
+
+    experiment: Experiment
+    job: Job
+    axes: tuple[Axis, ...]
+    methods: tuple[str, ...]
+    seeds: tuple[int, ...]
+    cells: tuple[FilterCell, ...]
+    single: tuple[str, ...] = ()
+
+    @property
+    def single_words(self) -> str:
+        """How `--hold-out each` scores filters that are given one marker; "" for none."""
+        if not self.single:
+            return ""
+        given = ", ".join(f"{m} ({self.experiment.methods[m].markers[0]})" for m in self.single)
+        return (
+            f"These methods are given one marker only and are scored by its next sample: {given}."
+        )
+
+
+def plan(
+    experiment: Experiment,
+    options: Options,
+    axes: Sequence[Axis],
+    seeds: int | tuple[int, ...] | None = None,
+    hold_out: tuple[str, ...] = (),
+) -> FilterPlan:
+    """Checks every path and value before anything runs.
+
+    `seeds`: so many from the declared seed of the twin on, or these (None: `SEEDS`; a measured
+    recording has one). An axis of one method multiplies its cells only. Raises `UsageError` for
+    an experiment without filters, unknown paths (naming the nearest), values of another type,
+    methods without a sweep's name, and fewer than one seed.
+    """
+    filters = [n for n, m in experiment.methods.items() if m.markers]
+    if not filters:
+        raise UsageError(
+            f"'{experiment.name}' has no filter: no method of {', '.join(experiment.methods)} "
+            'is given markers; declare one, as Method("...", KfFem(), markers=("A",)), in its file'
+        )
+    parameters, _ = configure(experiment, Options(options.values, (), options.quick))
+    methods = _methods(experiment, options.methods, axes)
+    seed_path = _seed_path(parameters) if experiment.repeats else ""
+    _require(axes, experiment, parameters, methods, seed_path)
+    job = job_of(experiment, options.values, options.quick)
+    chosen = [m for m in methods if m in filters] or filters
+    given = tuple(dict.fromkeys(n for m in chosen for n in experiment.methods[m].markers))
+    several = [m for m in chosen if len(experiment.methods[m].markers) > 1]
+    spared = tuple(dict.fromkeys(n for m in several for n in experiment.methods[m].markers))
+    single = tuple(m for m in chosen if m not in several) if hold_out == EACH else ()
+    if seeds is None:
+        seeds = SEEDS if experiment.repeats and seed_path else 1
+    bare = FilterCell(
+        "",
+        (),
+        (),
+        seed_path,
+        _seeds(seeds, parameters, seed_path),
+        given=given,
+        spared=spared,
+        hold_out=hold_out,
+        tracker=chosen[0],
+    )
+    if not options.methods and not experiment.repeats:
+        methods = tuple(dict.fromkeys((*methods, *_plain(experiment, methods))))
+    of_methods = [replace(bare, method=m) for m in methods]
+    cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
+    beside = [replace(bare, method=chosen[0], baseline="persistence")]
+    if all(m in filters for m in methods):  # no plain solver stands beside them
+        beside.insert(0, replace(bare, method=chosen[0], baseline="alone"))
+    conditions = [a for a in axes if not a.path.startswith(METHODS)]
+    cells += [c for one in beside for c in _cells(experiment, job, one, conditions)]
+    return FilterPlan(experiment, job, tuple(axes), methods, bare.seeds, tuple(cells), single)
+
+
+def set_up(experiment: Experiment, job: Job, cell: FilterCell, seed: int) -> tuple[Any, Any]:
+    """Parameters with that seed, and the method's settings, of a cell."""
+    values = {k: v for k, v in {**dict(job.values), **cell.values}.items() if k != CASE}
+    if cell.seed_path:
+        values[cell.seed_path] = str(seed)
+    parameters, methods = configure(experiment, Options(values, (cell.method,), job.quick))
+    return parameters, methods[cell.method]
+
+
+def _cells(
+    experiment: Experiment, job: Job, bare: FilterCell, axes: Sequence[Axis]
+) -> list[FilterCell]:
+    prefix = f"{METHODS}{bare.method}."
+    cells = []
+    concerning = [a for a in axes if not a.path.startswith(METHODS) or a.path.startswith(prefix)]
+    for row in grid(concerning):
+        settings = tuple((k, v) for k, v in row.items() if k.startswith(METHODS))
+        condition = tuple((k, v) for k, v in row.items() if not k.startswith(METHODS))
+        cells.append(_keyed(experiment, job, replace(bare, settings=settings, condition=condition)))
+    return cells
+
+
+def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
+    """The key holds every parameter and setting of the method as the cell will have it."""
+    try:
+        made: Any = _described(*set_up(experiment, job, bare, bare.seeds[0]))
+    except UsageError as error:  # a combination that settings refuse: a failed row later
+        made = str(error)
+    return replace(bare, key=key_of(job, bare, made))
+
+
+def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
+    both = (*describe(parameters), *describe(settings, METHODS))
+    return [(p.path, repr(p.default)) for p in both]
+
+
+def _methods(
+    experiment: Experiment, chosen: tuple[str, ...], axes: Sequence[Axis]
+) -> tuple[str, ...]:
+    """Those named, else those whose settings are swept, else all that run the whole time; on a
+    measured recording filters, with what the experiment accepts and varies its inputs by."""
+    known = experiment.methods
+    for name in chosen:
+        if name not in known:
+            raise UsageError(f"unknown method '{name}'; {nearest_names(name, set(known))}")
+    whole = tuple(n for n, m in known.items() if getattr(m, "steps", None) is None)
+    usual = whole if experiment.repeats else tuple(n for n in whole if n in _usual(experiment))
+    short = [n for n in chosen if n not in whole]
+    if short:
+        raise UsageError(
+            f"method '{short[0]}' runs {known[short[0]].steps} steps only, for timing, so it "
+            "has no error; leave it out"
+        )
+    swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
+    return chosen or tuple(n for n in whole if n in swept) or usual
+
+
+def _plain(experiment: Experiment, methods: Sequence[str]) -> tuple[str, ...]:
+    """A plain solver beside filters: the one that inputs are varied by, else one that is accepted;
+    none where there is one already, or none at all."""
+    known = experiment.methods
+    if any(not known[m].markers for m in methods):
+        return ()
+    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    names = (by, experiment.reference, *experiment.accepted)
+    return tuple(n for n in names if n in known and not known[n].markers)[:1]
+
+
+def _usual(experiment: Experiment) -> set[str]:
+    """Filters, and the plain solvers that stand beside them: other ones may take minutes."""
+    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    filters = {n for n, m in experiment.methods.items() if m.markers}
+    return {*filters, *experiment.accepted, experiment.reference, by}
+
+
+def _seed_path(parameters: Any) -> str:
+    """The path of the twin's seed; "" where there is none."""
+    paths = [p.path for p in describe(parameters)]
+    return next((p for p in ("twin.seed", "seed") if p in paths), "")
+
+
+def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tuple[int, ...]:
+    count = seeds if isinstance(seeds, int) else len(seeds)
+    if count < 1:
+        raise UsageError(f"--seeds {seeds}: at least 1")
+    if not seed_path:
+        if count > 1:
+            raise UsageError(
+                f"{count} seeds, but the experiment has no parameter twin.seed; use --seeds 1"
+            )
+        return (0,)
+    if isinstance(seeds, tuple):
+        if len(set(seeds)) < count:
+            raise UsageError(
+                "a seed is given twice, but each seed is one sample; give different seeds"
+            )
+        return seeds
+    first = {p.path: p.default for p in describe(parameters)}[seed_path]
+    return tuple(range(int(first), int(first) + count))
+
+
+def _require(
+    axes: Sequence[Axis],
+    experiment: Experiment,
+    parameters: Any,
+    methods: tuple[str, ...],
+    seed_path: str,
+) -> None:
+    known = experiment.methods
+    for a in axes:
+        if a.path == CASE:
+            _require_cases(experiment, a)
+            continue
+        if a.path == seed_path:
+            raise UsageError(
+                f"'{a.path}' cannot be swept; use --seeds N, which repeats every cell N times"
+            )
+        if not a.path.startswith(METHODS):
+            _require_values(parameters, a.path, a)
+            continue
+        short = a.path.removeprefix(METHODS)
+        _require_values(known, short, a)
+        if short.partition(".")[0] not in methods:
+            raise UsageError(
+                f"'{a.path}' is swept, but the method is not among {', '.join(methods)}; add it to "
+                "--methods"
+            )
+
+
+def _require_cases(experiment: Experiment, axis: Axis) -> None:
+    for value in axis.values:
+        if value != RECORDED and not experiment.repeats:
+            raise UsageError(
+                f"no case '{value}' of {experiment.name}: its recording is measured, and only "
+                "a twin has cases"
+            )
+        require_case(experiment, value)
+
+
+def _require_values(settings: Any, path: str, axis: Axis) -> None:
+    for value in axis.values:
+        with_values(settings, {path: value})

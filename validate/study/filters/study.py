@@ -1,0 +1,211 @@
+"""The filter sweep: every method and setting over common seeds, ranked with intervals.
+
+from validate.study.filters.study import study
+result = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))
+print(result.best[0].line)
+"""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from validate.engine.cell import Plan, Where
+from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.errors import ComparisonError, UsageError
+from validate.parameters import nearest_names
+from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.find import find
+from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.named_run import study_folder
+from validate.study.filters.bench import open_bench
+from validate.study.filters.blocks import score_difference
+from validate.study.filters.cell import run_cell, with_likelihoods
+from validate.study.filters.plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
+from validate.study.filters.ranking import Ranked, Ranking, TruthPick, picks, rankings, tied
+from validate.study.filters.score import AHEAD, HELD_OUT, POOLED, WITHHELD, FilterScores
+from validate.study.sweep import axes
+
+KIND = "filters"
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best filter of one condition and the command that runs it; `ties` counts the cells of
+    filters that are not distinguishable from it. `edges` are the swept paths whose first or last
+    value it has; `better` names what is first where that is no filter."""
+
+    ranked: Ranked
+    line: str
+    ties: int
+    edges: tuple[str, ...]
+    better: str = ""
+
+    @property
+    def doubts(self) -> str:
+        """Reasons not to take it as it is; "" for none."""
+        reasons = [f"place {self.ranked.place}: {self.better} is first"] if self.better else []
+        if self.ranked.score.half is None:
+            reasons.append("without an interval, settings cannot be distinguished")
+        elif self.ties:
+            others = "1 other" if self.ties == 1 else f"{self.ties} others"
+            reasons.append(f"{others} not distinguishable from it")
+        if self.edges:
+            reasons.append(
+                f"the best value lies at the end of the sweep of {', '.join(self.edges)}: widen it"
+            )
+        consistency = self.ranked.result.consistency
+        if consistency is not None and not consistency.band_95.holds(consistency.mean):
+            reasons.append(
+                f"NIS {consistency.mean:.3g} is outside its 95 % band: its claimed interval is "
+                "not used"
+            )
+        return "; ".join(reasons)
+
+
+@dataclass(frozen=True)
+class FilterStudy:
+    """All cells with their records, and the rankings by the score `by`, one a condition."""
+
+    plan: FilterPlan
+    by: str
+    done: Finished[FilterScores]
+    rankings: tuple[Ranking, ...]
+
+    @property
+    def unit(self) -> str:
+        """Of the score that ranks."""
+        return self.rankings[0].rows[0].result.units[self.by]
+
+    @property
+    def picks(self) -> tuple[TruthPick, ...]:
+        """What a ranking without truth picks where the truth is known."""
+        records = self.done.records
+        values = {c: v for c in self.plan.cells if (v := records[c.key].value) is not None}
+        return picks(values)
+
+    @property
+    def best(self) -> tuple[Best, ...]:
+        return tuple(_best(self.plan, r, self.by) for r in self.rankings if r.rows)
+
+    @property
+    def failed(self) -> int:
+        return sum(len(r.failed) for r in self.rankings)
+
+
+def study(
+    experiment: str | Experiment,
+    sweeps: Sequence[str] = (),
+    *,
+    methods: tuple[str, ...] = (),
+    values: Mapping[str, str] | None = None,
+    seeds: int | tuple[int, ...] | None = None,
+    by: str = "",
+    hold_out: tuple[str, ...] = (),
+    quick: bool = False,
+    out: Path | None = None,
+    where: Where | None = None,
+    report: Report | None = None,
+) -> FilterStudy:
+    """Runs what is not finished yet in `out`/<name>/study-filters/cells, and ranks everything.
+
+    `sweeps` as for `--sweep`, `values` as for `--set`; `out` is the folder of the reports. `by` is
+    a score of `validate.study.filters.score` (empty: the truth's, where it is known, else that of
+    what was withheld); `hold_out` as for `--hold-out`. Raises `UsageError` for bad names and values
+    before anything runs, `ComparisonError` when no cell has a score.
+    """
+    declared = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
+    options = Options(dict(values or {}), methods, quick)
+    planned = plan(declared, options, axes(sweeps or _declared(declared, options)), seeds, hold_out)
+    work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
+    done = finish(work, study_folder(declared, KIND, out) / CELLS, where, report)
+    _require_filters(planned, done)
+    done = replace(done, records=with_likelihoods(planned.cells, done.records))
+    by = by or usual_score(done, in_turn=hold_out == EACH)
+    _require_score(done, by)
+    return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
+
+
+def _declared(experiment: Experiment, options: Options) -> list[str]:
+    """The sweeps that the experiment declares, of the chosen methods."""
+    chosen = options.methods or tuple(experiment.methods)
+    return [
+        s.text for s in experiment.sweeps
+        if not s.path.startswith("methods.") or s.path.split(".")[1] in chosen
+    ]  # fmt: skip
+
+
+def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
+    """Raises `ComparisonError` with the first reason where every filter failed."""
+    known = planned.experiment.methods
+    cells = [c for c in planned.cells if known[c.method].markers and not c.baseline]
+    failed = [c for c in cells if done.records[c.key].value is None]
+    if cells and len(failed) == len(cells):
+        first = done.records[failed[0].key].why
+        raise ComparisonError(
+            f"all {len(cells)} settings of filters failed; the first, {failed[0].label}: {first}"
+        )
+
+
+def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
+    """The first of the usual scores that every filter has; else the first of a filter."""
+    filters = [v for r in done.records.values() if (v := r.value) is not None and v.nis is not None]
+    usual = (POOLED, HELD_OUT if in_turn else WITHHELD, AHEAD)
+    names = (*usual, *(filters[0].scores if filters else ()))
+    return next((n for n in names if all(n in v.scores for v in filters)), POOLED)
+
+
+def _require_score(done: Finished[FilterScores], by: str) -> None:
+    good = [r.value for r in done.records.values() if r.value is not None]
+    if not good:
+        first = next(iter(done.records.values()))
+        raise ComparisonError(
+            f"all {len(done.records)} cells failed, 0 compared; the first: {first.why}"
+        )
+    names = {name for value in good for name in value.scores}
+    if by not in names:
+        raise UsageError(f"no score '{by}' to rank by; {nearest_names(by, names)}")
+
+
+def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:
+    """The first filter (what has innovations); the first of all where there is none."""
+    filters = [r for r in ranking.rows if r.result.nis is not None and not r.cell.baseline]
+    rows = filters or list(ranking.rows)
+    differences = [score_difference(r.result, rows[0].result, by, ranking.blocks) for r in rows[1:]]
+    ties, cell = sum(tied(d) for d in differences if d.half is not None), rows[0].cell
+    first = ranking.rows[0]
+    better = "" if first is rows[0] else first.cell.name
+    return Best(rows[0], run_line(planned, cell), ties, _edges(planned, cell), better)
+
+
+def _edges(planned: FilterPlan, cell: FilterCell) -> tuple[str, ...]:
+    """Swept settings of three and more numbers of which the cell has the least or the largest."""
+    edges = []
+    for axis in planned.axes:
+        numbers = axis.numbers
+        if axis.path in dict(cell.settings) and numbers is not None and len(numbers) > 2:
+            value = numbers[axis.values.index(cell.values[axis.path])]
+            if value in (min(numbers), max(numbers)):
+                edges.append(axis.path)
+    return tuple(edges)
+
+
+def run_line(planned: FilterPlan, cell: FilterCell) -> str:
+    """The `validate run` command of a cell, with the methods it is judged beside: the reference
+    that speeds are compared with and those whose checks decide, as `cell` alone may have none."""
+    experiment = planned.experiment
+    beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
+    methods = tuple(dict.fromkeys((*beside, cell.method)))
+    values = {**dict(planned.job.values), **cell.values}
+    case = values.pop(CASE, "")
+    kept = {k: v for k, v in values.items() if _concerns(k, methods)}
+    parts = ["validate", "run", experiment.name]
+    for path, value in kept.items():
+        parts += ["--set", f"{path}={value}"]
+    parts += ["--case", case] if case else []
+    return shlex.join([*parts, "--methods", ",".join(methods)])
+
+
+def _concerns(path: str, methods: Sequence[str]) -> bool:
+    prefixes = tuple(f"{METHODS}{m}." for m in methods)
+    return not path.startswith(METHODS) or path.startswith(prefixes)

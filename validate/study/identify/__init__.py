@@ -1,0 +1,4 @@
+"""Parameters from a recording with profiles and correlations.
+
+Start with `study`.
+"""

@@ -1,0 +1,171 @@
+"""One variant on a worker: all modes once, then every scheme and step on them.
+
+Radii, measured and predicted limits, condition numbers, locking, rounding and drift; or the one
+line for which the variant is refused.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, eigvalsh
+
+from validate.arrays import Floats
+from validate.engine.kept import Kept
+from validate.errors import ComparisonError, ValidateError
+from validate.fem.assembly.mixed import mixed_static
+from validate.fem.locking import locking_of
+from validate.fem.system import System, build, mass_of
+from validate.pipeline.ladder.default import body_of
+from validate.pipeline.ladder.ladder import StabilityBody, Turned
+from validate.pipeline.run.job import Job
+from validate.scene.scene import Scene
+from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.solve.schemes import steppings_for
+from validate.solve.stepping import Stepping
+from validate.study.stability.plan import StabilityCell
+from validate.study.stability.precision import Drift, Rounding, drift, rounding
+
+_REACH = 8.0  # times the predicted limit, on both sides, that the measured one is sought in
+_HALVINGS = 30  # of that interval's logarithm: 4e-9 of the limit
+_DRIFT_SHARE = 0.5  # of the limit
+_LEAST_NU = 1e-6  # of mixed elements, whose pressure has no equation at lambda = 0
+
+
+@dataclass(frozen=True)
+class SchemeResult:
+    """Radii at the cell's steps; limits s: `predicted` None: none, `measured` None: not found."""
+
+    scheme: str
+    radii: tuple[float, ...]
+    predicted: float | None
+    measured: float | None
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """`lowest`, `highest` frequency 1/s with consistent mass; condition numbers by matrix; locking
+    factor (None: not for such cells); rounding; drift. `warning` on locking or "".
+    """
+
+    unknowns: int = 0
+    lowest: float = 0.0
+    highest: float = 0.0
+    schemes: tuple[SchemeResult, ...] = ()
+    conditions: Mapping[str, float] = field(default_factory=dict)
+    locking: float | None = None
+    rounding: Rounding | None = None
+    drifts: tuple[Drift, ...] = ()
+    warning: str = ""
+
+
+class StabilityBench:
+    """A body, and the locking factors of its meshes that were asked for."""
+
+    def __init__(self, body: StabilityBody) -> None:
+        self.body = body
+        self._locking: Kept[float | None] = Kept(64)
+
+    def locking(self, v: Turned) -> float | None:
+        """Compliance under the static load over that of mixed elements; E has no part in it."""
+        base = self.body.base
+        alike = replace(base, nu=max(v.nu, _LEAST_NU), mesh=v.mesh, quality=v.quality)
+        return self._locking.get(alike, lambda: _locking(self.body.pulled(alike)))
+
+
+def open_bench(job: Job) -> StabilityBench:
+    """Raises `ComparisonError` for an experiment that has nothing to be stepped."""
+    body = body_of(job.experiment())
+    if body is None:
+        raise ComparisonError(
+            "the experiment declares no density, so no scheme can step in time; set material.rho"
+        )
+    return StabilityBench(body)
+
+
+def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
+    """Raises `SceneError` for a variant that cannot be."""
+    base, v = bench.body, cell.variant
+    system = build(base.build(v))
+    modes = {mass: frequencies(system, mass) for mass in ("consistent", "lumped")}
+    schemes = steppings_for(system.scene.mesh.kind)
+    pulled = build(base.pulled(v))
+    limit = stable_step(pulled, ExplicitLinear(1.0, "lumped", "mass"))
+    return Stepped(
+        unknowns=len(system.free),
+        lowest=float(modes["consistent"][0]),
+        highest=float(modes["consistent"][-1]),
+        schemes=tuple(_scheme(s, system, modes[s.mass], v, cell.steps) for s in schemes),
+        conditions=_conditions(system, base.dt),
+        locking=bench.locking(v),
+        rounding=rounding(pulled, limit),
+        drifts=tuple(_drifts(base, system, schemes, modes)) if cell.drift else (),
+        warning="; ".join(f"{one.cause}: {one.where}" for one in locking_of(system.scene)),
+    )
+
+
+def frequencies(system: System, mass: Any) -> Floats:
+    """All frequencies (r,) 1/s, rising."""
+    free = system.free
+    K, M = (X[free][:, free].toarray() for X in (system.K, mass_of(system, mass)))
+    return np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0))
+
+
+def _scheme(
+    scheme: Stepping, system: System, omegas: Floats, v: Turned, steps: tuple[float, ...]
+) -> SchemeResult:
+    def radius(h: float) -> float:
+        return scheme.radius(h, omegas, v.mass_damping, v.stiffness_damping)
+
+    predicted = scheme.limit(system) if scheme.limit else None
+    measured = measured_limit(radius, predicted, 1 + scheme.rounding) if predicted else None
+    return SchemeResult(scheme.name, tuple(radius(h) for h in steps), predicted, measured)
+
+
+def measured_limit(radius: Callable[[float], float], near: float, border: float) -> float | None:
+    """The step s at which a radius crosses `border`, by bisection around `near`; None if none."""
+    low, high = near / _REACH, near * _REACH
+    if radius(low) > border or not radius(high) > border:
+        return None
+    for _ in range(_HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if radius(middle) > border else (middle, high)
+    return low
+
+
+def _conditions(system: System, dt: float) -> dict[str, float]:
+    """Of K, of the consistent M, and of Newmark's J = 4/h^2 M + 2/h C + K at the paper's step."""
+    free = system.free
+    K, M, C = (X[free][:, free].toarray() for X in (system.K, system.M, system.C))
+    matrices = {"K": K, "M": M, "J": 4 / dt**2 * M + 2 / dt * C + K}
+    found = {}
+    for name, matrix in matrices.items():
+        values = eigvalsh(matrix)
+        if values[0] > 0:
+            found[name] = float(values[-1] / values[0])
+    return found
+
+
+def _locking(pulled: Scene) -> float | None:
+    """None for cells that mixed elements do not know."""
+    try:
+        mixed = float(mixed_static(pulled).compliances[0])
+    except ValidateError:
+        return None
+    system = build(pulled)
+    f = system.loads[system.free, 0]
+    return float(f @ system.factor().solve(f)) / mixed
+
+
+def _drifts(
+    base: StabilityBody, system: System, schemes: tuple[Stepping, ...], modes: dict[str, Floats]
+) -> Iterable[Drift]:
+    """Schemes whose map knows its state: at half their limit, or at the paper's step."""
+    for s in schemes:
+        if s.name not in ("modal", "quasi_static"):
+            h = _DRIFT_SHARE * s.limit(system) if s.limit else base.dt
+            yield drift(s, h, modes[s.mass])
+
+
+# --- kept ----------------------------------------------------------------------------------------

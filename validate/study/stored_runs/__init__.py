@@ -1,0 +1,4 @@
+"""Stored runs side by side, and statements over all of them; nothing is run.
+
+Start with `stored`.
+"""

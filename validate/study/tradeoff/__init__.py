@@ -1,0 +1,4 @@
+"""Error against time per step over solvers, meshes and steps.
+
+Start with `study`.
+"""
