@@ -61,6 +61,7 @@ FORMER = {
     "solve.central": "solve.explicit.central",
     "solve.contact": "solve.static.contact",
     "solve.explicit_linear": "solve.explicit.linear",
+    "solve.guests": "solve.external",
     "solve.guests.guest": "solve.external.scheme",
     "solve.guests.simulators": "solve.external.program",
     "solve.haptic_loop": "solve.haptic.loop",
