@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from commands import here
+from command_line import here
 from script_modules import module_of
 
 from validate.compare.result import Result

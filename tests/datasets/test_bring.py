@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from commands import here, refused
+from command_line import here, refused
 
 from validate.commands import data as command
 from validate.datasets import home, registry

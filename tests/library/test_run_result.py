@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import here
+from command_line import here
 
 import validate
 from validate.compare.view import View

@@ -5,7 +5,7 @@ import pickle
 from pathlib import Path
 
 import pytest
-from commands import here
+from command_line import here
 
 import validate
 from validate.errors import UsageError

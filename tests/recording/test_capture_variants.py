@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import here
+from command_line import here
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.motion_capture.optitrack import read_optitrack

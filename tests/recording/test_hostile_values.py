@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from mcap.writer import Writer
 
 from validate.errors import RecordingError

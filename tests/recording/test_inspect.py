@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import here
+from command_line import here
 from mcap.writer import IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from mcap.reader import NonSeekingReader
 from mcap_samples import T0, markers_json, signal_json, write_foreign
 

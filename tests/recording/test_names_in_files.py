@@ -9,7 +9,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
-from commands import refused
+from command_line import refused
 from test_readers import make_dicom, make_rosbag
 
 SECRET = bytes(range(64)) * 64

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from canaries import folder, plant, ran
-from commands import here
+from command_line import here
 from engine_samples import Waited, Waiting, logged, open_folder
 from test_readers import EACH, files_of, sample
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from mcap_samples import ABSENT, T0, sample_recording
 
 from validate.recording.images.image import encode_png

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from report_samples import small_result
 
 from validate.parameters import Changed

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from canaries import folder, ran
-from commands import here
+from command_line import here
 from test_bodies_robust import MAKE
 
 __all__ = ["folder"]  # a fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import here, refused
+from command_line import here, refused
 from PIL import Image
 from test_stored import method, stored
 

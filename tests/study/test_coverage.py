@@ -38,7 +38,7 @@ from validate.study.coverage.worlds import Study, _alike
 
 ROOT = Path(__file__).parents[2]
 HERE = Where(0)
-TINY = (ROOT / "tests" / "replay" / "tiny.py").read_text("utf-8")
+TINY = (ROOT / "tests" / "pipeline" / "tiny.py").read_text("utf-8")
 # The block at three holds: one force each, its sensor's noise .1 mN, E perhaps uncertain.
 OWN = """
 from validate.pipeline.experiment.experiment import Uncertainty, vary

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from commands import here, refused
+from command_line import here, refused
 
 from validate.engine.cell import Record, Where
 from validate.errors import ComparisonError

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import here, refused
+from command_line import here, refused
 
 from validate.errors import UsageError
 from validate.report.export import parquet
