@@ -134,7 +134,8 @@ class Swing:
     ) -> Deviation | None:
         """One marker's deviation over its peak to peak."""
         mine, span = off[:, j], float(self.span[j])
-        mine = mine[np.isfinite(mine).all(axis=1)]
+        seen = np.isfinite(mine).all(axis=1)
+        mine = mine[seen]
         if not len(mine):
             return None
         words = (
@@ -144,7 +145,8 @@ class Swing:
         )
         free = int(_PER_PERIOD * rung.periods) * 3 if rung else None
         return Deviation(quantity_of(self.names[j]), mine / span, "1", self.sd / span,
-                         float(self.shared[j]) / span, words, freedom=free, scale=1.0)  # fmt: skip
+                         float(self.shared[j]) / span, words, freedom=free, scale=1.0,
+                         t=self.t[self.compared][seen], axes=tuple("xyz"))  # fmt: skip
 
     def _ringing(self, seen: Ringing | None, shown: Ringing | None) -> tuple[Deviation, ...]:
         if seen is None or shown is None:

@@ -118,6 +118,22 @@ def test_a_signals_deviation_is_the_trace_less_what_was_measured() -> None:
     assert late.values.tolist() == [[1.0], [1.0]]
 
 
+def test_values_at_several_instants_have_their_times_and_components_their_names() -> None:
+    """A hold is one instant, whose load is its condition: its values have no times."""
+    hold, two = Selection("1s", np.array([1.0])), Selection("late", np.array([1.0, 2.0]))
+    for selection, t in ((hold, None), (two, [1.0, 2.0]), (EVERYTHING, [0.0, 1.0, 2.0])):
+        (force,) = signal().deviations(HALVES, selection)
+        (a,) = markers().deviations(still("a"), selection)
+        assert [None if d.t is None else d.t.tolist() for d in (force, a)] == [t, t]
+        assert (force.axes, a.axes) == ((), ("x", "y", "z"))
+    seen = markers(Together("across", (1, 2), "along y and z"))
+    assert seen.deviations(still(), hold)[0].t is None
+    (every,) = seen.deviations(still(), EVERYTHING)
+    assert every.t is not None
+    assert every.t.tolist() == [0.0, 0.0, 1.0, 1.0, 2.0]  # the second is lost at the end
+    assert every.axes == ("y", "z")
+
+
 def test_a_signal_without_a_trace_says_what_was_not_answered() -> None:
     other = signal(trace="nowhere")
     assert other.deviations(HALVES, EVERYTHING) == ()

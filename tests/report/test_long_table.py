@@ -11,9 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from report_samples import small_result
 
+from validate.compare.residual import Residual
 from validate.compare.row import POINT, LongRow
 from validate.compare.score import Score
-from validate.errors import RecordingError, UsageError
+from validate.errors import ComparisonError, RecordingError, UsageError
 from validate.report import open_store
 from validate.report.export import parquet
 from validate.report.export.parquet import column_types
@@ -92,6 +93,23 @@ def test_a_run_is_read_back_with_its_points(form: str, tmp_path: Path) -> None:
             assert {(r.sd, r.unit, r.role) for r in points.rows} == {
                 (residual.sd, residual.unit, residual.role)
             }
+
+
+def test_points_over_time_have_their_times_and_axes() -> None:
+    """Those of a hold keep its load, and components without a name their number."""
+    values = np.array([[1.0, 2.0], [3.0, 4.0]])
+    over_time = Residual("tip", "all", values, 0.0, 0.0, "m", "", t=np.array([0.5, 0.7]),
+                         axes=("x", "z"))  # fmt: skip
+    at_hold = Residual("tip", "2s", values, 0.0, 0.0, "m", "")
+    both = {r.name: r for r in (over_time, at_hold)}
+    content = {"experiment": "one", "methods": [{"name": "fem"}]}
+    rows = long_table(content, "one", {"fem": both}).where(part=POINT).rows
+    assert [(r.at, r.axis, r.value) for r in rows] == [
+        (0.5, "x", 1.0), (0.5, "z", 2.0), (0.7, "x", 3.0), (0.7, "z", 4.0),
+        (2.0, "1", 1.0), (2.0, "2", 2.0), (2.0, "1", 3.0), (2.0, "2", 4.0),
+    ]  # fmt: skip
+    with pytest.raises(ComparisonError, match=r"tip@all: \(3,\) times of 2 values"):
+        replace(over_time, t=np.zeros(3))
 
 
 def test_names_units_and_answers_are_columns() -> None:

@@ -30,7 +30,8 @@ class Residual:
     `systematic` the part that all points share (registration), per component. `simulated` and
     `measured` are kept for scalar quantities. `role` says whether the observation validates.
     `freedom` counts the numbers in which noise is independent; None: all of them. `scale` is the
-    largest that was measured of what has a zero, `reference` (k, c) what was measured of it.
+    largest that was measured of what has a zero, `reference` (k, c) what was measured of it. `t`
+    (k,) s are the times of the values where there are several; `axes` names the components.
     """
 
     quantity: str
@@ -46,13 +47,19 @@ class Residual:
     freedom: int | None = None
     scale: float | None = None
     reference: Floats | None = None
+    t: Floats | None = None
+    axes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         values = checked(self.values, f"residual {self.name}", (None, None), error=ComparisonError)
         if values.size == 0:
             raise ComparisonError(f"{self.name}: 0 matched points, nothing was compared")
+        if self.t is not None and self.t.shape != (len(values),):
+            raise ComparisonError(
+                f"{self.name}: {self.t.shape} times of {len(values)} values; expected one for each"
+            )
         # In one order: sums of a stored residual are those of a fresh one, digit by digit.
-        for name, array in (("values", values), ("reference", self.reference)):
+        for name, array in (("values", values), ("reference", self.reference), ("t", self.t)):
             if array is not None:
                 own = np.array(array, order="C")
                 own.setflags(write=False)
@@ -125,9 +132,11 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
             values = np.vstack([other.values, residual.values])
             freedom = _joined_freedom(other, residual)
             truths = [r.reference for r in (other, residual) if r.reference is not None]
+            times = [r.t for r in (other, residual) if r.t is not None]
             residual = replace(
                 residual, values=values, simulated=None, measured=None, freedom=freedom,
                 reference=np.vstack(truths) if len(truths) == 2 else None,
+                t=np.concatenate(times) if len(times) == 2 else None,
             )  # fmt: skip
         merged[residual.name] = residual
     return merged
@@ -143,7 +152,7 @@ def _joined_freedom(one: Residual, other: Residual) -> int | None:
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
     return Residual(
         d.quantity, selection.label, d.values, d.sd, d.systematic, d.unit, d.definition,
-        d.simulated, d.measured, role, d.freedom, d.scale, d.reference,
+        d.simulated, d.measured, role, d.freedom, d.scale, d.reference, d.t, d.axes,
     )  # fmt: skip
 
 
@@ -153,8 +162,12 @@ def _volumes(run: Run, selection: Selection) -> list[Deviation]:
     for name, trace in run.traces.items():
         if name.endswith(".volume_ratio"):
             ratio = selection.read(run.t, trace.y, run.t)
-            one = (float(ratio[0]), 1.0) if len(ratio) == 1 else (None, None)
-            words = "cavity volume over its rest volume minus one; reference: incompressible fluid"
-            values = (ratio - 1)[:, None]
-            found.append(Deviation("volume.relative_error", values, "1", 0.0, 0.0, words, *one))
+            d = Deviation(
+                "volume.relative_error", (ratio - 1)[:, None], "1", 0.0, 0.0,
+                "cavity volume over its rest volume minus one; reference: incompressible fluid",
+            )  # fmt: skip
+            if len(ratio) == 1:
+                found.append(replace(d, simulated=float(ratio[0]), measured=1.0))
+            else:
+                found.append(replace(d, t=run.t if selection.t is None else selection.t))
     return found

@@ -98,7 +98,8 @@ class Deviation:
     `systematic` what all points share (registration), per component. `freedom` counts the numbers
     in which noise is independent (None: all). `scale` is the largest that was measured of what has
     a zero, in `unit`, and `reference` (k, c) what was measured of it; of places, from the middle of
-    them. `simulated` and `measured` are kept of scalars.
+    them. `simulated` and `measured` are kept of scalars. `t` (k,) s are the times of the values
+    where there are several. `axes` names the components where they have names.
     """
 
     quantity: str
@@ -112,6 +113,8 @@ class Deviation:
     freedom: int | None = None
     scale: float | None = None
     reference: Floats | None = None
+    t: Floats | None = None
+    axes: tuple[str, ...] = ()
 
 
 class Observation(Protocol):

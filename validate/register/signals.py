@@ -69,7 +69,7 @@ class SignalObservation:
         scale, common = float(np.abs(self.y[:, 0]).max()), self.share * rms(measured[:, None])
         found = Deviation(
             self.quantity, off, self.unit, self.sd, common, words, one[0], one[1], scale=scale,
-            reference=measured[:, None],
+            reference=measured[:, None], t=self.t[at] if len(at) > 1 else None,
         )  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         if sd_t > 0:

@@ -78,6 +78,7 @@ class StressObservation:
             Deviation(
                 self.quantity, off.reshape(-1, 1), "1", self.sd, self.shared, words, scale=1.0,
                 reference=(self.y[at] / self.scale[at][:, None]).reshape(-1, 1),
+                t=np.repeat(self.t[at], off.shape[1]),
             ),
         )  # fmt: skip
 

@@ -267,10 +267,13 @@ def _points(one: LongRow, residual: Residual) -> Iterator[LongRow]:
         unit=residual.unit, kind=kind_of(residual.quantity, residual.unit),
         sd=float(residual.sd) if math.isfinite(residual.sd) else None, role=residual.role,
     )  # fmt: skip
-    axes = [row._replace(axis=str(i)) for i in range(1, residual.values.shape[1] + 1)]
-    for point, values in enumerate(residual.values.tolist()):
+    count = residual.values.shape[1]
+    names = residual.axes or [str(i) for i in range(1, count + 1)]
+    axes = [row._replace(axis=name) for name in names]
+    times = [row.at] * residual.count if residual.t is None else residual.t.tolist()
+    for point, (at, values) in enumerate(zip(times, residual.values.tolist(), strict=True)):
         for of, value in zip(axes, values, strict=True):
-            yield of._replace(point=point, value=value)
+            yield of._replace(point=point, at=at, value=value)
 
 
 # --- results.json from the rows -------------------------------------------------------------------

@@ -46,6 +46,7 @@ class DisplacementObservation:
                 f"displacement along {_AXES[c]} of the particles",
                 scale=float(np.ptp(self.u[:, c])),
                 reference=self.u[:, [c]],
+                axes=(_AXES[c],),
             )
             for c, quantity in enumerate(self.units)
         )  # fmt: skip

@@ -209,6 +209,7 @@ class MarkerObservation:
         off = (shown - x).reshape(-1, self.x.shape[2])
         kept = np.isfinite(off).all(axis=1)
         off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
+        t = np.repeat(np.asarray(selection.t), self.x.shape[1])[kept]
         tre = rms(self.tre) / float(np.sqrt(3))
         found = (
             Deviation(
@@ -216,6 +217,8 @@ class MarkerObservation:
                 float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
                 scale=_largest((self.x - self.rest)[..., list(g.axes)]),
                 reference=moved[:, list(g.axes)],
+                t=t if len(samples) > 1 else None,
+                axes=tuple(_AXES[a] for a in g.axes),
             )
             for g in self.together
         )  # fmt: skip
@@ -254,7 +257,8 @@ class MarkerObservation:
         # The tre is a length over three axes, the systematic part is per axis.
         tre, sd = float(self.tre[j] / np.sqrt(3)), self.along(range(len(axes)))
         found = Deviation(name, off, "m", sd, tre, words, scale=_largest(moved),
-                          reference=moved[samples][seen])  # fmt: skip
+                          reference=moved[samples][seen],
+                          t=t[seen] if len(t) > 1 else None, axes=tuple(axes))  # fmt: skip
         sd_t = float(np.hypot(self.sd_t, selection.sd_t))
         return with_clock(found, sd_t, self._speed(j, samples, sd_t)) if sd_t > 0 else found
 

@@ -164,7 +164,8 @@ class OutlineObservation:
             one = self._between(start, (self.simulated(u), self.measured(float(t))), float(t))
             late = float(self.t[nearest_sample(self.t, float(t), self.name)] - t)
             off = float(np.hypot(sd_t, late)) if abs(late) > SAME else sd_t
-            found += self._on_clock(one, float(t), off) if off > 0 else one
+            one = self._on_clock(one, float(t), off) if off > 0 else one
+            found += [replace(d, t=np.full(len(d.values), t)) for d in one]
         return _stacked(found)
 
     def _between(
@@ -270,7 +271,7 @@ def _stacked(found: list[Deviation]) -> tuple[Deviation, ...]:
     """One deviation a quantity, over all instants; a scalar keeps its two values only alone."""
     quantities = dict.fromkeys(d.quantity for d in found)
     groups = [[d for d in found if d.quantity == q] for q in quantities]
-    return tuple(g[0] if len(g) == 1 else merged(g) for g in groups)
+    return tuple(replace(g[0], t=None) if len(g) == 1 else merged(g) for g in groups)
 
 
 def merged(group: list[Deviation]) -> Deviation:
@@ -281,9 +282,11 @@ def merged(group: list[Deviation]) -> Deviation:
     freedom = None if first.freedom is None else sum(d.freedom or 0 for d in group)
     truths = [d.reference for d in group if d.reference is not None]
     reference = np.vstack(truths) if len(truths) == len(group) else None
+    times = [d.t for d in group if d.t is not None]
     return Deviation(
         first.quantity, values, first.unit, rms([d.sd for d in group]), systematic,
         first.definition, freedom=freedom, reference=reference,
+        t=np.concatenate(times) if len(times) == len(group) else None,
     )  # fmt: skip
 
 

@@ -100,6 +100,7 @@ class RoundOutlines:
             measured=float(seen[0]) if one else None,
             scale=float(seen.max()),
             reference=seen[:, None],
+            t=None if one else self.t[at],
         )
         return (found,)
 

@@ -234,7 +234,7 @@ class TouchedLandmarks:
         about = d.places[at] - d.places.mean(axis=0)
         return (
             Deviation(self.name, off, "m", rms(d.expected), 0.0, words, freedom=freedom,
-                      reference=about),
+                      reference=about, t=self.t[at], axes=tuple("xyz")),
         )  # fmt: skip
 
     def left(self, run: Simulated) -> Floats:
