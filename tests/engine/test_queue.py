@@ -73,7 +73,9 @@ def test_what_stops_the_workers_is_raised_and_finished_cells_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(self: Pool, most: int | None = None) -> None:
+        end = time.monotonic() + 60
         while not (tmp_path / "runs").exists():
+            assert time.monotonic() < end, "no cell ran in 60 s"
             time.sleep(0.01)
         raise OSError("no more processes")
 

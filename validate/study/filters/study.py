@@ -20,8 +20,9 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.named_run import study_folder
 from validate.study.filters.bench import open_bench
 from validate.study.filters.blocks import score_difference
-from validate.study.filters.cell import run_cell, with_likelihoods
+from validate.study.filters.cell import run_cell
 from validate.study.filters.plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
+from validate.study.filters.predictive import with_likelihoods
 from validate.study.filters.ranking import Ranked, Ranking, TruthPick, picks, rankings, tied
 from validate.study.filters.score import AHEAD, HELD_OUT, POOLED, WITHHELD, FilterScores
 from validate.study.sweep import axes
