@@ -12,6 +12,7 @@ from command_line import refused
 from validate.catalogue import experiment_files, shipped
 from validate.compare.verdict import Accept
 from validate.errors import UsageError
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.parameters import describe
 from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.bodies.measured import solid
@@ -77,6 +78,14 @@ def test_a_declaration_without_code_is_its_json_alone(tmp_path: Path) -> None:
     assert to_json(found) == text  # what the library adds is no part of it
     line = refused("run", str(tmp_path / "body.json"), cwd=tmp_path)
     assert "none.mcap" in line
+
+
+def test_a_declaration_with_a_former_class_name_is_read(tmp_path: Path) -> None:
+    document = json.loads(to_json(body()))
+    method = document["experiment"]["methods"]["items"]["linear"]
+    method["settings"] = {"type": "FilterpyGuest", "modes": 3}
+    (tmp_path / "body.json").write_text(json.dumps(document), "utf-8")
+    assert load_file(tmp_path / "body.json").methods["linear"].settings == FilterpyFilter(modes=3)
 
 
 @pytest.mark.parametrize(
