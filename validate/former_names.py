@@ -91,6 +91,11 @@ FORMER = {
 FORMER_MEMBERS: Mapping[str, Mapping[str, str]] = {
     "estimate": {"FilterpyGuest": "FilterpyFilter"},
     "estimate.filterpy.filters": {"FilterpyGuest": "FilterpyFilter"},
+    "solve.external.answer": {"GuestAnswer": "ExternalAnswer"},
+    "solve.external.job": {"GuestJob": "ExternalJob"},
+    "solve.external.let_go": {"GuestLetGo": "ExternalLetGo"},
+    "solve.external.scheme": {"Guest": "ExternalSimulator"},
+    "solve.external.suite": {"check_guest": "check_simulator"},
 }
 
 

@@ -92,7 +92,10 @@ def test_a_declaration_with_a_former_class_name_is_read(tmp_path: Path) -> None:
     ("changed", "says"),
     [
         ({"type": "Popen", "args": "rm"}, "type 'Popen' is no part of a declaration"),
-        ({"type": "Guest", "command": "rm x"}, "parameters: 'Guest' runs a program"),
+        *(
+            ({"type": name, "command": "rm x"}, "parameters: 'ExternalSimulator' runs a program")
+            for name in ("ExternalSimulator", "Guest")
+        ),
         ({"code": "twin.record"}, "parameters: is code, which a JSON file does not hold"),
         ({"type": "MeasuredBody", "bodies": 1}, "parameters: 'bodies' is no field of MeasuredBody"),
         ({"like": "parameters"}, "is code"),

@@ -101,7 +101,7 @@ _MODULES = (
     "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.sheet",
     "scene.tool", "scene.tracked", "solve.schemes",
 )  # fmt: skip
-_RUNS_PROGRAMS = ("Guest", "GuestLetGo")  # settings whose command would be a stranger's
+_RUNS_PROGRAMS = ("ExternalSimulator", "ExternalLetGo")  # settings with a command to run
 
 
 # --- to JSON --------------------------------------------------------------------------------------
