@@ -1,4 +1,4 @@
-"""Old imports of public modules work for one version, with a warning that names the new one."""
+"""Former names of modules, classes and functions work for one version, with a warning."""
 
 import sys
 import warnings
@@ -6,7 +6,7 @@ from importlib import import_module
 
 import pytest
 
-from validate.former_names import FORMER
+from validate.former_names import FORMER, FORMER_MEMBERS, new_name
 
 
 @pytest.mark.parametrize("former", sorted(FORMER))
@@ -28,3 +28,27 @@ def test_a_former_name_is_the_module_of_today(former: str) -> None:
 def test_a_name_that_never_was_is_not_found() -> None:
     with pytest.raises(ModuleNotFoundError):
         import_module("validate.nowhere")
+
+
+@pytest.mark.parametrize(
+    ("module", "former"), [(m, name) for m, names in FORMER_MEMBERS.items() for name in names]
+)
+def test_a_former_class_is_the_class_of_today(module: str, former: str) -> None:
+    found, now = import_module(f"validate.{module}"), FORMER_MEMBERS[module][former]
+    with pytest.warns(
+        DeprecationWarning, match=rf"validate\.{module}\.{former} is called {now} now"
+    ):
+        assert getattr(found, former) is getattr(found, now)
+    assert former not in vars(found)
+    assert former not in dir(found)
+    assert new_name(former) == now
+    assert new_name(now) == now
+
+
+def test_a_module_with_former_names_has_no_other_attribute() -> None:
+    for module in FORMER_MEMBERS:
+        found = import_module(f"validate.{module}")
+        with pytest.raises(
+            AttributeError, match=rf"validate\.{module}' has no attribute 'no_such_name'"
+        ):
+            _ = found.no_such_name

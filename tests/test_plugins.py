@@ -27,7 +27,7 @@ from validate.scene.material import Material
 from validate.solve import schemes
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.central import CentralDifference
-from validate.solve.external.program import SIMULATORS, words
+from validate.solve.external.program import SIMULATORS, simulator_of, words
 from validate.solve.static.newton import StaticNewton
 from validate.solve.stepping import Stepping
 from validate.testing import refusal
@@ -404,13 +404,24 @@ def test_a_script_adds_a_part_once() -> None:
 
 
 def test_an_external_simulator_has_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`--guest felupe`; a program of that name on the path is taken first."""
+    """`--external felupe`; a program of that name on the path is taken first."""
     monkeypatch.setenv("PATH", str(tmp_path))
     for simulator in SIMULATORS.own:
         assert words(simulator.name) == words(simulator.command)
         assert Path(words(simulator.name)[1]).is_file()
     with pytest.raises(UsageError, match="there is no program 'felup'"):
         words("felup")
+
+
+def test_the_former_path_of_a_shipped_script_is_found() -> None:
+    for simulator in SIMULATORS.own:
+        former = f"python benchmarks/guests/{simulator.name}_guest.py"
+        with pytest.warns(DeprecationWarning, match=f"{simulator.name}_simulator.py now"):
+            assert words(former) == words(simulator.command)
+        assert simulator_of(former) is simulator
+    assert words("python benchmarks/guests/other_guest.py")[1:] == (
+        "benchmarks/guests/other_guest.py",
+    )
 
 
 def test_a_scheme_that_fails_where_all_are_asked_is_passed_over(

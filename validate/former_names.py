@@ -1,10 +1,13 @@
-"""Public modules by their former names, for one version: an old import works, with a warning."""
+"""Former names of public modules, classes and functions: old imports work for one version.
+
+An import by a former name gives a `DeprecationWarning` with the new name.
+"""
 
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
 
 FORMER = {
@@ -84,19 +87,45 @@ FORMER = {
 }
 
 
+#: Names in a module: the former name and the new one.
+FORMER_MEMBERS: Mapping[str, Mapping[str, str]] = {
+    "estimate": {"FilterpyGuest": "FilterpyFilter"},
+    "estimate.filterpy.filters": {"FilterpyGuest": "FilterpyFilter"},
+    "solve.external.answer": {"GuestAnswer": "ExternalAnswer"},
+    "solve.external.job": {"GuestJob": "ExternalJob"},
+    "solve.external.let_go": {"GuestLetGo": "ExternalLetGo"},
+    "solve.external.scheme": {"Guest": "ExternalSimulator"},
+    "solve.external.suite": {"check_guest": "check_simulator"},
+}
+
+
+def new_name(member: str) -> str:
+    """Return the name that a class or function has now; a name that is no former one is kept."""
+    for names in FORMER_MEMBERS.values():
+        if member in names:
+            return names[member]
+    return member
+
+
 class FormerNames:
-    """Finds a module of `FORMER` as the one that it became."""
+    """Import hook: finds a module by its former name, and former names in a module."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """A spec for a former name; None for every other."""
-        if name.removeprefix("validate.") not in FORMER:
+        """Return a spec for a former name and for a module with former members, else None."""
+        short = name.removeprefix("validate.")
+        if short in FORMER:
+            return ModuleSpec(name, self)  # type: ignore[arg-type]
+        if not name.startswith("validate.") or short not in FORMER_MEMBERS:
             return None
-        return ModuleSpec(name, self)  # type: ignore[arg-type]
+        spec = PathFinder.find_spec(name, path)
+        if spec is not None and isinstance(spec.loader, SourceFileLoader):
+            spec.loader = _WithFormerMembers(spec.loader.name, str(spec.loader.path))
+        return spec
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """The module of today; warns with both names."""
+        """Return the module by its new name; warns with both names."""
         now = f"validate.{FORMER[spec.name.removeprefix('validate.')]}"
         warnings.warn(f"{spec.name} is called {now} now", DeprecationWarning, stacklevel=2)
         module = import_module(now)
@@ -104,12 +133,40 @@ class FormerNames:
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Gives the module its own spec back, which the import of a former name replaced."""
+        """Give the module its own spec back, which the import of a former name replaced."""
         if module.__spec__ is not None:
             module.__spec__ = module.__spec__.loader_state
 
 
+class _WithFormerMembers(SourceFileLoader):
+    """Loader of a module whose former names are attributes, too (PEP 562)."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        super().exec_module(module)
+        others = vars(module).get("__getattr__")
+        vars(module)["__getattr__"] = _former_members(module, others)
+
+
+def _former_members(
+    module: ModuleType, others: Callable[[str], object] | None
+) -> Callable[[str], object]:
+    """Return a module's `__getattr__`; `others` is the one that the module itself has."""
+    former = FORMER_MEMBERS[module.__name__.removeprefix("validate.")]
+
+    def load(name: str) -> object:
+        if name in former:
+            now = former[name]
+            text = f"{module.__name__}.{name} is called {now} now"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            return getattr(module, now)
+        if others is not None:
+            return others(name)
+        raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}")
+
+    return load
+
+
 def install() -> None:
-    """Let old imports work from now on."""
+    """Install the import hook, once."""
     if not any(isinstance(finder, FormerNames) for finder in sys.meta_path):
         sys.meta_path.insert(0, FormerNames())  # folders of today may have a former name

@@ -17,7 +17,7 @@ from validate.pipeline.plates.choices import stated_sizes
 from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.tabulated import Tabulated
@@ -32,9 +32,9 @@ from .modulus import identified
 from .published import PUBLISHED, follows
 from .specimens import specimen_of
 
-FELUPE = "python benchmarks/guests/felupe_guest.py"
-CALCULIX = "python benchmarks/guests/calculix_guest.py"
-MUJOCO = "python benchmarks/guests/mujoco_guest.py"
+FELUPE = "python benchmarks/external/felupe_simulator.py"
+CALCULIX = "python benchmarks/external/calculix_simulator.py"
+MUJOCO = "python benchmarks/external/mujoco_simulator.py"
 TABLE = Tabulated(StaticNewton("none"), 0.0015)
 BONDED = {"supports": (Support("lower_plate"), Support("upper_plate", (0, 1)))}
 E_SLIP, E_BONDED = ({"material.E": f"as material.E_{plates}"} for plates in ("slip", "bonded"))
@@ -57,11 +57,11 @@ METHODS: Mapping[str, Method] = {
                          {**NEO, **HELD, "material.E": "as material.E_neo_bonded"}),
     "svk_bonded": Method("SVK, bonded plates", TABLE, {**SVK, **HELD, **E_BONDED}),
     "felupe": Method("FElupe, quadratic tetrahedra, 125 nodes, neo-Hooke, slipping plates",
-                     Guest(FELUPE, levels=10), NEO),
+                     ExternalSimulator(FELUPE, levels=10), NEO),
     "calculix": Method("CalculiX, quadratic tetrahedra, 729 nodes, linear, slipping plates",
-                       Guest(CALCULIX, levels=5), {**E_SLIP, "body.cells": (4, 4)}),
+                       ExternalSimulator(CALCULIX, levels=5), {**E_SLIP, "body.cells": (4, 4)}),
     "mujoco": Method("MuJoCo, linear tetrahedra, 27 nodes, SVK, slipping plates",
-                     Guest(MUJOCO, levels=10), {**SVK, **LINEAR_CELLS}),
+                     ExternalSimulator(MUJOCO, levels=10), {**SVK, **LINEAR_CELLS}),
 }  # fmt: skip
 MODULI = tuple(p.path for p in describe(SiliconeModuli(), "material."))
 

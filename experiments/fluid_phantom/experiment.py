@@ -22,7 +22,7 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.plates.inclusion import MESHES
 from validate.recording.types import Recording
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
 
@@ -36,7 +36,7 @@ from .scene import SCENE
 BONDED = {"foundations.plates.contact": "bonded"}
 MEAN_DILATATION = {"dilatation": "nodal_mean"}
 P2 = {"body.element": "quadratic"}
-FELUPE = "python benchmarks/guests/felupe_guest.py"
+FELUPE = "python benchmarks/external/felupe_simulator.py"
 METHODS: Mapping[str, Method] = {
     "p1_fluid": Method("P1 with fluid", ExactPressure()),
     "p1_loop": Method("P1 with fluid, the paper's loop", PressureLoop()),
@@ -44,7 +44,7 @@ METHODS: Mapping[str, Method] = {
     "p1_bonded": Method("P1 with fluid, bonded plates", ExactPressure(), BONDED),
     "md_fluid": Method("P1 mean dilatation with fluid", ExactPressure(), MEAN_DILATATION),
     "p2_fluid": Method("P2 with fluid", ExactPressure(), P2),
-    "felupe": Method("FElupe, P2", Guest(FELUPE), P2),  # a job carries no cavity
+    "felupe": Method("FElupe, P2", ExternalSimulator(FELUPE), P2),  # a job carries no cavity
 }
 
 

@@ -1,8 +1,8 @@
-"""A soft bar that hangs under its weight, in our own solver and in those of others.
+"""Soft bar that hangs under its weight: solvers of the package and external simulators.
 
-Seven solvers were printed for it, from 43 to 159 mm; the converged answer stands beside them. The
-reference is what another code (dolfinx) tends to: a computation, no experiment. Another program is
-judged by `validate run hanging_bar --guest "python my_guest.py"`.
+Seven solvers have published results, from 43 to 159 mm. The reference is the limit of another code
+(dolfinx): a computation, no experiment. Test another simulator by `validate run hanging_bar
+--external "python my_simulator.py"`.
 """
 
 from validate.compare.verdict import Accept
@@ -13,7 +13,7 @@ from validate.scene.geometries.specification import Box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support, Weight
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.static.newton import StaticNewton
 
 from .published import PUBLISHED, tell
@@ -22,9 +22,9 @@ from .study import trial
 
 SIZE = ("0.6 m", "0.6 m", "1.6 m")  # held at its top
 STATIC = StaticNewton("none")
-FELUPE = Guest("python benchmarks/guests/felupe_guest.py")
-CALCULIX = Guest("python benchmarks/guests/calculix_guest.py")
-MUJOCO = Guest("python benchmarks/guests/mujoco_guest.py")
+FELUPE = ExternalSimulator("python benchmarks/external/felupe_simulator.py")
+CALCULIX = ExternalSimulator("python benchmarks/external/calculix_simulator.py")
+MUJOCO = ExternalSimulator("python benchmarks/external/mujoco_simulator.py")
 THEIRS = {"body": tetrahedra}
 WHOLE = {"body": Box(SIZE, cells=(9, 9, 24), element="hex8")}
 

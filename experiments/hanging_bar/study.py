@@ -1,4 +1,4 @@
-"""How the hanging bar enters `validate study tradeoff`: cells that a guest is given, too."""
+"""Hanging bar in `validate study tradeoff`, with cells that a job of an external simulator has."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -10,7 +10,7 @@ from typing import Any
 from validate.compare.verdict import Accept
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
-from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
@@ -69,7 +69,7 @@ METHODS = {
                          Roukf(parameters=("stiffness", "load.pull")), markers=A),
     "enkf": Method("ensemble filter of the stiffness, 10 runs, inflated by 1 %",
                    EnsembleKf(inflation=1.01), markers=A, chosen="inflation chosen on this twin"),
-    "filterpy": Method("filterpy's KalmanFilter, 5 modes", FilterpyGuest(), markers=A,
+    "filterpy": Method("filterpy's KalmanFilter, 5 modes", FilterpyFilter(), markers=A,
                        chosen=WALK_UNRECORDED),
 }  # fmt: skip
 RIVALS = ("fem", "kf_printed", "kf_load", "load_scale", "kf_reduced")

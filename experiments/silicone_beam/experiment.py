@@ -20,8 +20,8 @@ from validate.scene.material import Material
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
 from validate.solve.dynamic.let_go import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
-from validate.solve.external.let_go import GuestLetGo
-from validate.solve.external.scheme import Guest
+from validate.solve.external.let_go import ExternalLetGo
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.static.newton import StaticNewton
 
 from .beam import build, heeded, place, sets
@@ -33,7 +33,7 @@ from .swing import DAMPING, FREQUENCY, LABEL, quantity_of
 from .variations import edge, finer, gravity_alone, heavier, higher, sooner
 
 FELUPE, CALCULIX, MUJOCO = (
-    f"python benchmarks/guests/{name}_guest.py" for name in ("felupe", "calculix", "mujoco")
+    f"python benchmarks/external/{name}_simulator.py" for name in ("felupe", "calculix", "mujoco")
 )
 STATIC = StaticNewton("none")
 BETA = 0.0023  # s: 2 x .055 over 2 pi 7.7 Hz, of the linear models
@@ -62,13 +62,13 @@ METHODS = {
     "roukf": Method("unscented filter of the modulus, linear, given Tip - 1 to .2 mm",
                     Roukf(R=4e-8), LINEAR, markers=ONE, chosen="R, as for the filter of the load"),
     "felupe": Method("FElupe, rest position only, linear hexahedra of three fields",
-                     Guest(FELUPE), COARSE),
-    "calculix": Method("CalculiX, linear hexahedra of incompatible modes", GuestLetGo(CALCULIX),
+                     ExternalSimulator(FELUPE), COARSE),
+    "calculix": Method("CalculiX, linear hexahedra of incompatible modes", ExternalLetGo(CALCULIX),
                        {**BRICKS, **DAMPED, "body.cells": (8, 2, 2)}),
     "mujoco": Method("MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff",
-                     GuestLetGo(MUJOCO), CUT),
+                     ExternalLetGo(MUJOCO), CUT),
     "mujoco_45": Method("MuJoCo, linear tetrahedra, 176 nodes, St. Venant-Kirchhoff, nu .45",
-                        GuestLetGo(MUJOCO), {**CUT, "material.nu": 0.45}),
+                        ExternalLetGo(MUJOCO), {**CUT, "material.nu": 0.45}),
 }  # fmt: skip
 SWUNG = tuple(f"{name}@{LABEL}" for name in (*map(quantity_of, TIPS), FREQUENCY, DAMPING))
 GRAVITY = "the recording under gravity alone"

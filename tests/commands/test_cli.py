@@ -31,7 +31,8 @@ from validate.commands import (
     digitise as known_places,
 )
 from validate.commands import (
-    external_check as guesting,
+    external_check,
+    tool_poses,
 )
 from validate.commands import main as cli
 from validate.commands import (
@@ -42,9 +43,6 @@ from validate.commands import (
 )
 from validate.commands import (
     study as studying,
-)
-from validate.commands import (
-    tool_poses,
 )
 from validate.commands.questions import body as new_body
 from validate.commands.questions import kinds as new_body_questions
@@ -452,13 +450,13 @@ def test_commands_without_what_they_need_report_it(
 ) -> None:
     (tmp_path / "kept").write_text("x")
     with pytest.raises(UsageError, match="this folder is not empty; name another"):
-        guesting.job("x", tmp_path, None, 2, (), inertia=False, force=False)
+        external_check.job("x", tmp_path, None, 2, (), inertia=False, force=False)
     experiment = SimpleNamespace(methods={"linear": None}, accepted=("linear",), twin=None)
-    for module in (guesting, making):
+    for module in (external_check, making):
         monkeypatch.setattr(module, "find", lambda *_: experiment)
-    monkeypatch.setattr(guesting, "own_body", lambda found: SimpleNamespace(experiment=found))
+    monkeypatch.setattr(external_check, "own_body", lambda found: SimpleNamespace(experiment=found))
     with pytest.raises(UsageError, match=r"no method 'lin'; .*linear"):
-        guesting.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
+        external_check.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
     with pytest.raises(
         UsageError, match="experiment 'x' has no synthetic recording, as its data are"
     ):

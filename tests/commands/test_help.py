@@ -20,10 +20,12 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.types import Recording, Signal, Source
 
-PAGES = dict(every_command(cli)) | {n: command_at(cli, n) for n in ("study", "guest")} | {"": cli}
+PAGES = (
+    dict(every_command(cli)) | {n: command_at(cli, n) for n in ("study", "external")} | {"": cli}
+)
 TIP = np.array([0.108, 0.008, 0.003])
 SLOW = ("study", "run", "check", "identify", "show", "compare", "history", "summary", "export",
-        "guest", "live", "data get")  # fmt: skip
+        "external", "live", "data get")  # fmt: skip
 FAILS = {"study coverage": 1, "identify": 1}  # ten draws decide nothing; one law is not identified
 
 
@@ -54,9 +56,9 @@ def test_a_help_page_has_few_words_and_an_example(name: str) -> None:
     ],
 )
 def test_the_example_of_a_help_page_runs(name: str, lab: Path, project_root: Path) -> None:
-    if name == "guest check":
-        guest = project_root / "benchmarks" / "guests" / "felupe_guest.py"
-        shutil.copy(guest, lab / "my_guest.py")
+    if name == "external check":
+        script = project_root / "benchmarks" / "external" / "felupe_simulator.py"
+        shutil.copy(script, lab / "my_simulator.py")
     if name == "summary":  # of measured recordings, and of whole runs only
         assert here("new", "pressed", "--from", "log.mcap", cwd=lab)[0] == 0
         assert here("run", "pressed", cwd=lab)[0] in (0, 1)

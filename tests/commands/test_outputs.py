@@ -59,7 +59,7 @@ def test_what_lies_beside_the_output_is_not_lost_either(tmp_path: Path) -> None:
 
 def test_a_job_s_folder_is_new_or_empty(tmp_path: Path) -> None:
     (tmp_path / "notes").touch()
-    line = refused("guest", "job", "hanging_bar", "-o", str(tmp_path))
+    line = refused("external", "job", "hanging_bar", "-o", str(tmp_path))
     assert "this folder is not empty; name another one, or write there with --force" in line
 
 

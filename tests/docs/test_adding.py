@@ -11,7 +11,7 @@ import pytest
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.march import run_scheme
 from validate.solve.static.quasi_static import QuasiStatic
 
@@ -28,17 +28,17 @@ def test_the_page_adds_each_of_the_six(project_root: Path) -> None:
         assert "assert " in section, thing
 
 
-def test_a_guest_takes_forty_lines(project_root: Path) -> None:
+def test_an_external_simulator_takes_forty_lines(project_root: Path) -> None:
     """And `test_every_example_runs` runs it, against our own statics."""
-    (block,) = (b for b in blocks(project_root) if b.startswith("GUEST"))
+    (block,) = (b for b in blocks(project_root) if b.startswith("SIMULATOR"))
     assert len(block.split('"""')[1].strip().splitlines()) <= 40
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ absent: no compiler of C++")
-def test_a_guest_in_another_language(project_root: Path, tmp_path: Path) -> None:
-    source = project_root / "benchmarks" / "guests" / "example_guest.cpp"
-    program = tmp_path / "my_guest"
+def test_an_external_simulator_in_another_language(project_root: Path, tmp_path: Path) -> None:
+    source = project_root / "benchmarks" / "external" / "example_simulator.cpp"
+    program = tmp_path / "my_simulator"
     subprocess.run(
         ["g++", "-O2", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-o", program, source],
         check=True,
@@ -50,12 +50,12 @@ def test_a_guest_in_another_language(project_root: Path, tmp_path: Path) -> None
         loads=(Load("pull", "z1", (0.0, 0.0, 1.0)), Load("push", "x1", (1.0, 0.0, 0.0))),
     )
     t, y = np.array([0.1, 0.2, 0.3]), np.array([[0.01, 0.0], [0.02, 0.01], [0.01, 0.03]])
-    found = Guest(str(program)).solve(scene, t, y)
+    found = ExternalSimulator(str(program)).solve(scene, t, y)
     own = run_scheme("own", QuasiStatic(), scene, t, y, np.arange(3))
     assert found.finished, found.outcome.why
-    assert found.said == ("guest: example in C++ 1",)  # nothing ignored, in balance
+    assert found.said == ("external: example in C++ 1",)  # nothing ignored, in balance
     assert np.abs(found.u - own.u).max() < 1e-10 * np.abs(own.u).max()
-    asleep = Guest(str(program), inertia=True).solve(scene, t, y)
+    asleep = ExternalSimulator(str(program), inertia=True).solve(scene, t, y)
     assert asleep.outcome.state == "refused"
 
 

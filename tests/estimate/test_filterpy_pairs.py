@@ -1,4 +1,4 @@
-"""filterpy as oracle and as guest: exact pairs, shape checks in front."""
+"""filterpy as oracle and as method: equal results, and checks of array shapes."""
 
 import copy
 from collections.abc import Callable
@@ -11,8 +11,8 @@ import pytest
 from validate.errors import ComparisonError
 from validate.estimate.filterpy import oracle as filterpy_oracle
 from validate.estimate.filterpy.filters import (
-    GUESTS,
-    FilterpyGuest,
+    FILTERPY_FILTERS,
+    FilterpyFilter,
     ensemble,
     kalman,
     require_shapes,
@@ -42,7 +42,7 @@ def test_the_oracle_tells_the_largest_difference(
     monkeypatch: pytest.MonkeyPatch, pair: str
 ) -> None:
     apart = iter((1.0, 5.0, 3.0))
-    monkeypatch.setattr(filterpy_oracle, "_apart", lambda ours, guest: next(apart))
+    monkeypatch.setattr(filterpy_oracle, "_apart", lambda ours, theirs: next(apart))
     assert getattr(filterpy_oracle, pair)(3, np.random.default_rng(0)).largest == 5.0
 
 
@@ -50,35 +50,35 @@ def test_a_copy_of_an_ensemble_walks_alone() -> None:
     one = np.eye(1)
     model = LinearModel(0.5 * one, one, one, 0.1 * one, 0.1 * one, np.array([1.0]), one)
     with drawing(np.random.default_rng(0).multivariate_normal):
-        guest = ensemble(model)
-        before = guest.sigmas.copy()
-        other = copy.deepcopy(guest)
-        assert other.sigmas is not guest.sigmas
+        enkf = ensemble(model)
+        before = enkf.sigmas.copy()
+        other = copy.deepcopy(enkf)
+        assert other.sigmas is not enkf.sigmas
         assert np.array_equal(other.sigmas, before)
         other.predict(np.array([100.0]))
-        assert np.array_equal(guest.sigmas, before)
-        assert guest.loads == pytest.approx([0.0])
+        assert np.array_equal(enkf.sigmas, before)
+        assert enkf.loads == pytest.approx([0.0])
     assert other.sigmas.mean() == pytest.approx(100.0, abs=2.0)
 
 
-def test_a_guest_is_our_own_filter_to_rounding() -> None:
+def test_a_filterpy_filter_equals_the_internal_filter_to_rounding() -> None:
     pulled = case()
     seen = pulled.measured(1, every=2)
     ours = pulled.march(ReducedKf(modes=5, settled=0.0).prepare(pulled.system, seen))
     # The unscented one subtracts G S G^T from P and has no form that keeps its digits.
     for name, rounding in (("KalmanFilter", 1e-9), ("UnscentedKalmanFilter", 1e-3)):
-        run = pulled.march(FilterpyGuest(name).prepare(pulled.system, seen))
+        run = pulled.march(FilterpyFilter(name).prepare(pulled.system, seen))
         assert np.abs(run.u - ours.u).max() < rounding * np.abs(ours.u).max()
         assert run.sd is not None
         assert ours.sd is not None
         assert np.abs(run.sd - ours.sd).max() < rounding * ours.sd.max()
 
 
-def test_a_guest_that_draws_repeats_itself_and_leaves_the_generator_alone() -> None:
+def test_a_filterpy_filter_with_random_draws_repeats_and_restores_the_generator() -> None:
     pulled = case()
-    guest = FilterpyGuest("EnsembleKalmanFilter")
+    enkf = FilterpyFilter("EnsembleKalmanFilter")
     before = np.random.get_state()[1].copy()  # type: ignore[union-attr,index]  # noqa: NPY002
-    runs = [pulled.march(guest.prepare(pulled.system, pulled.measured(1))) for _ in range(2)]
+    runs = [pulled.march(enkf.prepare(pulled.system, pulled.measured(1))) for _ in range(2)]
     assert np.array_equal(runs[0].u, runs[1].u)
     assert np.array_equal(before, np.random.get_state()[1])  # type: ignore[index]  # noqa: NPY002
     assert pulled.nrmse(runs[0]) < 0.1
@@ -86,9 +86,9 @@ def test_a_guest_that_draws_repeats_itself_and_leaves_the_generator_alone() -> N
 
 def broken(name: str, value: Any) -> Callable[[LinearModel], Any]:
     def make(model: LinearModel) -> Any:
-        guest = kalman(model)
-        setattr(guest, name, value(model.size))
-        return guest
+        kf = kalman(model)
+        setattr(kf, name, value(model.size))
+        return kf
 
     return make
 
@@ -98,25 +98,29 @@ def broken(name: str, value: Any) -> Callable[[LinearModel], Any]:
     [
         ("x", lambda n: np.zeros((n, 1)), r"x: shape \(\d+, 1\), expected"),
         ("P", lambda n: np.eye(n - 1), r"P: shape .* expected"),
-        ("P", lambda n: np.triu(np.ones((n, n))), "guest P: differs from its transpose"),
+        (
+            "P",
+            lambda n: np.triu(np.ones((n, n))),
+            "KalmanFilter.P: differs from its transpose",
+        ),
         ("F", lambda n: np.eye(n + 1), r"F: shape .* expected"),
         ("R", lambda _: np.eye(2), r"R: shape \(2, 2\), expected \(3, 3\)"),
         ("H", lambda n: np.zeros((2, n)), r"H: shape .* expected"),
         ("Q", lambda n: np.full((n, n), np.nan), "Q: not finite"),
     ],
 )
-def test_a_guest_of_wrong_shape_is_refused(name: str, value: Any, says: str) -> None:
+def test_a_filterpy_filter_of_wrong_shape_is_refused(name: str, value: Any, says: str) -> None:
     pulled = case()
     with pytest.raises(ComparisonError, match=says):
-        FilterpyGuest(broken(name, value)).prepare(pulled.system, pulled.measured(1))
+        FilterpyFilter(broken(name, value)).prepare(pulled.system, pulled.measured(1))
 
 
-def test_unknown_guests_and_what_is_no_filter() -> None:
+def test_unknown_filterpy_filters_and_other_objects_are_refused() -> None:
     pulled = case()
-    with pytest.raises(ComparisonError, match=f"expected one of {', '.join(GUESTS)}"):
-        FilterpyGuest("Kalman").prepare(pulled.system, pulled.measured(1))
+    with pytest.raises(ComparisonError, match=f"expected one of {', '.join(FILTERPY_FILTERS)}"):
+        FilterpyFilter("Kalman").prepare(pulled.system, pulled.measured(1))
     with pytest.raises(ComparisonError, match=r"dict.x: shape None"):
-        FilterpyGuest(lambda _: {}).prepare(pulled.system, pulled.measured(1))
+        FilterpyFilter(lambda _: {}).prepare(pulled.system, pulled.measured(1))
 
 
 def test_models_are_checked_at_the_door() -> None:
@@ -149,8 +153,8 @@ def test_a_simulator_filter_without_a_method_of_a_filter_is_refused(name: str) -
     one = np.eye(1)
     model = SimpleNamespace(size=1, H=one)
     methods = {m: (lambda *_: None) for m in ("predict", "update") if m != name}
-    guest = SimpleNamespace(x=np.zeros(1), P=one, Q=one, R=one, F=one, H=one, **methods)
+    filter_ = SimpleNamespace(x=np.zeros(1), P=one, Q=one, R=one, F=one, H=one, **methods)
     with pytest.raises(
         ComparisonError, match=f"external filter SimpleNamespace has no `{name}`: not a fil"
     ):
-        require_shapes(guest, model)  # type: ignore[arg-type]
+        require_shapes(filter_, model)  # type: ignore[arg-type]

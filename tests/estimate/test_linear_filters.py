@@ -81,24 +81,24 @@ def test_the_printed_filter_is_filterpys(pulled: PulledCase, recursion: str) -> 
     seen, free = pulled.measured(4), pulled.system.free
     p = propagation(pulled.system, rule_of("average", DT))
     n = len(free)
-    guest = KalmanFilter(n, 3, n)
-    guest.x, guest.F, guest.B = np.zeros(n), p.transition(), np.eye(n)
-    guest.P, guest.Q, guest.R = 4e-9 * np.eye(n), 1e-9 * np.eye(n), SD**2 * np.eye(3)
-    guest.H = seen.free(free)
+    kf = KalmanFilter(n, 3, n)
+    kf.x, kf.F, kf.B = np.zeros(n), p.transition(), np.eye(n)
+    kf.P, kf.Q, kf.R = 4e-9 * np.eye(n), 1e-9 * np.eye(n), SD**2 * np.eye(3)
+    kf.H = seen.free(free)
     f = pulled.system.loads[free] @ pulled.inputs[0]
     v, a = np.zeros(n), np.linalg.solve(p.M.toarray(), f)
     J = p.J.toarray()
     for z in seen.z:
-        x = guest.x.copy()
-        guest.predict(u=np.linalg.solve(J, p.history(0 * v, v, a) + f))
-        prior = guest.x.copy()
-        guest.update(z)
-        v, a = p.rates(prior if recursion == "prior" else guest.x, x, v, a)
+        x = kf.x.copy()
+        kf.predict(u=np.linalg.solve(J, p.history(0 * v, v, a) + f))
+        prior = kf.x.copy()
+        kf.update(z)
+        v, a = p.rates(prior if recursion == "prior" else kf.x, x, v, a)
     settings = KfFem(gains="every_step", P0=4e-9, recursion=recursion)  # type: ignore[arg-type]
     run = pulled.march(settings.prepare(pulled.system, seen))
     assert run.sd is not None
-    assert run.u[-1].ravel()[free] == pytest.approx(guest.x, rel=1e-9, abs=1e-15)
-    assert run.sd[-1].ravel()[free] == pytest.approx(np.sqrt(np.diag(guest.P)), rel=1e-9)
+    assert run.u[-1].ravel()[free] == pytest.approx(kf.x, rel=1e-9, abs=1e-15)
+    assert run.sd[-1].ravel()[free] == pytest.approx(np.sqrt(np.diag(kf.P)), rel=1e-9)
 
 
 @pytest.mark.slow

@@ -88,16 +88,16 @@ def test_one_parameter_through_a_bent_sensor_is_filterpys_unscented_filter() -> 
     def h(x: Floats) -> Floats:
         return np.array([np.exp(-x[0]), np.sin(x[0])])
 
-    guest = UnscentedKalmanFilter(1, 2, 1.0, h, lambda x, _: x, _OnAxes())
-    guest.x, guest.P, guest.Q, guest.R = x.copy(), np.eye(1) * 0.2, np.zeros((1, 1)), R * np.eye(2)
+    ukf = UnscentedKalmanFilter(1, 2, 1.0, h, lambda x, _: x, _OnAxes())
+    ukf.x, ukf.P, ukf.Q, ukf.R = x.copy(), np.eye(1) * 0.2, np.zeros((1, 1)), R * np.eye(2)
     Z, rng = x + unit * np.sqrt(0.2), np.random.default_rng(1)
     for _ in range(20):
         z = h(np.array([0.7])) + 0.1 * rng.normal(size=2)
-        guest.predict()
-        guest.update(z)
+        ukf.predict()
+        ukf.update(z)
         Z = reduced_update(Z, np.array([h(r) for r in Z]), z, R * np.eye(2), unit).members
-        assert Z.mean() == pytest.approx(float(guest.x[0]), abs=1e-12)
-        assert (spread(Z, unit) ** 2)[0, 0] == pytest.approx(float(guest.P[0, 0]), rel=1e-10)
+        assert Z.mean() == pytest.approx(float(ukf.x[0]), abs=1e-12)
+        assert (spread(Z, unit) ** 2)[0, 0] == pytest.approx(float(ukf.P[0, 0]), rel=1e-10)
 
 
 # --- the ensemble ---------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.estimate.consistency import nees_consistency
 from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.estimate.filters import FILTERS, Filter
 from validate.estimate.kalman.covariance import Dense
 from validate.estimate.kalman.kf_fem import KfFem
@@ -35,7 +35,7 @@ LINEAR: tuple[Any, ...] = (
     ReducedKf(load_start=0.0, load_jitter=0.02),
     LoadScale(),
     LoadScale(walk=0.3, Q=1e-12),
-    FilterpyGuest(),
+    FilterpyFilter(),
 )
 
 
@@ -107,9 +107,9 @@ def test_it_is_filterpys() -> None:
     z = gappy(rng, 30, 2)
     notes, means, covariances = filtered(model, z)
     found = smoothed(model, notes)
-    guest = KalmanFilter(5, 2)
-    guest.F, guest.Q, guest.H, guest.R = model.A, model.Q, model.H, np.diag(model.R)
-    xs, Ps, _, _ = guest.rts_smoother(means, np.array(covariances))
+    kf = KalmanFilter(5, 2)
+    kf.F, kf.Q, kf.H, kf.R = model.A, model.Q, model.H, np.diag(model.R)
+    xs, Ps, _, _ = kf.rts_smoother(means, np.array(covariances))
     assert means + found.corrections == pytest.approx(xs, rel=1e-9, abs=1e-11)
     for k, P in enumerate(covariances):
         assert covariance_of(found, P, k + 1) == pytest.approx(Ps[k], rel=1e-8, abs=1e-10)
@@ -177,7 +177,7 @@ def test_every_linear_and_reduced_filter_smooths() -> None:
         "ReducedKf",
         "ReducedEKF",
         "LoadScale",
-        "FilterpyGuest",
+        "FilterpyFilter",
     }
 
 
@@ -314,22 +314,24 @@ def test_a_steady_gain_is_refused(pulled: PulledCase) -> None:
         ReducedKf(gains="steady", smooth=True).prepare(pulled.system, pulled.measured(1))
 
 
-def test_a_guest_is_smoothed_as_our_own_filter_and_another_is_refused(pulled: PulledCase) -> None:
+def test_only_the_linear_filterpy_filter_is_smoothed(
+    pulled: PulledCase,
+) -> None:
     seen = pulled.measured(1, every=3)
-    ours, guest = (
+    ours, theirs = (
         pulled.march(s.prepare(pulled.system, seen), at=FRAMES)
         for s in (
             ReducedKf(modes=5, load_start=0.1, load_walk=0.1, settled=0.0, smooth=True),
-            FilterpyGuest(smooth=True),
+            FilterpyFilter(smooth=True),
         )
     )
-    assert guest.u == pytest.approx(ours.u, rel=1e-6, abs=1e-11)
-    assert guest.sd == pytest.approx(ours.sd, rel=1e-4, abs=1e-12)
+    assert theirs.u == pytest.approx(ours.u, rel=1e-6, abs=1e-11)
+    assert theirs.sd == pytest.approx(ours.sd, rel=1e-4, abs=1e-12)
     for name in ("EnsembleKalmanFilter", "UnscentedKalmanFilter"):
         with pytest.raises(
             UsageError, match=f"gains of the model, which _?{name[:8]}.* does not have: take make="
         ):
-            FilterpyGuest(name, smooth=True).prepare(pulled.system, seen)
+            FilterpyFilter(name, smooth=True).prepare(pulled.system, seen)
 
 
 def test_a_load_scale_is_the_posterior_of_all_looks_through_a_load_that_changes() -> None:

@@ -12,6 +12,7 @@ from command_line import refused
 from validate.catalogue import experiment_files, shipped
 from validate.compare.verdict import Accept
 from validate.errors import UsageError
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.parameters import describe
 from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.bodies.measured import solid
@@ -79,11 +80,22 @@ def test_a_declaration_without_code_is_its_json_alone(tmp_path: Path) -> None:
     assert "none.mcap" in line
 
 
+def test_a_declaration_with_a_former_class_name_is_read(tmp_path: Path) -> None:
+    document = json.loads(to_json(body()))
+    method = document["experiment"]["methods"]["items"]["linear"]
+    method["settings"] = {"type": "FilterpyGuest", "modes": 3}
+    (tmp_path / "body.json").write_text(json.dumps(document), "utf-8")
+    assert load_file(tmp_path / "body.json").methods["linear"].settings == FilterpyFilter(modes=3)
+
+
 @pytest.mark.parametrize(
     ("changed", "says"),
     [
         ({"type": "Popen", "args": "rm"}, "type 'Popen' is no part of a declaration"),
-        ({"type": "Guest", "command": "rm x"}, "parameters: 'Guest' runs a program"),
+        *(
+            ({"type": name, "command": "rm x"}, "parameters: 'ExternalSimulator' runs a program")
+            for name in ("ExternalSimulator", "Guest")
+        ),
         ({"code": "twin.record"}, "parameters: is code, which a JSON file does not hold"),
         ({"type": "MeasuredBody", "bodies": 1}, "parameters: 'bodies' is no field of MeasuredBody"),
         ({"like": "parameters"}, "is code"),

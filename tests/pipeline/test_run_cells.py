@@ -15,7 +15,7 @@ import pytest
 from beside import experiment
 from command_line import here
 from study_samples import TEXT
-from test_guest_methods import FAKE
+from test_external_methods import FAKE
 
 from validate.catalogue import experiment_files, shipped
 from validate.engine import finish
@@ -208,9 +208,9 @@ def test_an_external_simulator_is_run_anew_once_it_changed(tmp_path: Path) -> No
     script, ran = place / "own.py", tmp_path / "ran"
     script.write_text(FAKE.replace("import json, sys", "import json, sys\nprint('ran')\nopen("
                       f"{str(ran)!r}, 'a').write('x')"), "utf-8")  # fmt: skip
-    out, guest = str(tmp_path / "out"), f"{sys.executable} {script}"
+    out, program = str(tmp_path / "out"), f"{sys.executable} {script}"
     command = ("run", "hanging_bar", "--quick", "--methods", "hexahedra", "--out", out,
-               "--guest", guest)  # fmt: skip
+               "--external", program)  # fmt: skip
     for step, count in ((None, 1), (None, 1), ("table.csv", 2), ("own.py", 3)):
         if step:  # a file beside it, or itself
             with (place / step).open("a") as file:

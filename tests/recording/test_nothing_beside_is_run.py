@@ -18,7 +18,7 @@ from validate.engine.finish import finish
 from validate.pipeline.run.job import Job
 from validate.recording.reader import Reader
 from validate.report.scenes import gl
-from validate.solve.external.program import Limits, run_guest, words
+from validate.solve.external.program import Limits, run_program, words
 
 __all__ = ["folder"]  # a fixture
 
@@ -48,7 +48,7 @@ def test_beside_an_external_simulator_that_keeps_the_user_s_variables(
     job = tmp_path / "job"
     job.mkdir()
     plant(job)
-    ended = run_guest((sys.executable, "-E", str(script)), job, Limits(60.0, 2**33, 2**30))
+    ended = run_program((sys.executable, "-E", str(script)), job, Limits(60.0, 2**33, 2**30))
     assert ended.why == ""
     assert ended.said == f"{folder} {job} False"
     assert ran(folder) == ""

@@ -44,6 +44,31 @@ def detailed(command: Callable[..., Any]) -> Any:
     return chosen
 
 
+def external_simulators(command: Callable[..., Any]) -> Any:
+    """Add `--external` to a command, which gets `simulators`; `--guest` is the former name."""
+
+    @wraps(command)
+    def renamed(*, former: tuple[str, ...], simulators: tuple[str, ...], **given: Any) -> Any:
+        if former:
+            complain_of_former_name("--guest", "--external")
+        return command(simulators=(*simulators, *former), **given)
+
+    for option in (
+        click.option("--guest", "former", multiple=True, hidden=True),
+        click.option(
+            "--external", "simulators", multiple=True, metavar="COMMAND",
+            help="An external simulator as one more method (docs/external-simulators.md).",
+        ),
+    ):  # fmt: skip
+        renamed = option(renamed)
+    return renamed
+
+
+def complain_of_former_name(former: str, now: str) -> None:
+    """Print one line on standard error: a word of the command line has a new name."""
+    complain(f"{former} is called {now} now; the next version accepts {now} only")
+
+
 def command_line() -> tuple[str, ...]:
     """The arguments of the running command; empty where there is none."""
     context = click.get_current_context(silent=True)

@@ -8,17 +8,17 @@ import click
 from validate.commands.arguments import EXPERIMENTS, FOLDER, FORCE
 
 
-@click.group("guest")
-def guest() -> None:
-    """Use an external simulator as one more method (docs/guests.md).
+@click.group("external")
+def external() -> None:
+    """Use an external simulator as one more method (docs/external-simulators.md).
 
     \b
     Example:
-      validate guest job hanging_bar --method felupe -o felupe_job
+      validate external job hanging_bar --method felupe -o felupe_job
     """
 
 
-@guest.command("check", context_settings={"ignore_unknown_options": True})
+@external.command("check", context_settings={"ignore_unknown_options": True})
 @click.option(
     "--seconds", type=float, default=60.0, show_default=True, help="Time limit of a scene."
 )
@@ -30,17 +30,17 @@ def check(command: tuple[str, ...], **options: Any) -> int:
 
     \b
     Example:
-      validate guest check "python my_guest.py"
+      validate external check "python my_simulator.py"
     """
     from shlex import join
 
-    from validate.commands import external_check as guesting
+    from validate.commands import external_check
 
     text = command[0] if len(command) == 1 else join(command)
-    return guesting.check(text, **options)
+    return external_check.check(text, **options)
 
 
-@guest.command("job")
+@external.command("job")
 @click.argument("name", metavar="NAME|FILE.py")
 @EXPERIMENTS
 @click.option("-o", "folder", required=True, type=FOLDER, help="Folder to write; new or empty.")
@@ -58,8 +58,8 @@ def job(name: str, named: tuple[Path, ...], **given: Any) -> None:
 
     \b
     Example:
-      validate guest job hanging_bar --method felupe -o job
+      validate external job hanging_bar --method felupe -o job
     """
-    from validate.commands import external_check as guesting
+    from validate.commands import external_check
 
-    guesting.job(name, experiments=named, **given)
+    external_check.job(name, experiments=named, **given)

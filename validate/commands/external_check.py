@@ -1,5 +1,7 @@
-"""`validate guest check`: what a program of others can do, and how far off it is; `guest job`: what
-it is given, as a folder to keep."""
+"""Commands `validate external check` and `validate external job`.
+
+`check` tests capabilities and accuracy of an external simulator. `job` writes its input files.
+"""
 
 import json
 from collections.abc import Sequence
@@ -15,20 +17,20 @@ from validate.parameters import nearest_names
 from validate.pipeline.bodies.own_body import meshed, own_body
 from validate.pipeline.experiment.find import find
 from validate.solve.external.job import write_job
-from validate.solve.external.scheme import Guest
-from validate.solve.external.suite import OffBy, check_guest
+from validate.solve.external.scheme import ExternalSimulator
+from validate.solve.external.suite import OffBy, check_simulator
 
 _STATES = {"finished": "yes", "refused": "no"}
-_TOLERANCE = 1e-6  # asked of a guest's equations
+_TOLERANCE = 1e-6  # relative, of the equations
 
 
 def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
-    """Runs the small scenes; fails where a run went wrong, or none was finished.
+    """Run the small scenes and return the exit code.
 
-    How far off a guest may be is its user's to say: no error fails.
+    It is 1 if a run failed or no run finished. The size of an error does not count.
     """
-    guest = Guest(command, seconds=seconds, memory=memory)
-    found = [row for rows in check_guest(guest) for row in rows]
+    simulator = ExternalSimulator(command, seconds=seconds, memory=memory)
+    found = [row for rows in check_simulator(simulator) for row in rows]
     if as_json:
         print(
             json.dumps(
@@ -51,7 +53,7 @@ def job(
     inertia: bool,
     force: bool,
 ) -> None:
-    """Writes what a guest is given of one method's scene to an empty `folder`; `force`: to any."""
+    """Write the job of a method's scene to an empty `folder`; with `force` to any folder."""
     if folder.exists() and any(folder.iterdir()) and not force:
         raise UsageError(
             f"-o {folder}: this folder is not empty; name another one, or write there with --force"

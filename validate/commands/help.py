@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from validate.commands.arguments import complain_of_former_name
+
 if TYPE_CHECKING:
     from validate.recording.reader import Reader
 
@@ -63,12 +65,25 @@ SECTIONS = {
         "study filters", "study stability", "study tradeoff", "study choose", "study coverage",
     ),
     "Results": ("show", "compare", "history", "summary", "export"),
-    "Connect": ("guest check", "guest job", "live"),
+    "Connect": ("external check", "external job", "live"),
 }  # fmt: skip
+
+
+FORMER_COMMANDS = {"guest": "external"}  # former names, for one version; no help page lists them
 
 
 class Sections(click.Group):
     """A group of commands that are listed by section, those of inner groups by their whole name."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command; a former name prints one warning line with the new name."""
+        if args and args[0] in FORMER_COMMANDS:
+            now = FORMER_COMMANDS[args[0]]
+            complain_of_former_name(f"'validate {args[0]}'", f"'validate {now}'")
+            args = [now, *args[1:]]
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         for title, names in SECTIONS.items():

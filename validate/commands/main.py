@@ -20,10 +20,11 @@ from validate.commands.arguments import (
     INTERRUPTED,
     complain,
     detailed,
+    external_simulators,
     output,
     require_new,
 )
-from validate.commands.external import guest
+from validate.commands.external import external
 from validate.commands.help import Sections, outlives_reader
 from validate.commands.on_recordings import COMMANDS
 from validate.errors import UsageError, ValidateError
@@ -107,10 +108,6 @@ WORKERS = click.option(
     "--workers", type=click.IntRange(1), envvar="VALIDATE_WORKERS", metavar="N",
     help="Processes side by side (default: the idle cores).",
 )  # fmt: skip
-GUESTS = click.option(
-    "--guest", "guests", multiple=True, metavar="COMMAND",
-    help="An external simulator as one more method (docs/guests.md).",
-)  # fmt: skip
 
 
 @click.group(cls=Sections, context_settings={"help_option_names": ["-h", "--help"]})
@@ -183,7 +180,7 @@ def list_(
     metavar="NAME",
     help="Run only this case (variant) in addition to the recording.",
 )
-@GUESTS
+@external_simulators
 @click.option("--refine", is_flag=True, help="Finer meshes, more load steps, no time limit.")
 @click.option("--anyway", is_flag=True, help="Predict even if parameters are not identifiable.")
 @click.option("--json", "as_json", is_flag=True, help="Print results.json of all runs as one list.")
@@ -448,9 +445,9 @@ def stability_(name: str, **options: Any) -> int:
 
 
 @study.command()
-@GUESTS
+@external_simulators
 @_studied
-def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
+def tradeoff(name: str, simulators: tuple[str, ...], **options: Any) -> int:
     """Measure error against time per step of every solver.
 
     \b
@@ -459,7 +456,7 @@ def tradeoff(name: str, guests: tuple[str, ...], **options: Any) -> int:
     """
     from validate.commands import study as studying
 
-    return studying.tradeoff(name, _common(options), guests)
+    return studying.tradeoff(name, _common(options), simulators)
 
 
 @study.command()
@@ -565,5 +562,5 @@ def live_(name: str, **options: Any) -> int:
     return living.run(name, **options)
 
 
-for _command in (*COMMANDS, guest):
+for _command in (*COMMANDS, external):
     cli.add_command(_command)

@@ -70,7 +70,7 @@ def run(
     out: Path | None,
     values: tuple[str, ...],
     methods: str,
-    guests: tuple[str, ...] = (),
+    simulators: tuple[str, ...] = (),
     case: str = "",
     refine: bool = False,
     anyway: bool,
@@ -84,7 +84,7 @@ def run(
     """
     gl.ask()
     wanted = tuple(m.strip() for m in methods.split(",") if m.strip())
-    options = Options(pairs(values, "--set"), wanted, quick, anyway, guests, case)
+    options = Options(pairs(values, "--set"), wanted, quick, anyway, simulators, case)
     found: list[str] = []  # results.json of each, or why there is none
 
     def one(experiment: Experiment) -> bool:

@@ -101,10 +101,10 @@ def stability_map(name: str, common: StudyOptions) -> int:
     return OK if found.passed else FAILED
 
 
-def tradeoff(name: str, common: StudyOptions, guests: tuple[str, ...] = ()) -> int:
+def tradeoff(name: str, common: StudyOptions, simulators: tuple[str, ...] = ()) -> int:
     """Measures error against time; 0."""
     with noted():
-        done = studies.tradeoff(common.experiment(name), common.settings, guests)
+        done = studies.tradeoff(common.experiment(name), common.settings, simulators)
     if not printed(done.page, common):
         answer(_trade_passages(done.found), done.found.done, done.page, common.detail)
     return OK

@@ -7,7 +7,7 @@ _HOMES = {
     "measurements": ("Measurements", "measurements"),
     "consistency": ("Consistency", "nees_consistency", "nis_consistency"),
     "kalman.kf_fem": ("KfFem",),
-    "filterpy.filters": ("FilterpyGuest",),
+    "filterpy.filters": ("FilterpyFilter",),
 }
 
 __all__ = names(_HOMES)

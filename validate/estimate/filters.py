@@ -10,7 +10,7 @@ from validate.estimate.care import NoiseSettings
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.extended.node_ekf import NodeEKF
-from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.estimate.kalman.batch import Batch
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf
@@ -52,7 +52,7 @@ _OWN: tuple[type[Filter], ...] = (
     ModalKf,
     ReducedKf,
     LoadScale,
-    FilterpyGuest,
+    FilterpyFilter,
     NodeEKF,
     ReducedEKF,
     Roukf,

@@ -53,7 +53,7 @@ _TAKES: Mapping[str, tuple[Callable[..., Studied[Any]], tuple[str, ...]]] = {
     "identify": (identified, (_SET, "parameters", "starts")),
 }
 _NAMES = {"sweep": "sweeps", _SET: "values"}  # as the studies call them
-_WORDS = {"hold_out": "--hold-out", "simulators": "--guest", "declared_law": "--declared-law",
+_WORDS = {"hold_out": "--hold-out", "simulators": "--external", "declared_law": "--declared-law",
           "starts": "--seeds"}  # fmt: skip
 _EACH = ("sweep", "simulators")  # repeated on a command line; others are joined by commas
 

@@ -12,7 +12,7 @@ from validate.engine.finish import CELLS, Report
 from validate.engine.pool import Pool
 from validate.pipeline.calibration.calibrated import Identify, here
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.external import with_guests
+from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.options import Options, doubtful
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder
@@ -58,7 +58,7 @@ def reported_run(
     looks as if its unit was forgotten is a warning. Raises children of `ValidateError` for bad
     input, and `UsageError` for a folder that cannot be written, before anything runs.
     """
-    experiment = with_guests(plain, options.guests)
+    experiment = with_simulators(plain, options.simulators)
     folder = run_folder(experiment, options, out)
     made_by = rests_on(experiment, options, command)
     warn_of_units(experiment, options)

@@ -45,7 +45,7 @@ def run(
         "run", str(experiment.name if isinstance(experiment, Experiment) else experiment),
         *["--quick"] * quick, *set_words(texts),
         *(["--methods", ",".join(methods)] if methods else []), *(["--case", case] if case else []),
-        *(word for one in simulators for word in ("--guest", one)), *["--anyway"] * anyway,
+        *(word for one in simulators for word in ("--external", one)), *["--anyway"] * anyway,
         *([] if out is None else ["--out", str(out)]),
     )  # fmt: skip
     folder = None if out is None else Path(out)

@@ -126,12 +126,12 @@ def tradeoff(
     experiment: Experiment, settings: StudySettings, simulators: tuple[str, ...] = ()
 ) -> Studied[Trade]:
     """Measure error against time per step; `simulators` are commands of external ones."""
-    words = ["quick"] * settings.quick + ["guest"] * bool(simulators)
+    words = ["quick"] * settings.quick + ["external"] * bool(simulators)
     content = [settings.quick, simulators] if simulators else settings.quick
     place = f"tradeoff{tag(words, content)}"
     with _running(experiment, place, "pilot runs", settings) as report:
         found = trade(
-            experiment, quick=settings.quick, guests=simulators, out=settings.out,
+            experiment, quick=settings.quick, simulators=simulators, out=settings.out,
             where=settings.where, report=report,
         )  # fmt: skip
     return _written(experiment, found, trade_page.told(found), place, settings)

@@ -13,13 +13,13 @@ from validate.solve.types import SceneSolver, Scheme
 
 Rung = Literal[
     "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
-    "large strain", "guests",
+    "large strain", "external simulators",
 ]  # fmt: skip
 RUNGS: tuple[Rung, ...] = (  # that are climbed to choose a method of ours
     "static superposition", "modal", "condensed", "prefactored", "regions", "explicit",
     "large strain",
 )  # fmt: skip
-SHOWN: tuple[Rung, ...] = (*RUNGS, "guests")
+SHOWN: tuple[Rung, ...] = (*RUNGS, "external simulators")
 
 
 @dataclass(frozen=True)

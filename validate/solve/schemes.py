@@ -19,8 +19,8 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.viscous_modes import ViscousModes
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.external.let_go import GuestLetGo
-from validate.solve.external.scheme import Guest
+from validate.solve.external.let_go import ExternalLetGo
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
 from validate.solve.fluid.pulse import PulsePressure
@@ -72,7 +72,16 @@ SCHEMES: Registry[type[Scheme]] = Registry(
 # What solves a whole scene at once.
 SOLVERS: Registry[type[SceneSolver]] = Registry(
     "schemes",
-    (StretchTest, RigidMotion, Proportional, ViscousModes, LetGo, Harmonic, Guest, GuestLetGo),
+    (
+        StretchTest,
+        RigidMotion,
+        Proportional,
+        ViscousModes,
+        LetGo,
+        Harmonic,
+        ExternalSimulator,
+        ExternalLetGo,
+    ),
     lambda solver: solver.__name__,
     lambda part: settings_faults(part) or handles_faults(part),
     lambda part: hasattr(part, "solve"),

@@ -1,7 +1,7 @@
-"""filterpy's filters as guests: any of them runs in an experiment, behind our shape checks.
+"""filterpy's filters as methods of an experiment, with checks of their array shapes.
 
-filterpy accepts a P of the wrong size, and a 1-D z beside a column x turns x into a matrix: both
-are refused here, before the first step and after every one.
+filterpy accepts a P of the wrong size, and a 1-D z with a column x turns x into a matrix. The
+checks here refuse both, before the first step and after every step.
 """
 
 import copy
@@ -51,9 +51,9 @@ def kalman(model: LinearModel) -> Any:
     """filterpy's `KalmanFilter` of a model."""
     from validate.estimate.filterpy.names import KalmanFilter  # filterpy takes 0.6 s
 
-    guest = KalmanFilter(model.size, len(model.H), model.B.shape[1])
-    guest.F, guest.B, guest.H = model.F.copy(), model.B.copy(), model.H.copy()
-    return _filled(guest, model)
+    kf = KalmanFilter(model.size, len(model.H), model.B.shape[1])
+    kf.F, kf.B, kf.H = model.F.copy(), model.B.copy(), model.H.copy()
+    return _filled(kf, model)
 
 
 def unscented(model: LinearModel) -> Any:
@@ -78,22 +78,22 @@ def ensemble(model: LinearModel) -> Any:
     """filterpy's `EnsembleKalmanFilter` with 50 members, whose `predict` takes the loads."""
     from validate.estimate.filterpy.ensemble import Ensemble
 
-    guest = Ensemble(model)
-    guest.Q, guest.R = model.Q.copy(), model.R.copy()
-    return guest
+    enkf = Ensemble(model)
+    enkf.Q, enkf.R = model.Q.copy(), model.R.copy()
+    return enkf
 
 
-GUESTS: dict[str, Make] = {
+FILTERPY_FILTERS: dict[str, Make] = {
     "KalmanFilter": kalman,
     "UnscentedKalmanFilter": unscented,
     "EnsembleKalmanFilter": ensemble,
 }
 
 
-def _filled(guest: Any, model: LinearModel) -> Any:
-    guest.x, guest.P = model.x0.copy(), model.P0.copy()
-    guest.Q, guest.R = model.Q.copy(), model.R.copy()
-    return guest
+def _filled(filter_: Any, model: LinearModel) -> Any:
+    filter_.x, filter_.P = model.x0.copy(), model.P0.copy()
+    filter_.Q, filter_.R = model.Q.copy(), model.R.copy()
+    return filter_
 
 
 def _root(P: Floats) -> Floats:
@@ -103,7 +103,7 @@ def _root(P: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class FilterpyGuest:
+class FilterpyFilter:
     """A filterpy filter of the reduced model (`reduced_linear`), named or made by `make`.
 
     `make` takes the `LinearModel` and gives a filter with x (n,), P, Q, R set, whose `predict`
@@ -140,7 +140,7 @@ class FilterpyGuest:
         if self.smooth:
             require_exact_covariances(first)
         care = care_of(measurements, self.gate, self.clock, self.dt)
-        core = GuestCore(reduced, first, self.seed, care)
+        core = FilterpyCore(reduced, first, self.seed, care)
         table = timetable(measurements, self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
 
@@ -148,65 +148,68 @@ class FilterpyGuest:
 def _made(make: Make | str) -> Make:
     if not isinstance(make, str):
         return make
-    if make not in GUESTS:
+    if make not in FILTERPY_FILTERS:
         raise ComparisonError(
-            f"no external filter '{make}'; expected one of {', '.join(GUESTS)}, or a function"
+            f"no external filter '{make}'; expected one of {', '.join(FILTERPY_FILTERS)}, "
+            "or a function"
         )
-    return GUESTS[make]
+    return FILTERPY_FILTERS[make]
 
 
-def require_shapes(guest: Any, model: LinearModel) -> None:
-    """Raises `ComparisonError` unless the guest's arrays fit the model and each other."""
-    n, m = model.size, len(model.H)
+def require_shapes(filter_: Any, model: LinearModel) -> None:
+    """Raises `ComparisonError` unless the filter's arrays fit the model and each other."""
+    n, m, kind = model.size, len(model.H), type(filter_).__name__
     wanted = {"x": (n,), "P": (n, n), "Q": (n, n), "R": (m, m), "F": (n, n), "H": (m, n)}
     for name, shape in wanted.items():
-        value = getattr(guest, name, None)
+        value = getattr(filter_, name, None)
         if value is None and name in ("F", "H"):
             continue  # filters with functions have none
         got = np.shape(value) if value is not None else None
         if got != shape:
             raise ComparisonError(
-                f"external filter {type(guest).__name__}.{name}: shape {got}, expected "
+                f"external filter {kind}.{name}: shape {got}, expected "
                 f"{shape}; filterpy would accept it without an error"
             )
         if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise ComparisonError(f"external filter {type(guest).__name__}.{name}: not finite")
+            raise ComparisonError(f"external filter {kind}.{name}: not finite")
     for name in ("P", "Q", "R"):
-        require_symmetric(np.asarray(getattr(guest, name)), f"guest {name}")
+        require_symmetric(np.asarray(getattr(filter_, name)), f"external filter {kind}.{name}")
     for name in ("predict", "update"):
-        if not callable(getattr(guest, name, None)):
-            raise ComparisonError(
-                f"external filter {type(guest).__name__} has no `{name}`: not a filter"
-            )
+        if not callable(getattr(filter_, name, None)):
+            raise ComparisonError(f"external filter {kind} has no `{name}`: not a filter")
 
 
-def require_exact_covariances(guest: Any) -> None:
-    """Raises `UsageError` unless the guest's P and gain are those of the linear model. filterpy's
-    unscented filter takes its gain from points that were moved without the step's noise."""
+def require_exact_covariances(filter_: Any) -> None:
+    """Raises `UsageError` unless P and gain of the filter are those of the linear model.
+
+    filterpy's unscented filter computes its gain from points without the step's noise."""
     from validate.estimate.filterpy.names import KalmanFilter
 
-    if not isinstance(guest, KalmanFilter) or guest.alpha != 1.0:
+    if not isinstance(filter_, KalmanFilter) or filter_.alpha != 1.0:
         raise UsageError(
             "smooth needs the covariances and gains of the model, which "
-            f"{type(guest).__name__} does not have: take make='KalmanFilter' (alpha = 1), or "
+            f"{type(filter_).__name__} does not have: take make='KalmanFilter' (alpha = 1), or "
             "smooth=false"
         )
 
 
 @dataclass(frozen=True)
 class Visit:
-    """A guest after a step, and the look that it took; smoothed, what is added to its mean (n,)
-    and at output frames taken off its covariance (n, n)."""
+    """A filterpy filter after a step, and its measurement `look`.
 
-    guest: Any
+    The smoother adds `more` (n,) to the mean, and at output frames subtracts `less` (n, n) from
+    the covariance.
+    """
+
+    filter: Any
     look: Look | None = None
     more: Floats | float = 0.0
     less: Floats | float = 0.0
 
 
 @dataclass(frozen=True)
-class GuestCore:
-    """Every step works on a copy of the guest: a state is never changed from behind."""
+class FilterpyCore:
+    """Steps of a filterpy filter. Each step changes a copy, never the given state."""
 
     reduced: ReducedModel
     first: Any
@@ -223,35 +226,35 @@ class GuestCore:
     def step(
         self, inner: Visit, k: int, loads: Floats, z: Floats | None
     ) -> tuple[Visit, Innovation]:
-        guest, model = copy.deepcopy(inner.guest), self.reduced.model
+        filter_, model = copy.deepcopy(inner.filter), self.reduced.model
         with seeded(self.seed + k):
-            guest.predict(u=loads)
+            filter_.predict(u=loads)
             if z is None or not np.isfinite(z).all():
-                return Visit(guest), nothing(len(model.H))
-            look, found = self._update(guest, z, model.H @ (guest.x - inner.guest.x))
-        require_shapes(guest, model)
-        return Visit(guest, look), found
+                return Visit(filter_), nothing(len(model.H))
+            look, found = self._update(filter_, z, model.H @ (filter_.x - inner.filter.x))
+        require_shapes(filter_, model)
+        return Visit(filter_, look), found
 
-    def _update(self, guest: Any, z: Floats, moved: Floats) -> tuple[Look | None, Innovation]:
-        """Changes the guest, unless a gate rejects part of z (m,) m."""
+    def _update(self, filter_: Any, z: Floats, moved: Floats) -> tuple[Look | None, Innovation]:
+        """Update the filter, unless a gate rejects part of z (m,) m."""
         H, R, gated = self.reduced.model.H, self.reduced.model.R, None
-        PHt, shown, offered = guest.P @ H.T, H @ guest.x, z
+        PHt, shown, offered = filter_.P @ H.T, H @ filter_.x, z
         if self.care is not None:
             R = R + self.care.together(moved)
             z, gated = self.care.passed(z, shown, H @ PHt + R)
         if not np.isfinite(z).all():
             return None, gated_out(nothing(len(H)), offered, shown, gated)
         gain = best_gain(PHt, H @ PHt + R)
-        guest.update(z, R=R) if self.care else guest.update(z)
+        filter_.update(z, R=R) if self.care else filter_.update(z)
         found = gated_out(innovation(z, shown, gain), offered, shown, gated)
         return look_of(gain, found), found
 
     def free(self, inner: Visit) -> Floats:
-        return np.asarray(self.reduced.lift @ (inner.guest.x + inner.more))
+        return np.asarray(self.reduced.lift @ (inner.filter.x + inner.more))
 
     def variances(self, inner: Visit) -> Floats:
         lift = self.reduced.lift
-        return np.asarray(np.einsum("ij,ij->i", lift @ (inner.guest.P - inner.less), lift))
+        return np.asarray(np.einsum("ij,ij->i", lift @ (inner.filter.P - inner.less), lift))
 
     def note(self, inner: Visit, framed: bool) -> Note:
         return Note(inner.look, framed)
@@ -262,7 +265,7 @@ class GuestCore:
     def corrected(self, inner: Visit, e: Floats, W: Floats | None) -> Visit:
         if W is None:
             return replace(inner, more=e)
-        PW = inner.guest.P @ W
+        PW = inner.filter.P @ W
         return replace(inner, more=e, less=PW @ PW.T)
 
     def numbers(self, inner: Visit) -> Mapping[str, float]:

@@ -1,4 +1,4 @@
-"""A linear model in the letters of filterpy: what a guest filter is built from."""
+"""Linear model of a filterpy filter, in the notation of filterpy."""
 
 from dataclasses import dataclass
 

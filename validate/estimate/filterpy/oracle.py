@@ -74,9 +74,9 @@ def _measured(steps: int, rng: np.random.Generator, m: int) -> list[Floats | Non
     return [None if k % 7 == 6 else rng.normal(0, 0.5, m) for k in range(steps)]
 
 
-def _apart(ours: Gaussian, guest: Any) -> float:
+def _apart(ours: Gaussian, theirs: Any) -> float:
     """Largest difference in mean and covariance."""
-    return float(max(np.abs(ours.x - guest.x).max(), np.abs(ours.P - guest.P).max()))
+    return float(max(np.abs(ours.x - theirs.x).max(), np.abs(ours.P - theirs.P).max()))
 
 
 def _kalman_pair(steps: int, rng: np.random.Generator) -> OracleRow:
@@ -91,66 +91,66 @@ def _kalman_pair(steps: int, rng: np.random.Generator) -> OracleRow:
         np.zeros(n),
         np.eye(n),
     )
-    guest, ours, worst = kalman(model), Gaussian(model.x0, model.P0), 0.0
+    kf, ours, worst = kalman(model), Gaussian(model.x0, model.P0), 0.0
     for z in _measured(steps, rng, m):
         loads = rng.normal(size=l)
-        guest.predict(u=loads)
-        guest.update(z)
+        kf.predict(u=loads)
+        kf.update(z)
         ours = kf_predict(ours, model.F, model.Q, model.B @ loads)
         ours = ours if z is None else kf_update(ours, z, model.H, model.R).posterior
-        worst = max(worst, _apart(ours, guest))
+        worst = max(worst, _apart(ours, kf))
     return OracleRow("KalmanFilter", n, steps, worst)
 
 
 def _extended_pair(steps: int, rng: np.random.Generator) -> OracleRow:
-    guest = ExtendedKalmanFilter(2, 1)
-    guest.x, guest.P, guest.Q, guest.R = _START.x.copy(), _START.P.copy(), _Q, _R
+    ekf = ExtendedKalmanFilter(2, 1)
+    ekf.x, ekf.P, ekf.Q, ekf.R = _START.x.copy(), _START.P.copy(), _Q, _R
 
     def predict_x(_: float = 0) -> None:
-        guest.x = _f(guest.x)
+        ekf.x = _f(ekf.x)
 
-    guest.predict_x = predict_x  # its own is linear
+    ekf.predict_x = predict_x  # its own is linear
     ours, worst = _START, 0.0
     for z in _measured(steps, rng, 1):
-        guest.F = _f_jacobian(guest.x)
-        guest.predict()
-        guest.update(z, _h_jacobian, _h)
+        ekf.F = _f_jacobian(ekf.x)
+        ekf.predict()
+        ekf.update(z, _h_jacobian, _h)
         ours = ekf_predict(ours, _f, _f_jacobian, _Q)
         ours = ours if z is None else ekf_update(ours, z, _h, _h_jacobian, _R).posterior
-        worst = max(worst, _apart(ours, guest))
+        worst = max(worst, _apart(ours, ekf))
     return OracleRow("ExtendedKalmanFilter", 2, steps, worst)
 
 
 def _unscented_pair(steps: int, rng: np.random.Generator) -> OracleRow:
     sigma = SigmaPoints(0.5, 2.0, 1.0)
     points = MerweScaledSigmaPoints(2, sigma.alpha, sigma.beta, sigma.kappa)
-    guest = UnscentedKalmanFilter(2, 1, _STEP, _h, lambda x, _: _f(x), points)
-    guest.x, guest.P, guest.Q, guest.R = _START.x.copy(), _START.P.copy(), _Q, _R
+    ukf = UnscentedKalmanFilter(2, 1, _STEP, _h, lambda x, _: _f(x), points)
+    ukf.x, ukf.P, ukf.Q, ukf.R = _START.x.copy(), _START.P.copy(), _Q, _R
     ours, worst = _START, 0.0
     for z in _measured(steps, rng, 1):
-        guest.predict()
-        guest.update(z)
+        ukf.predict()
+        ukf.update(z)
         ours = ukf_predict(ours, _f, _Q, sigma)
         ours = ours if z is None else ukf_update(ours, z, _h, _R, sigma).posterior
-        worst = max(worst, _apart(ours, guest))
+        worst = max(worst, _apart(ours, ukf))
     return OracleRow("UnscentedKalmanFilter", 2, steps, worst)
 
 
 def _ensemble_pair(steps: int, rng: np.random.Generator) -> OracleRow:
-    """Both get the same draws: the guest's generator is replaced while the pair runs."""
+    """Both filters get the same draws: a shared generator replaces filterpy's during the run."""
     N, draws = 20, _Draws(rng)
     with drawing(draws):
-        guest = EnsembleKalmanFilter(_START.x, _START.P, 1, _STEP, N, _h, lambda x, _: _f(x))
-        guest.Q, guest.R = _Q, _R
+        enkf = EnsembleKalmanFilter(_START.x, _START.P, 1, _STEP, N, _h, lambda x, _: _f(x))
+        enkf.Q, enkf.R = _Q, _R
         members, worst = draws.last.copy(), 0.0
         for z in _measured(steps, rng, 1):
-            guest.predict()
+            enkf.predict()
             members = enkf_predict(members, _f, draws.last)
-            guest.update(z)
+            enkf.update(z)
             if z is not None:
                 members = enkf_update(members, z, _h, _R, draws.last)
-            worst = max(worst, float(np.abs(members - guest.sigmas).max()))
-            worst = max(worst, float(np.abs(ensemble_gaussian(members).x - guest.x).max()))
+            worst = max(worst, float(np.abs(members - enkf.sigmas).max()))
+            worst = max(worst, float(np.abs(ensemble_gaussian(members).x - enkf.x).max()))
     return OracleRow("EnsembleKalmanFilter", 2, steps, worst)
 
 

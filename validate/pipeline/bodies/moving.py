@@ -17,7 +17,7 @@ from validate.compare.score import Score
 from validate.errors import ComparisonError, UsageError, ValidateError
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
-from validate.estimate.filterpy.filters import FilterpyGuest
+from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.estimate.filters import FILTERS
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf
@@ -185,7 +185,7 @@ METHODS: Mapping[str, tuple[Any, str]] = {
     "modal_kf": (ModalKf(), "Kalman filter of all modes (KF-FEM's), {law}"),
     "roukf": (Roukf(), "unscented filter of the modulus, {law}"),
     "load_scale": (LoadScale(), "filter of one load's scale, without inertia, {law}"),
-    "filterpy": (FilterpyGuest(), "filterpy's Kalman filter of the modes and the load, {law}"),
+    "filterpy": (FilterpyFilter(), "filterpy's Kalman filter of the modes and the load, {law}"),
     "ensemble_kf": (EnsembleKf(), "ensemble filter of the modulus, {law}"),
     "reduced_ekf": (ReducedEKF(), "extended filter of shapes at large strain, {law}"),
 }  # fmt: skip

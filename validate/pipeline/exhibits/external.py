@@ -1,4 +1,4 @@
-"""Programs of others beside our own: error, verdict, rate and memory in one table."""
+"""Table of external simulators and internal methods: error, verdict, rate and memory."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,13 +8,14 @@ import numpy as np
 from validate.compare.exhibit import Exhibit, NumberTable, TableCell
 from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
-from validate.pipeline.experiment.external import guests_of
+from validate.pipeline.experiment.external import external_methods
 from validate.pipeline.run.followed import Followed
 from validate.pipeline.run.runs import Road
-from validate.solve.external.scheme import Guest, changes
+from validate.solve.external.scheme import ExternalSimulator, changes
 
 _HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptance",
          "validation", "rate / Hz", "memory / MB", "ended")  # fmt: skip
+_NAME = "external_simulators"
 _OURS = "this one"
 _MB = 1e-6
 _WORDS = (
@@ -26,24 +27,24 @@ _WORDS = (
 )
 
 
-def guest_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
-    """The table and what guests were found to do otherwise; nothing where no guest was run."""
-    guests = guests_of({n: m for n, m in road.methods.items() if n in main})
-    if not guests:
+def external_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
+    """Return the table and the deviations; empty if no external simulator ran."""
+    simulators = external_methods({n: m for n, m in road.methods.items() if n in main})
+    if not simulators:
         return ()
     accepted = [n for n in road.experiment.accepted if n in main][:1]
     terms = {k: t for n in accepted for _, one in terms_of(road, main[n]) for k, t in one.items()}
     rows = [r for f in main.values() for r in _rows(f, road.methods[f.method].settings, terms)]
-    said = [(main[n].label, line) for n in guests for line in _findings(main[n])]
-    tables = [NumberTable("guests", "External simulators and our methods", _HEAD, tuple(rows))]
+    said = [(main[n].label, line) for n in simulators for line in _findings(main[n])]
+    tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
         head = ("simulator", "deviations and failures")
-        tables.append(NumberTable("guest_findings", "Findings", head, tuple(said)))
-    return (Exhibit("guests", "External simulators", (_WORDS,), tables=tuple(tables)),)
+        tables.append(NumberTable("external_findings", "Findings", head, tuple(said)))
+    return (Exhibit(_NAME, "External simulators", (_WORDS,), tables=tuple(tables)),)
 
 
-def _findings(guest: Followed) -> list[str]:
-    lines = [w for run in guest.runs for w in run.said if not w.startswith("guest: ")]
+def _findings(simulator: Followed) -> list[str]:
+    lines = [w for run in simulator.runs for w in run.said if not w.startswith("external: ")]
     return list(dict.fromkeys(lines))
 
 
@@ -51,15 +52,15 @@ def _rows(
     f: Followed, settings: Any, terms: Mapping[str, Terms]
 ) -> list[tuple[TableCell | float | str | None, ...]]:
     """A row a check; one alone where it was not run, or has nothing that is checked."""
-    run, guest = f.run, isinstance(settings, Guest)
-    named = [line.removeprefix("guest: ") for line in run.said if line.startswith("guest: ")]
-    program = next(iter(named), "-") if guest else _OURS
+    run, external = f.run, isinstance(settings, ExternalSimulator)
+    named = [line.removeprefix("external: ") for line in run.said if line.startswith("external: ")]
+    program = next(iter(named), "-") if external else _OURS
     rate = _rate(f, settings)
     memory = _MB * run.memory or None
     end = run.outcome.state + (f": {run.outcome.why}" if run.outcome.why else "")
     cost = (rate, memory, end)
     judged = [t.judge(f.residuals[k]) for k, t in terms.items() if k in f.residuals]
-    if not judged and not guest:
+    if not judged and not external:
         return []
     if not judged or not run.finished:
         return [(f.label, program, "-", None, None, None, "-", "-", *cost)]

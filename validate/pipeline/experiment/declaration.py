@@ -21,6 +21,7 @@ import numpy as np
 
 from validate.errors import UsageError, ValidateError
 from validate.estimate.filters import FILTERS
+from validate.former_names import new_name
 from validate.parameters import describe, has_path, nearest_names
 from validate.pipeline.experiment.completed import DECLARED, completed, of_a_kind
 from validate.pipeline.experiment.experiment import Experiment
@@ -100,7 +101,7 @@ _MODULES = (
     "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.sheet",
     "scene.tool", "scene.tracked", "solve.schemes",
 )  # fmt: skip
-_RUNS_PROGRAMS = ("Guest", "GuestLetGo")  # settings whose command would be a stranger's
+_RUNS_PROGRAMS = ("ExternalSimulator", "ExternalLetGo")  # settings with a command to run
 
 
 # --- to JSON --------------------------------------------------------------------------------------
@@ -247,9 +248,10 @@ class _Reader:
         return MappingProxyType({k: self.read(v, f"{at}.{k}") for k, v in items.items()})
 
     def _object(self, value: dict[str, Any], at: str) -> Any:
-        kind = classes().get(str(value["type"]))
+        name = str(value["type"])
+        kind = classes().get(name) or classes().get(new_name(name))
         if kind is None:
-            raise self._wrong(at, f"type '{value['type']}' is no part of a declaration")
+            raise self._wrong(at, f"type '{name}' is no part of a declaration")
         if self._declared is None and kind.__name__ in _RUNS_PROGRAMS:
             raise self._wrong(at, f"'{kind.__name__}' runs a program; a JSON file may not")
         return self._of(kind, {k: v for k, v in value.items() if k != "type"}, at)

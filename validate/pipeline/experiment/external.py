@@ -1,4 +1,4 @@
-"""Programs of others among the methods of any experiment: those it declares, those a user adds."""
+"""External simulators among the methods of an experiment: declared ones and added ones."""
 
 import re
 import shlex
@@ -9,31 +9,32 @@ from pathlib import Path
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.solve.external.program import words
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 
+_SUFFIX = re.compile("_(simulator|guest)$")  # of a script; the second is a former one
 _LEVELS = 20  # of statics with one input, where the experiment does not say
 
 
-def guests_of(methods: dict[str, Method]) -> dict[str, Method]:
-    """Those that are programs of others."""
-    return {name: m for name, m in methods.items() if isinstance(m.settings, Guest)}
+def external_methods(methods: dict[str, Method]) -> dict[str, Method]:
+    """Return the methods that are external simulators."""
+    return {name: m for name, m in methods.items() if isinstance(m.settings, ExternalSimulator)}
 
 
-def added_guests(methods: Mapping[str, Method], commands: Sequence[str]) -> tuple[str, ...]:
-    """Names of those that `with_guests` made of these commands; declared ones are none of them."""
+def added_simulators(methods: Mapping[str, Method], commands: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the methods that `with_simulators` adds for these commands."""
     labels = [_label(command) for command in commands]
     return tuple(name for name, m in methods.items() if m.label in labels)
 
 
 def _label(command: str) -> str:
-    return f"guest: {command}"
+    return f"external: {command}"
 
 
-def with_guests(experiment: Experiment, commands: Sequence[str]) -> Experiment:
-    """The experiment with a method a command beside its own: run as the first guest that it
-    declares, else as what it accepts is.
+def with_simulators(experiment: Experiment, commands: Sequence[str]) -> Experiment:
+    """Return the experiment with one more method for each command.
 
-    Raises `UsageError` for a command that is no program's.
+    A method has the settings of the first external simulator that the experiment declares, else
+    those of its accepted method. Raises `UsageError` for a command whose program is missing.
     """
     methods = dict(experiment.methods)
     accepted = next(iter(experiment.accepted), next(iter(methods), ""))
@@ -44,22 +45,22 @@ def with_guests(experiment: Experiment, commands: Sequence[str]) -> Experiment:
 
 
 def _as(methods: dict[str, Method], accepted: str, command: str) -> Method:
-    declared = next(iter(guests_of(methods).values()), None)
+    declared = next(iter(external_methods(methods).values()), None)
     label = _label(command)
     if declared is not None:
         return replace(declared, label=label, settings=replace(declared.settings, command=command))
     like = methods[accepted]
     handles = getattr(like.settings, "handles", None)
     moving = handles is not None and handles.inertia
-    settings = Guest(command, inertia=moving, levels=0 if moving else _LEVELS)
+    settings = ExternalSimulator(command, inertia=moving, levels=0 if moving else _LEVELS)
     return replace(like, label=label, settings=settings, markers=(), steps=None, chosen="")
 
 
 def _named(command: str, taken: dict[str, Method]) -> str:
-    """After its script: `felupe` of `python benchmarks/guests/felupe_guest.py`."""
+    """Return a free name after the script: `felupe` for `python felupe_simulator.py`."""
     stems = [Path(word).stem for word in shlex.split(command) if not word.startswith("-")]
     last = next((s for s in stems[1:] if s), stems[0])
-    name = re.sub(r"\W+", "_", last.removesuffix("_guest")) or "guest"
+    name = re.sub(r"\W+", "_", _SUFFIX.sub("", last)) or "external"
     while name in taken:
         name += "_2"
     return name

@@ -9,7 +9,7 @@ from typing import Any
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, has_path, nearest_names, with_values
 from validate.pipeline.experiment.experiment import Case, Experiment
-from validate.pipeline.experiment.external import added_guests
+from validate.pipeline.experiment.external import added_simulators
 from validate.pipeline.experiment.law_solver import with_law
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import valued
@@ -24,15 +24,15 @@ _LAYOUTS = (".fcsv", ".json")  # of landmarks, which place markers
 @dataclass(frozen=True)
 class Options:
     """What the user changed: values by path, methods to run (none: all), quick; `anyway`: predict
-    with parameters that were not identifiable, too. `guests` are command lines of programs of
-    others that the experiment has as methods (`with_guests`): they are run whatever is chosen.
+    with parameters that were not identifiable, too. `simulators` are command lines of
+    external simulators that the experiment has as methods (`with_simulators`); all of them run.
     `case`: run this case alone beside the recorded one (`RECORDED`: none beside it)."""
 
     values: Mapping[str, str]
     methods: tuple[str, ...] = ()
     quick: bool = False
     anyway: bool = False
-    guests: tuple[str, ...] = ()
+    simulators: tuple[str, ...] = ()
     case: str = ""
 
 
@@ -45,7 +45,7 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     parameters = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
     mine, _ = _split(options.values)
     methods = all_methods(experiment, options)
-    added = added_guests(methods, options.guests)
+    added = added_simulators(methods, options.simulators)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     picked = {name: methods[name] for name in chosen}
     given = with_values(parameters, mine)

@@ -21,7 +21,7 @@ from validate.engine.store import key_of, oldest_removed
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.experiment.experiment import Experiment, Told
-from validate.pipeline.experiment.external import with_guests
+from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, configure, folder_of, mesh_files
 from validate.pipeline.experiment.origins import opened
@@ -30,7 +30,7 @@ from validate.pipeline.run.followed import NO_TRUTH, Cases, Truth
 from validate.pipeline.run.job import Job, job_on
 from validate.pipeline.run.runs import Road, RunFound, RunWanted
 from validate.solve.external.program import version_of
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.types import Run
 
 MOST_BYTES = 1_000_000_000  # of the cells of an experiment: the oldest go
@@ -90,8 +90,8 @@ class RunJob:
 
 def open_road(job: RunJob) -> Road:
     """The road on a worker, with its recordings."""
-    experiment = with_guests(job.of.experiment(), job.of.guests)
-    options = Options(dict(job.of.values), (), job.of.quick, guests=job.of.guests)
+    experiment = with_simulators(job.of.experiment(), job.of.simulators)
+    options = Options(dict(job.of.values), (), job.of.quick, simulators=job.of.simulators)
     declared, methods = configure(experiment, options)
     recordings = opened(experiment, declared).recordings
     parameters = decoded(job.parameters, _AT, experiment)
@@ -247,7 +247,8 @@ class InStore:
             dict(self._job(road).identity()), encoded(method, f"methods.{wanted.method}"),
             hashes, encoded(_compared_left_out(true), _AT) if truth else "",
             [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
-            self._external(method.settings.command) if isinstance(method.settings, Guest) else "",
+            self._external(method.settings.command)
+            if isinstance(method.settings, ExternalSimulator) else "",
         )  # fmt: skip
 
     def _external(self, command: str) -> str:
@@ -261,7 +262,7 @@ class InStore:
         if at not in self._jobs:
             hashes = tuple(r.source.sha256 for r in road.recordings)
             base = job_on(self._experiment, hashes, self._options.values, self._options.quick)
-            self._jobs[at] = RunJob(replace(base, guests=self._options.guests), *at)
+            self._jobs[at] = RunJob(replace(base, simulators=self._options.simulators), *at)
         return self._jobs[at]
 
 

@@ -82,7 +82,7 @@ def _same(one: Any, other: Any) -> bool:
 @dataclass(frozen=True)
 class Job:
     """What all cells share: the experiment's file, its hash and those of its recordings,
-    values set, quick, command lines of guests.
+    values set, quick, command lines of external simulators.
 
     A `declaration` without code is all that a worker needs: it executes no file. The hash is then
     that of the declaration. `changes` are what a script changed of the file's experiment, and parts
@@ -94,7 +94,7 @@ class Job:
     recordings: tuple[str, ...] = ()
     values: tuple[tuple[str, str], ...] = ()
     quick: bool = False
-    guests: tuple[str, ...] = ()
+    simulators: tuple[str, ...] = ()
     declaration: str = ""
     changes: SentCode = NO_CODE
     code: str = ""

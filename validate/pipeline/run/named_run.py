@@ -50,9 +50,9 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
         methods = []
     case = [f"case_{options.case}"] * bool(options.case)
     words = ["quick"] * options.quick + case + ["methods"] * bool(methods)
-    guests = sorted(options.guests)
-    content = [options.quick, methods, differing, *guests, *case]
-    return [*words, *(p for p, _ in differing), *["guest"] * bool(guests)], content
+    simulators = sorted(options.simulators)
+    content = [options.quick, methods, differing, *simulators, *case]
+    return [*words, *(p for p, _ in differing), *["external"] * bool(simulators)], content
 
 
 def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:

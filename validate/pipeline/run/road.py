@@ -35,7 +35,7 @@ from validate.pipeline.checks.likely_causes import Difference, Failed, differenc
 from validate.pipeline.checks.plausible import doubts
 from validate.pipeline.checks.sentence import figures_sentence, verdict_sentence
 from validate.pipeline.checks.uncertain_drives import with_uncertain_drives
-from validate.pipeline.exhibits.external import guest_exhibits
+from validate.pipeline.exhibits.external import external_exhibits
 from validate.pipeline.exhibits.gated import gate_warnings
 from validate.pipeline.exhibits.standard import error_at, speed_rows, standard_exhibits
 from validate.pipeline.experiment.experiment import Experiment, Identified, SolvesVariants, Told
@@ -47,7 +47,7 @@ from validate.pipeline.run.memory import coarser, require_room
 from validate.pipeline.run.runs import Road, Solves
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 
 _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
@@ -172,7 +172,7 @@ def _compared(
     locking = locking_notes(
         (f.label, f.scene)
         for name, f in main.items()
-        if not isinstance(methods[name].settings, Guest)  # its elements are its own
+        if not isinstance(methods[name].settings, ExternalSimulator)  # its elements are its own
     )
     parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
     warnings = (
@@ -210,7 +210,7 @@ def _compared(
             captioned(exhibit, experiment.captions)
             for exhibit in (
                 *causes,
-                *guest_exhibits(road, main),
+                *external_exhibits(road, main),
                 *standard_exhibits(experiment, main, others),
                 *told.exhibits,
             )

@@ -1,1 +1,1 @@
-"""Programs of others that solve our scenes: a folder with a job goes out, an answer comes back."""
+"""External simulators: `validate` writes a job into a folder, the program writes its answer."""

@@ -1,7 +1,7 @@
-"""What a guest answered: `answer.json` and its fields, read as a stranger's files are.
+"""Answer of an external simulator: `answer.json` and its fields, read from untrusted files.
 
-Nothing in them is believed unchecked: sizes and shapes before memory is taken, mesh and times
-against the job, law and parameters against what was asked, forces against each other.
+Everything is checked: sizes and shapes before memory is allocated, mesh and times against the job,
+law and parameters against the request, and forces against each other.
 """
 
 import json
@@ -19,10 +19,10 @@ from validate.errors import RecordingError, UsageError, ValidateError
 from validate.files import npz_arrays
 from validate.recording.formats.apart import decoded
 from validate.scene.scene import Weight
-from validate.solve.external.job import GuestJob
+from validate.solve.external.job import ExternalJob
 from validate.solve.external.program import plain
 
-# --- The fields of a guest's answer: `fields.npz`, or .vtu files listed in `fields.pvd`.
+# --- The fields of an answer: `fields.npz`, or .vtu files listed in `fields.pvd`.
 
 _HEADER_BYTES = 4096
 _NUMBER_BYTES = 32  # of a number in a .vtu, as text
@@ -35,7 +35,7 @@ class NoAnswerError(ValidateError):
     """Files that are no answer to the job."""
 
 
-def fields_of(folder: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+def fields_of(folder: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     """t (k,), u (k, n, 3) and, where given, reactions of that shape, with k at most the job's."""
     npz, pvd = folder / "fields.npz", folder / "fields.pvd"
     if pvd.exists() and not npz.exists():
@@ -43,7 +43,7 @@ def fields_of(folder: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     return _shaped(_arrays(npz, job), npz.name, job)
 
 
-def _series(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+def _series(path: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     """Of the files beside the list, whose points are the job's nodes in their order."""
     regular(path, _LIST_BYTES)
     mesh = job.scene.mesh
@@ -64,7 +64,7 @@ def _series(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     return found
 
 
-def _arrays(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
+def _arrays(path: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     nodes, most = job.scene.mesh.nodes.size, len(job.times)
     room = 8 * most * (2 * nodes + 1) + 3 * _HEADER_BYTES
     regular(path, room + _HEADER_BYTES)
@@ -76,7 +76,7 @@ def _arrays(path: Path, job: GuestJob) -> dict[str, NDArray[Any]]:
     return {name: _number_array(found[name], name) for name in wanted}
 
 
-def _shaped(found: dict[str, NDArray[Any]], file: str, job: GuestJob) -> dict[str, NDArray[Any]]:
+def _shaped(found: dict[str, NDArray[Any]], file: str, job: ExternalJob) -> dict[str, NDArray[Any]]:
     """Raises `NoAnswerError` for arrays that are missing or of other shapes than the job's."""
     if not {"t", "u"} <= set(found):
         raise NoAnswerError(f"{file}: arrays {sorted(found)}, expected t and u")
@@ -109,7 +109,8 @@ def regular(path: Path, most: int) -> Path:
 
 # -------------------------------------------------------------------------------------------------
 
-ANSWER_SCHEMA = "validate-guest-answer/1"
+ANSWER_SCHEMA = "validate-external-answer/1"
+_FORMER_SCHEMA = "validate-guest-answer/1"  # of programs for an earlier version
 _STATES = ("finished", "cannot_run", "diverged", "not_converged")
 _JSON_BYTES = 4_000_000
 _LINES = 20  # of what it could not do
@@ -119,9 +120,12 @@ _HUGE = 1e12  # m or N
 
 
 @dataclass(frozen=True)
-class GuestAnswer:
-    """`state` and `why` in the guest's words; u (k, n, 3) m and reactions (k, n, 3) N, or None, of
-    the times done; seconds as it says; `findings`: what is odd, in words."""
+class ExternalAnswer:
+    """Answer to a job; `state` and `why` are reported by the simulator.
+
+    u (k, n, 3) m and reactions (k, n, 3) N or None at the finished times; seconds as reported;
+    `findings` are deviations from the job, one line each.
+    """
 
     name: str
     state: str
@@ -133,17 +137,19 @@ class GuestAnswer:
     findings: tuple[str, ...]
 
 
-def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
+def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
     """Raises `NoAnswerError` with the reason where there is no answer to this job."""
     said = _document(folder)
-    name = f"{_text(said, 'name') or 'a guest'} {_text(said, 'version') or '(no version)'}"
+    name = (
+        f"{_text(said, 'name') or 'external simulator'} {_text(said, 'version') or '(no version)'}"
+    )
     state, why = _text(said, "state"), _text(said, "reason")
     if state not in _STATES:
         raise NoAnswerError(f"answer.json: state '{state}', expected {', '.join(_STATES)}")
     if state == "cannot_run":
         nothing = np.zeros((0, *job.scene.mesh.nodes.shape))
         why = why or "no reason given"
-        return GuestAnswer(name, state, why, nothing, None, 0.0, None, _limits(said))
+        return ExternalAnswer(name, state, why, nothing, None, 0.0, None, _limits(said))
     if said.get("mesh_sha256") != job.document["mesh"]["sha256"]:
         raise NoAnswerError("answer.json: mesh_sha256 differs from that of the job's mesh.vtu")
     arrays = fields_of(folder, job)
@@ -158,7 +164,7 @@ def read_answer(folder: Path, job: GuestJob) -> GuestAnswer:
         *_limits(said), *echoed(job.document["material"], said.get("used")),
         *_kept_still(job, u[:step]), *_balance(job, reactions),
     )  # fmt: skip
-    return GuestAnswer(name, state, why, u[:step], reactions, setup, seconds, findings)
+    return ExternalAnswer(name, state, why, u[:step], reactions, setup, seconds, findings)
 
 
 def echoed(asked: Mapping[str, Any], used: Any) -> tuple[str, ...]:
@@ -190,7 +196,9 @@ def _document(folder: Path) -> dict[str, Any]:
         said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
-    if not isinstance(said, dict) or said.get("schema") != ANSWER_SCHEMA:
+    if not isinstance(said, dict) or said.get("schema") not in (
+        ANSWER_SCHEMA, _FORMER_SCHEMA,
+    ):  # fmt: skip
         raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
     return said
 
@@ -205,10 +213,14 @@ def _text(said: Mapping[str, Any], key: str) -> str:
 
 
 def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
+    former = said.get("schema") == _FORMER_SCHEMA
+    found = (f"answers by the former schema '{_FORMER_SCHEMA}'; write '{ANSWER_SCHEMA}'",) * former
     lines = said.get("could_not", [])
     if not isinstance(lines, list):
-        return ("gives no list of what it could not do",)
-    return tuple(f"could not: {plain(line)}" for line in lines[:_LINES] if isinstance(line, str))
+        return (*found, "gives no list of what it could not do")
+    return found + tuple(
+        f"could not: {plain(line)}" for line in lines[:_LINES] if isinstance(line, str)
+    )
 
 
 def _usable(values: Floats) -> NDArray[np.bool_]:
@@ -218,7 +230,7 @@ def _usable(values: Floats) -> NDArray[np.bool_]:
         return np.asarray((np.abs(values) < _HUGE).all(axis=(1, 2)))
 
 
-def _times_done(t: Floats, job: GuestJob, state: str) -> int:
+def _times_done(t: Floats, job: ExternalJob, state: str) -> int:
     """How many of the job's times were done: all of them, or the first ones if it gave up."""
     asked = job.times[: len(t)]
     slack = 1e-9 * max(float(job.times[-1]), 1e-30)
@@ -247,7 +259,7 @@ def _is_time(value: Any) -> bool:
     return 0 < value < 1e9
 
 
-def _kept_still(job: GuestJob, u: Floats) -> tuple[str, ...]:
+def _kept_still(job: ExternalJob, u: Floats) -> tuple[str, ...]:
     """Whether what is held and driven is where the job has it."""
     system = job.system
     asked = job.inputs[: len(u), : system.moves.shape[1]] @ system.moves.T
@@ -261,7 +273,7 @@ def _kept_still(job: GuestJob, u: Floats) -> tuple[str, ...]:
     )
 
 
-def _balance(job: GuestJob, reactions: Floats | None) -> tuple[str, ...]:
+def _balance(job: ExternalJob, reactions: Floats | None) -> tuple[str, ...]:
     """In statics what supports and drives push is what loads and weight pull."""
     if reactions is None:
         return (

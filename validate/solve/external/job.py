@@ -1,4 +1,4 @@
-"""What a guest is given: a folder with `job.json` and `mesh.vtu` (docs/guests.md)."""
+"""Job of an external simulator: `job.json` and `mesh.vtu` (docs/external-simulators.md)."""
 
 import json
 from collections.abc import Mapping
@@ -18,13 +18,12 @@ from validate.scene.material import Material
 from validate.scene.mesh_files.vtu import CELL_TYPES, write_vtu
 from validate.scene.scene import Scene, Weight
 
-JOB_SCHEMA = "validate-guest-job/1"
+JOB_SCHEMA = "validate-external-job/1"
 
 
 @dataclass(frozen=True)
-class GuestJob:
-    """What was asked: `document` is the JSON; held (N,) marks the prescribed unknowns of `system`;
-    `inputs` (nt, k) at `times` s."""
+class ExternalJob:
+    """Job that was written: `document` is the JSON, `inputs` (nt, k) are those at `times` s."""
 
     system: System
     times: Floats
@@ -38,7 +37,7 @@ class GuestJob:
 
 def write_job(
     folder: Path, scene: Scene, t: Floats, inputs: Floats, inertia: bool, tolerance: float
-) -> GuestJob:
+) -> ExternalJob:
     """Writes mesh and job; raises `SceneError` for what a job does not carry."""
     _require_carried(scene, t)
     write_vtu(scene.mesh, folder / "mesh.vtu")
@@ -64,7 +63,7 @@ def write_job(
         "tolerance": tolerance,
     }
     (folder / "job.json").write_text(json.dumps(document, indent=1, allow_nan=False), "utf-8")
-    return GuestJob(system, t, inputs, document)
+    return ExternalJob(system, t, inputs, document)
 
 
 def asked_material(scene: Scene, inertia: bool) -> dict[str, Any]:

@@ -1,21 +1,23 @@
-"""A guest's body that is let go: its swing from one job, the rest that it comes to from another."""
+"""External simulation of a released body: one job for the swing, one for the final rest."""
 
 from dataclasses import dataclass, fields, replace
 
 from validate.arrays import Floats
 from validate.scene.scene import Scene
 from validate.solve.dynamic.let_go import joined
-from validate.solve.external.scheme import Guest, at_rest
+from validate.solve.external.scheme import ExternalSimulator, at_rest
 from validate.solve.types import Run
 
 
 @dataclass(frozen=True)
-class GuestLetGo(Guest):
-    """As `LetGo`: even steps of time, then statics at the last instant."""
+class ExternalLetGo(ExternalSimulator):
+    """Settings as of `LetGo`: even steps of time, then statics at the last instant."""
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
-        """Under inputs (nt, k) at t (nt,) s; refused as a guest is."""
-        plain = Guest(**{f.name: getattr(self, f.name) for f in fields(Guest)})
+        """Return the run under inputs (nt, k) at t (nt,) s; refused as by `ExternalSimulator`."""
+        plain = ExternalSimulator(
+            **{f.name: getattr(self, f.name) for f in fields(ExternalSimulator)}
+        )
         moving = replace(plain, inertia=True).solve(scene, t[:-1], inputs[:-1])
         if not moving.finished:
             return moving

@@ -1,13 +1,15 @@
-"""What an external simulator is made of: a stored run of it holds while none of that changes."""
+"""Program of an external simulator: its command, its process with limits, and its version."""
 
 import hashlib
 import os
+import re
 import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import distributions
@@ -17,13 +19,13 @@ from validate.catalogue import shipped
 from validate.errors import UsageError
 from validate.plugins import Registry
 
-# --- External simulators by name: `validate run NAME --guest felupe`.
+# --- External simulators by name: `validate run NAME --external felupe`.
 
 
 @dataclass(frozen=True)
 class Simulator:
     """An external simulator: its name, what it is, the `command` that is called with a folder
-    (docs/guests.md), and the `programs` that the command starts."""
+    (docs/external-simulators.md), and the `programs` that the command starts."""
 
     name: str
     doc: str
@@ -31,8 +33,11 @@ class Simulator:
     programs: tuple[str, ...] = ()
 
 
+_FORMER_PATH = re.compile(r"benchmarks/guests/(\w+)_guest\.")  # read for one version
+
+
 def _shipped(name: str, doc: str, *programs: str) -> Simulator:
-    return Simulator(name, doc, f"python benchmarks/guests/{name}_guest.py", programs)
+    return Simulator(name, doc, f"python benchmarks/external/{name}_simulator.py", programs)
 
 
 def _faults(part: object) -> str:
@@ -56,11 +61,11 @@ SIMULATORS: Registry[Simulator] = Registry(
 
 def simulator_of(command: str) -> Simulator | None:
     """The simulator of this name, or that of this command; None where there is none."""
-    return next((s for s in SIMULATORS if command in (s.name, s.command)), None)
+    known = (command, _without_former_path(command))
+    return next((s for s in SIMULATORS if s.name == command or s.command in known), None)
 
 
-# --- A program of others is run: alone in its process group, within limits, at home in one
-# folder.
+# --- The program runs in a process group with limits; its home is one folder.
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _CACHES = (
@@ -119,10 +124,20 @@ def _whole(word: str) -> str:
     for path in (Path(word), shipped().parent / word):
         if path.is_file():
             return str(path.absolute())
-    return word
+    now = _without_former_path(word)
+    path = shipped().parent / now
+    if now == word or not path.is_file():
+        return word
+    warnings.warn(f"{word} is called {now} now", DeprecationWarning, stacklevel=2)
+    return str(path.absolute())
 
 
-def run_guest(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
+def _without_former_path(command: str) -> str:
+    """Return a command with today's path of a shipped script."""
+    return _FORMER_PATH.sub(r"benchmarks/external/\1_simulator.", command)
+
+
+def run_program(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
     """Runs a command with the folder as its last argument until it ends or a limit ends it.
 
     Whatever of its process group is left then is ended too. The limit of memory is each process's;
@@ -205,7 +220,7 @@ def _last_line(path: Path) -> str:
 
 
 def _peak(path: Path) -> int:
-    """Bytes; a file that the guest itself wrote there is no more believed than its other words."""
+    """Return the peak in bytes; 0 if the file is damaged, since the program can write it, too."""
     text = _last_line(path)
     return int(text) if text.isdecimal() and len(text) < 16 else 0
 

@@ -15,14 +15,14 @@ from validate.fem.assembly.locate import probe_rows
 from validate.parameters import quantity
 from validate.scene.material import Prony
 from validate.scene.scene import Scene
-from validate.solve.external.answer import GuestAnswer, NoAnswerError, read_answer
-from validate.solve.external.job import GuestJob, write_job
-from validate.solve.external.program import Ended, Limits, run_guest, size_of, words
+from validate.solve.external.answer import ExternalAnswer, NoAnswerError, read_answer
+from validate.solve.external.job import ExternalJob, write_job
+from validate.solve.external.program import Ended, Limits, run_program, size_of, words
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.march import given_traces, probe_traces, step_times
 from validate.solve.types import Ending, Outcome, Run, Trace
 
-# --- Which times a guest is asked for, and what its answers say of all the others.
+# --- Requested times, and the run at all times from the answers at these.
 #
 # An elastic body in equilibrium knows its inputs and no history, so that statics need not be
 # asked again where the inputs are the same, nor everywhere where one input alone changes.
@@ -105,17 +105,17 @@ def at_rest(scene: Scene) -> Scene:
 
 # -------------------------------------------------------------------------------------------------
 
-_FOLDER = "validate-guest-"
+_FOLDER = "validate-external-"
 
 
 @dataclass(frozen=True)
-class Guest:
-    """Settings of a program of others, called as `command FOLDER` (docs/guests.md).
+class ExternalSimulator:
+    """Settings of an external simulator, called as `command FOLDER`: docs/external-simulators.md.
 
-    What it cannot do, a program that is not there, and a crash, a hang or a wrong answer, are the
-    outcome of its run. In statics a Prony series stands for its relaxed limit, and times whose
-    inputs are those of the time before are not asked again: the answer is the same. It is asked at
-    each of a few `levels` instead where there are many times.
+    The outcome of the run reports an unsupported scene, a missing program, a crash, a time-out and
+    a wrong answer. In statics a Prony series becomes its relaxed limit. A time whose inputs equal
+    those of the previous time is not requested again. With `levels` the job has so many even levels
+    of one input in place of all times.
     """
 
     handles: ClassVar[Handles] = Handles(
@@ -154,7 +154,7 @@ class Guest:
             job = write_job(folder, scene, asked.t, asked.inputs, self.inertia, self.tolerance)
             most = size_of(folder) + int(self.output * 2**20)
             limits = Limits(self.seconds, int(self.memory * 2**20), most)
-            ended = run_guest(command, folder, limits)
+            ended = run_program(command, folder, limits)
             return asked.answered(run_of(folder, job, ended))
 
     def _statics(self, t: Floats, inputs: Floats) -> Asked:
@@ -170,7 +170,7 @@ def _unasked(why: str) -> Run:
                Outcome("refused", 0, why), 0.0, None)  # fmt: skip
 
 
-def run_of(folder: Path, job: GuestJob, ended: Ended) -> Run:
+def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
     """A run of what came back, or one without steps that says why there is none."""
     if ended.why:
         return _none(job, "invalid", f"{ended.why}{ended.said and ': '}{ended.said}", ended)
@@ -183,7 +183,9 @@ def run_of(folder: Path, job: GuestJob, ended: Ended) -> Run:
     return _answered(job, answer, ended)
 
 
-def _none(job: GuestJob, state: Ending, why: str, ended: Ended, said: tuple[str, ...] = ()) -> Run:
+def _none(
+    job: ExternalJob, state: Ending, why: str, ended: Ended, said: tuple[str, ...] = ()
+) -> Run:
     shape = job.scene.mesh.nodes.shape
     traces = {"updates": Trace(np.zeros(0), "1")}
     at = np.zeros(0, dtype=np.int64)
@@ -191,9 +193,9 @@ def _none(job: GuestJob, state: Ending, why: str, ended: Ended, said: tuple[str,
                ended.seconds, None, said=said, memory=ended.memory)  # fmt: skip
 
 
-def _answered(job: GuestJob, answer: GuestAnswer, ended: Ended) -> Run:
+def _answered(job: ExternalJob, answer: ExternalAnswer, ended: Ended) -> Run:
     u, steps = answer.u, len(answer.u)
-    said = (f"guest: {answer.name}", *answer.findings, *_overdrawn(answer, ended))
+    said = (f"external: {answer.name}", *answer.findings, *_overdrawn(answer, ended))
     return Run(
         "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
         Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
@@ -201,7 +203,7 @@ def _answered(job: GuestJob, answer: GuestAnswer, ended: Ended) -> Run:
     )  # fmt: skip
 
 
-def _traces(job: GuestJob, answer: GuestAnswer) -> dict[str, Trace]:
+def _traces(job: ExternalJob, answer: ExternalAnswer) -> dict[str, Trace]:
     """Inputs and probes; `<drive>.force` N of the whole body, compression positive, where told."""
     scene, steps = job.scene, len(answer.u)
     traces = {"updates": Trace(np.zeros(steps), "1")}
@@ -217,7 +219,7 @@ def _traces(job: GuestJob, answer: GuestAnswer) -> dict[str, Trace]:
     return traces
 
 
-def _overdrawn(answer: GuestAnswer, ended: Ended) -> tuple[str, ...]:
+def _overdrawn(answer: ExternalAnswer, ended: Ended) -> tuple[str, ...]:
     """Its own times are believed as far as they fit into the time that it took."""
     told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
     if told <= ended.seconds:

@@ -1,4 +1,4 @@
-"""Small scenes with exact answers, that show what a guest can do and how far off it is."""
+"""Small scenes with exact solutions: capabilities and accuracy of an external simulator."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Drive, DriveShape, Scene, Support, Weight
 from validate.solve.external.program import words
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.types import Run
 
 _E, _NU, _RHO, _G = 10e3, 0.3, 1000.0, 9.81
@@ -39,9 +39,9 @@ class SmallScene:
 
 @dataclass(frozen=True)
 class OffBy:
-    """How far a guest is off in one quantity at most; `exact` is the quantity's largest value.
+    """Largest error of one quantity; `exact` is the largest exact value of that quantity.
 
-    `error` is None where there is none to tell: `state` and `why` say what came of the run.
+    `error` is None if the run has no such quantity; `state` and `why` are the outcome of the run.
     """
 
     scene: str
@@ -58,14 +58,14 @@ def small_scenes() -> tuple[SmallScene, ...]:
     return (_moved(), _turned(), _patch(), _stretched(), _stretched_far(), _hanging(), _ringing())
 
 
-def check_guest(guest: Guest) -> Iterator[tuple[OffBy, ...]]:
-    """What a guest makes of every small scene, one after the other, and what it was found to do.
+def check_simulator(simulator: ExternalSimulator) -> Iterator[tuple[OffBy, ...]]:
+    """Run every small scene and yield its errors, one scene after the other.
 
-    Raises `UsageError` for a command that is no program's.
+    Raises `UsageError` for a command whose program is missing.
     """
-    words(guest.command)
+    words(simulator.command)
     for small in small_scenes():
-        run = replace(guest, inertia=small.inertia).solve(small.scene, small.t, small.inputs)
+        run = replace(simulator, inertia=small.inertia).solve(small.scene, small.t, small.inputs)
         yield _measured(small, run)
 
 

@@ -26,21 +26,24 @@ from validate.pipeline.run.job import Job
 from validate.scene.material import LawName
 from validate.scene.scene import Scene
 from validate.solve.external.program import words
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.march import march
 from validate.solve.types import Run, SceneSolver, Scheme, Stepper, StepTimes
 from validate.study.tradeoff.held import held_bytes
 
-# --- Programs of others on the ladder of a trade: each run is a process of its own.
+# --- External simulators on the ladder of a trade-off: each run is a separate process.
 
-GUEST = "guest "  # what their names begin with
+EXTERNAL = "external "  # prefix of their names
 _CARRIED = ("P1", "P2", "H8")  # elements that a job carries
 _SECONDS = 120.0  # of one run, start and files included
 
 
-def with_guests_beside(trial: Trial, commands: Sequence[str]) -> Trial:
-    """The trial with every guest by the linear law and, where there is a pair, at large strain, by
-    the ladder's longest steps. Raises `UsageError` for a command that is no program's."""
+def with_simulators(trial: Trial, commands: Sequence[str]) -> Trial:
+    """Return the trial with every external simulator as a solver, at the ladder's longest steps.
+
+    Each has the linear law and, if the trial has a pair of laws, large strain. Raises `UsageError`
+    for a command whose program is missing.
+    """
     rivals = [r for command in commands for r in _rivals(trial, command)]
     return replace(trial, solvers=(*trial.solvers, *rivals)) if rivals else trial
 
@@ -51,16 +54,16 @@ def _rivals(trial: Trial, command: str) -> list[Rival]:
     laws: tuple[LawName, ...] = ("linear", *((trial.pair.law,) if trial.pair else ()))
     return [
         Rival(
-            f"{GUEST}{_called(command)}" + ("" if law == "linear" else ", large strain"),
-            "guests", partial(_guest, command, trial.dynamic), law=law,
+            f"{EXTERNAL}{_called(command)}" + ("" if law == "linear" else ", large strain"),
+            "external simulators", partial(_external, command, trial.dynamic), law=law,
             elements=own or ("-",), shortest=trial.steps[0],
         )
         for law in laws
     ]  # fmt: skip
 
 
-def _guest(command: str, moving: bool, dt: float) -> Guest:
-    return Guest(command, inertia=moving, seconds=_SECONDS)
+def _external(command: str, moving: bool, dt: float) -> ExternalSimulator:
+    return ExternalSimulator(command, inertia=moving, seconds=_SECONDS)
 
 
 def _called(command: str) -> str:
@@ -131,14 +134,17 @@ class Measured:
 
 
 def keyed(job: Job, cell: TradeCell) -> TradeCell:
-    """Times are this machine's, answers are everyone's, whatever guests stand beside."""
+    """Return the cell with its key.
+
+    Times are valid on one machine. External simulators do not change the key of another solver.
+    """
     machine = platform.node() if cell.timed else ""
-    job = job if cell.solver.startswith(GUEST) else replace(job, guests=())
+    job = job if cell.solver.startswith(EXTERNAL) else replace(job, simulators=())
     return replace(cell, key=key_of(job, cell, machine))
 
 
 def open_trial(job: Job) -> Trial:
-    return with_guests_beside(trial_of(job.experiment(), job.quick), job.guests)
+    return with_simulators(trial_of(job.experiment(), job.quick), job.simulators)
 
 
 def run_cell(trial: Trial, cell: TradeCell) -> Measured:

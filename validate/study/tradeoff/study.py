@@ -33,7 +33,7 @@ from validate.study.tradeoff.cell import (
     keyed,
     open_trial,
     run_cell,
-    with_guests_beside,
+    with_simulators,
 )
 
 KIND = "tradeoff"
@@ -238,17 +238,19 @@ def trade(
     experiment: str | Experiment,
     *,
     quick: bool = False,
-    guests: tuple[str, ...] = (),
+    simulators: tuple[str, ...] = (),
     out: Path | None = None,
     where: Where | None = None,
     report: Report | None = None,
 ) -> Trade:
-    """Runs what is not finished yet in `out`/<name>/study-tradeoff/cells. A cell that fails is a
-    row with the reason; `guests` are command lines of programs of others. Raises `ComparisonError`
-    without a reference."""
+    """Run the cells that are not finished in `out`/<name>/study-tradeoff/cells.
+
+    A cell that fails is a row with the reason; `simulators` are command lines of external
+    simulators. Raises `ComparisonError` without a reference.
+    """
     found = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
-    trial = with_guests_beside(trial_of(found, quick), guests)
-    job = replace(job_of(found, quick=quick), guests=guests)
+    trial = with_simulators(trial_of(found, quick), simulators)
+    job = replace(job_of(found, quick=quick), simulators=simulators)
     cells = trade_cells(trial, job)
     done = finish(plan_of(job, cells), study_folder(found, KIND, out) / CELLS, where, report)
     return traded(found, trial, cells, done, quick)

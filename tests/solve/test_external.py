@@ -1,4 +1,4 @@
-"""A guest is a stranger: what it does wrong is a row, and what it does right is its run."""
+"""External simulators are untrusted: an error is a row of the report, a valid answer is a run."""
 
 import json
 import os
@@ -27,7 +27,7 @@ from validate.solve.external import program as ran
 from validate.solve.external.answer import NoAnswerError, echoed
 from validate.solve.external.job import write_job
 from validate.solve.external.program import Ended
-from validate.solve.external.scheme import Guest, run_of
+from validate.solve.external.scheme import ExternalSimulator, run_of
 from validate.solve.march import run_scheme
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run
@@ -57,7 +57,7 @@ for drive in job["drives"]:
     u[:, :, 2] = np.array(drive["history"])[-len(t):, None]
 fields = {"t": t, "u": u, "reactions": np.zeros_like(u)}
 answer = {
-    "schema": "validate-guest-answer/1", "name": "fake", "version": "1", "state": "finished",
+    "schema": "validate-external-answer/1", "name": "fake", "version": "1", "state": "finished",
     "used": job["material"], "mesh_sha256": job["mesh"]["sha256"],
     "setup_s": 1e-6, "step_s": [1e-6] * len(t),
 }
@@ -68,11 +68,13 @@ np.savez(folder / "fields.npz", **fields)
 """
 
 
-def guest(tmp_path: Path, twist: str = "", rest: str = WRITTEN, **settings: float) -> Guest:
+def simulator(
+    tmp_path: Path, twist: str = "", rest: str = WRITTEN, **settings: float
+) -> ExternalSimulator:
     """One whose program does something else before it writes."""
-    script = tmp_path / "guest.py"
+    script = tmp_path / "program.py"
     script.write_text(HONEST + twist + rest, "utf-8")
-    return Guest(shlex.join([sys.executable, str(script)]), seconds=20.0, **settings)  # type: ignore[arg-type]
+    return ExternalSimulator(shlex.join([sys.executable, str(script)]), seconds=20.0, **settings)  # type: ignore[arg-type]
 
 
 def answered(
@@ -85,17 +87,17 @@ def answered(
     """The same without a process of its own, which takes most of the time."""
     job = write_job(tmp_path, scene, T, inputs, False, 1e-6)
     program = (HONEST + twist + rest).replace("sys.argv[-1]", repr(str(tmp_path)))
-    exec(compile(program, "guest.py", "exec"), {})
+    exec(compile(program, "program.py", "exec"), {})
     return run_of(tmp_path, job, Ended(1.0, "", ""))
 
 
-def shell(script: str, **settings: float) -> Guest:
+def shell(script: str, **settings: float) -> ExternalSimulator:
     """One that is a line of the shell: it starts at once."""
-    return Guest(shlex.join(["sh", "-c", script]), **settings)  # type: ignore[arg-type]
+    return ExternalSimulator(shlex.join(["sh", "-c", script]), **settings)  # type: ignore[arg-type]
 
 
-def solved(one: Guest, scene: Scene = SCENE) -> Run:
-    return run_scheme("guest", one, scene, T, INPUTS, np.array([0, 1]))
+def solved(one: ExternalSimulator, scene: Scene = SCENE) -> Run:
+    return run_scheme("external", one, scene, T, INPUTS, np.array([0, 1]))
 
 
 SERIES = """
@@ -147,15 +149,25 @@ def test_a_series_that_is_none_is_a_row(tmp_path: Path, after: str, why: str) ->
     assert re.search(why, run.outcome.why), run.outcome.why
 
 
-def test_an_honest_guest_is_a_run(tmp_path: Path) -> None:
-    run = solved(guest(tmp_path))
+def test_a_valid_answer_is_a_run(tmp_path: Path) -> None:
+    run = solved(simulator(tmp_path))
     assert run.finished
     assert np.array_equal(run.u[1], np.tile([0.0, 0.0, 0.001], (12, 1)))
     assert run.traces["top.z"].y == pytest.approx([0.0005, 0.001])
     assert run.traces["lift.displacement"].y.tolist() == [0.0005, 0.001]
     assert run.traces["lift.force"].y.tolist() == [0.0, 0.0]
     assert (run.setup_s, run.step_s.n if run.step_s else 0) == (1e-6, 2)
-    assert run.said == ("guest: fake 1",)
+    assert run.said == ("external: fake 1",)
+
+
+def test_an_answer_with_the_former_schema_is_read(tmp_path: Path) -> None:
+    run = answered(tmp_path, "answer['schema'] = 'validate-guest-answer/1'")
+    assert run.finished
+    assert run.said == (
+        "external: fake 1",
+        "answers by the former schema 'validate-guest-answer/1'; write "
+        "'validate-external-answer/1'",
+    )
 
 
 @pytest.mark.parametrize(
@@ -246,7 +258,7 @@ def test_output_and_memory_are_bounded(tmp_path: Path) -> None:
     run = solved(shell("for i in 1 2 3 4; do head -c 500000 /dev/zero > $i; done", output=1.0))
     assert "bytes in its folder, the limit is" in run.outcome.why
     greedy = shlex.join([sys.executable, "-S", "-c", "bytes(2**31)"])
-    run = solved(Guest(greedy, memory=1024.0))
+    run = solved(ExternalSimulator(greedy, memory=1024.0))
     assert (run.outcome.state, "MemoryError" in run.outcome.why) == ("invalid", True)
 
 
@@ -292,7 +304,7 @@ def test_it_is_at_home_in_the_folder_alone(tmp_path: Path) -> None:
         "inside = [os.getcwd(), *(os.environ[k] for k in ('HOME', 'TMPDIR', 'XDG_CACHE_HOME'))]\n"
         "assert all(Path(p).is_dir() and Path(p).is_relative_to(folder) for p in inside), inside"
     )
-    assert solved(guest(tmp_path, twist)).finished
+    assert solved(simulator(tmp_path, twist)).finished
 
 
 def test_the_job_is_the_scene(tmp_path: Path) -> None:
@@ -324,12 +336,14 @@ def test_the_job_is_the_scene(tmp_path: Path) -> None:
 def test_what_a_job_does_not_carry_is_refused(tmp_path: Path) -> None:
     stiff = Region("stiff", np.array([0]), Material(2e4, 0.0))
     scene = Scene(SCENE.mesh, SCENE.material, SCENE.supports, drives=SCENE.drives, regions=(stiff,))
-    refused = solved(Guest(sys.executable), scene)
+    refused = solved(ExternalSimulator(sys.executable), scene)
     assert refused.outcome.state == "refused"
     assert refused.outcome.why.startswith(
         "cannot run: a job for an external simulator cannot contain regions"
     )
-    assert "increasing" in Guest(sys.executable).solve(SCENE, T[::-1], INPUTS).outcome.why
+    assert (
+        "increasing" in ExternalSimulator(sys.executable).solve(SCENE, T[::-1], INPUTS).outcome.why
+    )
     flat = grid((0.02, 0.02), (2, 2))
     with pytest.raises(SceneError, match="not quad4"):
         write_job(tmp_path, Scene(flat, SCENE.material), T, INPUTS, False, 1e-6)
@@ -339,12 +353,12 @@ def test_what_a_job_does_not_carry_is_refused(tmp_path: Path) -> None:
 
 def test_a_program_that_is_not_there_is_a_row() -> None:
     for command, why in (("", "no command"), ("no-such-program x", "no program"), ("'", "closing")):
-        outcome = solved(Guest(command)).outcome
+        outcome = solved(ExternalSimulator(command)).outcome
         assert outcome.state == "refused"
         assert why in outcome.why
     assert (
         "not installed: there is no program 'no-such-program'"
-        in solved(Guest("no-such-program x")).outcome.why
+        in solved(ExternalSimulator("no-such-program x")).outcome.why
     )
 
 
@@ -365,7 +379,9 @@ def test_the_mesh_is_read_by_another_library(tmp_path: Path, kind: str) -> None:
 
 
 def test_it_stands_in_an_experiment_and_is_set_as_others_are() -> None:
-    method = with_values(Method("a guest", Guest()), {"command": "python g.py", "seconds": "3"})
+    method = with_values(
+        Method("external", ExternalSimulator()), {"command": "python g.py", "seconds": "3"}
+    )
     assert (method.settings.command, method.settings.seconds) == ("python g.py", 3.0)
 
 

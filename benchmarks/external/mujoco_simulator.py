@@ -1,5 +1,5 @@
-"""MuJoCo (pip install mujoco; Apache-2.0) as a guest, by a flex of linear tetrahedra that obey St.
-Venant-Kirchhoff's law, at rest and in time.
+"""MuJoCo (pip install mujoco; Apache-2.0) as an external simulator, by a flex of linear
+tetrahedra that obey St. Venant-Kirchhoff's law, at rest and in time.
 
 MuJoCo's hexahedral cells (flexcomp's dof and cellcount) and its stable neo-Hooke law
 (MjsFlex.elastic3d = 1) are not used.
@@ -8,7 +8,7 @@ Every node is a body with a slide for each component that is free; what is held 
 is driven is moved by the place of its body. At rest it is stepped, long steps and no velocity kept,
 until forces balance. Hexahedra are cut into six tetrahedra each.
 
-validate guest check "python benchmarks/guests/mujoco_guest.py"
+validate external check "python benchmarks/external/mujoco_simulator.py"
 """
 
 import json
@@ -35,7 +35,7 @@ def arrays(path):
     }
     kind, cells = int(found["types"][0]), found["connectivity"].astype(int)
     if kind not in (10, 12):
-        raise LookupError(f"cells of VTK's kind {kind}: this guest has linear tetrahedra alone")
+        raise LookupError(f"cells of VTK's kind {kind}: this simulator has linear tetrahedra only")
     cells = cells.reshape(len(found["types"]), -1)
     points, cut = found["Points"].reshape(-1, 3), kind == 12
     return points, cells[:, SIX].reshape(-1, 4) if cut else cells, cut
@@ -153,7 +153,7 @@ def solve(folder, job, answer):
     start, asked, could_not = time.perf_counter(), job["material"], answer["could_not"]
     points, cells, cut = arrays(folder / "mesh.vtu")
     if asked["law"] not in LAWS:
-        raise LookupError(f"the law {asked['law']}: this guest has St. Venant-Kirchhoff's alone")
+        raise LookupError(f"the law {asked['law']}: this simulator has St. Venant-Kirchhoff's only")
     answer["used"] = {k: v for k, v in asked.items() if k != "volumetric"} | {"law": "svk"}
     if cut:
         could_not.append("use hexahedra: each was cut into six linear tetrahedra")
@@ -187,7 +187,7 @@ if __name__ == "__main__":
     folder = Path(sys.argv[-1])
     job = json.loads((folder / "job.json").read_text())
     answer = {
-        "schema": "validate-guest-answer/1", "name": "MuJoCo", "version": "", "step_s": [],
+        "schema": "validate-external-answer/1", "name": "MuJoCo", "version": "", "step_s": [],
         "mesh_sha256": job["mesh"]["sha256"], "could_not": [], "state": "finished",
     }  # fmt: skip
     try:

@@ -1,7 +1,7 @@
 """The table of external simulators on the same recordings as ours.
 
-OMP_NUM_THREADS=1 python benchmarks/guests_table.py            prints it (some five minutes)
-OMP_NUM_THREADS=1 python benchmarks/guests_table.py --write    puts it into docs/results.md
+OMP_NUM_THREADS=1 python benchmarks/external_table.py            prints it (some five minutes)
+OMP_NUM_THREADS=1 python benchmarks/external_table.py --write    puts it into docs/results.md
 
 Needs the recordings, FElupe, CalculiX and MuJoCo. All but rate and memory is the same everywhere.
 """
@@ -18,7 +18,7 @@ from validate.pipeline import load, run_in_memory
 from validate.report.views.numbers import significant, with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
-BEGIN, END = "<!-- guests: begin -->", "<!-- guests: end -->"
+BEGIN, END = "<!-- external simulators: begin -->", "<!-- external simulators: end -->"
 HEAD = (
     "experiment", "check", "method", "error E", "2 u_val", "margin", "acceptance", "validation",
     "rate, Hz", "memory, MB",
@@ -64,7 +64,7 @@ def run(one: Judged) -> Result:
 
 def rows_of(one: Judged, result: Result) -> list[list[str]]:
     """A row a method and check; a method that could not be run stands once, with the reason."""
-    (table,) = (e.tables[0] for e in result.exhibits if e.anchor == "guests")
+    (table,) = (e.tables[0] for e in result.exhibits if e.anchor == "external_simulators")
     name = f"`{one.name}`" + (f" {one.called}" if one.called else "")
     shown = [r for check in one.checks for r in table.rows if plain(r[2]) == check]
     shown += [r for r in table.rows if plain(r[2]) == "-"]

@@ -1,9 +1,10 @@
-"""FElupe (pip install felupe; GPL-3, a program of its own) as a guest: statics of linear elasticity
-and neo-Hooke on tetrahedra and hexahedra.
+"""FElupe (pip install felupe; GPL-3, a program of its own) as an external simulator.
+
+It solves statics of linear elasticity and neo-Hooke on tetrahedra and hexahedra.
 
 Hexahedra that would lock, of neo-Hooke from nu = .45 on, take its mixed form of three fields.
 
-validate guest check "python benchmarks/guests/felupe_guest.py"
+validate external check "python benchmarks/external/felupe_simulator.py"
 """
 
 import json
@@ -85,7 +86,7 @@ def solve(folder, job, answer):
     if kind not in CELLS:
         raise LookupError(f"cells of VTK's kind {kind}")
     if job["inertia"]:
-        raise LookupError("no dynamics: this guest solves statics")
+        raise LookupError("no dynamics: this simulator solves statics")
     mesh = fem.Mesh(points, cells, CELLS[kind][0])
     field, solids = bodies(fem, job["material"], mesh, kind)
     answer["used"] = job["material"]
@@ -132,7 +133,7 @@ if __name__ == "__main__":
     folder = Path(sys.argv[-1])
     job = json.loads((folder / "job.json").read_text())
     answer = {
-        "schema": "validate-guest-answer/1", "name": "FElupe", "version": "", "step_s": [],
+        "schema": "validate-external-answer/1", "name": "FElupe", "version": "", "step_s": [],
         "mesh_sha256": job["mesh"]["sha256"],
     }  # fmt: skip
     try:

@@ -1,4 +1,4 @@
-"""Programs of others that are guests here, run for real; skipped where they are not installed."""
+"""Real runs of the shipped external simulators; skipped if a program is not installed."""
 
 import shlex
 import shutil
@@ -12,21 +12,21 @@ import pytest
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support, Weight
-from validate.solve.external.scheme import Guest
-from validate.solve.external.suite import OffBy, check_guest
+from validate.solve.external.scheme import ExternalSimulator
+from validate.solve.external.suite import OffBy, check_simulator
 from validate.solve.march import run_scheme
 from validate.solve.static.newton import StaticNewton
 
 STATICS = ("rigid motion", "rigid turn", "patch test", "uniaxial, linear", "hanging bar")
 
 
-def shipped(root: Path, script: str) -> Guest:
-    command = [sys.executable, str(root / "benchmarks" / "guests" / script)]
-    return Guest(shlex.join(command), seconds=120.0)
+def shipped(root: Path, script: str) -> ExternalSimulator:
+    command = [sys.executable, str(root / "benchmarks" / "external" / script)]
+    return ExternalSimulator(shlex.join(command), seconds=120.0)
 
 
 def checked(root: Path, script: str) -> dict[str, tuple[OffBy, ...]]:
-    return {rows[0].scene: rows for rows in check_guest(shipped(root, script))}
+    return {rows[0].scene: rows for rows in check_simulator(shipped(root, script))}
 
 
 def off(rows: tuple[OffBy, ...]) -> float:
@@ -38,10 +38,10 @@ def off(rows: tuple[OffBy, ...]) -> float:
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("felupe") is None, reason="felupe absent: the extra 'peers' has it")
 def test_felupe_solves_all_statics_and_says_that_it_has_no_dynamics(project_root: Path) -> None:
-    found = checked(project_root, "felupe_guest.py")
+    found = checked(project_root, "felupe_simulator.py")
     for name in (*STATICS, "uniaxial, neo-Hooke"):
         assert off(found[name]) < 1e-6
-        assert found[name][0].why.startswith("guest: FElupe")
+        assert found[name][0].why.startswith("external: FElupe")
         assert "; " not in found[name][0].why  # nothing ignored, changed or out of balance
     ring = found["ring-down"][0]
     assert (ring.state, ring.error) == ("refused", None)
@@ -55,7 +55,7 @@ def test_felupe_solves_all_statics_and_says_that_it_has_no_dynamics(project_root
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx absent: apt-get calculix-ccx")
 def test_calculix_solves_all_and_says_that_its_volume_term_is_another(project_root: Path) -> None:
     """Its own K/2 (J - 1)^2 costs about 1 % of the largest displacement at a stretch of 1.3."""
-    found = checked(project_root, "calculix_guest.py")
+    found = checked(project_root, "calculix_simulator.py")
     for name in STATICS:
         assert off(found[name]) < 1e-5
         assert "out of balance" not in found[name][0].why
@@ -67,9 +67,9 @@ def test_calculix_solves_all_and_says_that_its_volume_term_is_another(project_ro
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
-def test_the_guest_of_mujoco_uses_one_law_and_says_so(project_root: Path) -> None:
+def test_mujoco_uses_one_law_and_reports_it(project_root: Path) -> None:
     """Exact where St. Venant-Kirchhoff's law is asked's own answer; far off where it is not."""
-    found = checked(project_root, "mujoco_guest.py")
+    found = checked(project_root, "mujoco_simulator.py")
     for name in ("rigid turn", "patch test"):
         assert off(found[name]) < 1e-6
     for rows in found.values():
@@ -89,7 +89,7 @@ def test_the_guest_of_mujoco_uses_one_law_and_says_so(project_root: Path) -> Non
 @pytest.mark.parametrize("nu", [0.45, 0.499])
 def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path, nu: float) -> None:
     """Locking and all: the measured beam's size and modulus, 10 x 3 x 3 cells."""
-    guest, weight = shipped(project_root, "mujoco_guest.py"), np.full((1, 1), 9.80709)
+    simulator, weight = shipped(project_root, "mujoco_simulator.py"), np.full((1, 1), 9.80709)
     at, ends = np.zeros(1, int), []
     for make in (box, grid):  # its cut of hexahedra is our box's
         scene = Scene(
@@ -98,7 +98,7 @@ def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path,
             (Support("x0", (0, 1, 2)),),
             loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
         )
-        run = guest.solve(scene, np.ones(1), weight)
+        run = simulator.solve(scene, np.ones(1), weight)
         assert run.finished, run.outcome.why
         ends.append(run.u[0, scene.mesh.facet_nodes("x1"), 2].mean())
         if make is box:
@@ -115,7 +115,7 @@ def test_mujoco_bends_a_beam_as_our_tetrahedra_of_its_law_do(project_root: Path,
 def test_quadratic_cells_of_mujoco_do_not_lock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: tuple[int, int, int], end: float
 ) -> None:
-    """The same beam at nu .45 by cells that its guest does not use; mean motion of the end, mm."""
+    """The same beam at nu .45 by cells that its script does not use; mean motion of the end, mm."""
     mujoco = pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # it leaves a log where it runs
     model = mujoco.MjModel.from_xml_string(
@@ -141,7 +141,7 @@ def test_quadratic_cells_of_mujoco_do_not_lock(
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    find_spec("newton") is None, reason="newton absent: a guest by hand, pip newton"
+    find_spec("newton") is None, reason="newton absent: install it manually: pip install newton"
 )
 def test_newton_is_told_its_own_moduli(project_root: Path) -> None:
     """4/3 mu and lambda + 5/6 mu: given Lame's it would be a quarter too soft in shear."""
@@ -152,7 +152,7 @@ def test_newton_is_told_its_own_moduli(project_root: Path) -> None:
         drives=(Drive("pull", "z1", (0.0, 0.0, 1.0)),),
     )
     strain = 1e-3
-    run = shipped(project_root, "newton_guest.py").solve(
+    run = shipped(project_root, "newton_simulator.py").solve(
         scene, np.ones(1), np.array([[strain * 0.02]])
     )
     assert run.finished, run.outcome.why

@@ -1,10 +1,12 @@
-"""NVIDIA Newton on the processor (pip install newton; Apache-2.0) as a guest, by hand: statics and
-dynamics of its stable neo-Hooke on linear tetrahedra, by its semi-implicit solver.
+"""NVIDIA Newton on the processor (pip install newton; Apache-2.0) as an external simulator.
+
+It is installed manually. It solves statics and dynamics of its stable neo-Hooke law on linear
+tetrahedra, by its semi-implicit solver.
 
 Its steps are explicit, in single precision. At rest they are damped: what moves is stopped wherever
 its kinetic energy has passed a peak, until forces balance. Hexahedra are cut into six tetrahedra.
 
-validate guest check "python benchmarks/guests/newton_guest.py"
+validate external check "python benchmarks/external/newton_simulator.py"
 """
 
 import json
@@ -165,9 +167,9 @@ if __name__ == "__main__":
     folder = Path(sys.argv[-1])
     job = json.loads((folder / "job.json").read_text())
     answer = {
-        "schema": "validate-guest-answer/1", "name": "NVIDIA Newton", "version": "", "step_s": [],
+        "schema": "validate-external-answer/1", "name": "NVIDIA Newton", "version": "",
         "mesh_sha256": job["mesh"]["sha256"], "state": "finished",
-        "could_not": ["compute in double precision"],
+        "step_s": [], "could_not": ["compute in double precision"],
     }  # fmt: skip
     try:
         solve(folder, job, answer)

@@ -1,4 +1,4 @@
-"""A program of others on the ladder of a trade."""
+"""External simulators in the study of error against time."""
 
 import shlex
 import sys
@@ -16,7 +16,7 @@ from validate.scene.geometries.remeshed import of_element
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
-from validate.study.tradeoff.cell import TradeCell, keyed, run_cell, with_guests_beside
+from validate.study.tradeoff.cell import TradeCell, keyed, run_cell, with_simulators
 
 FAKE = """
 import json, sys
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 folder = Path(sys.argv[-1])
 job = json.loads((folder / "job.json").read_text())
-answer = {"schema": "validate-guest-answer/1", "name": "fake", "version": "7",
+answer = {"schema": "validate-external-answer/1", "name": "fake", "version": "7",
           "state": "cannot_run", "reason": "no such law"}
 if job["material"]["law"] == "linear":
     u = np.full((len(job["times"]), job["mesh"]["nodes"], 3), -0.05)
@@ -44,9 +44,9 @@ def test_its_answer_is_read_where_all_are_compared(tmp_path: Path) -> None:
     plain = beside("hanging_bar", "study").trial(
         NOTHING, experiment("hanging_bar").parameters, quick=True
     )
-    both = with_guests_beside(plain, (command,))
+    both = with_simulators(plain, (command,))
     linear, large = both.solvers[len(plain.solvers) :]
-    assert (linear.name, large.name) == ("guest fake", "guest fake, large strain")
+    assert (linear.name, large.name) == ("external fake", "external fake, large strain")
     assert linear.steps("H27", 2, both.steps) == ()  # a job carries none
     (stride,) = run_cell(both, TradeCell("solver", "H8", 2, both.steps, linear.name)).strides
     assert stride.u == pytest.approx(np.full((1, len(both.points), 3), -0.05))
@@ -55,12 +55,12 @@ def test_its_answer_is_read_where_all_are_compared(tmp_path: Path) -> None:
     (other,) = run_cell(both, TradeCell("solver", "H8", 2, both.steps, large.name)).strides
     assert (other.u, other.failed) == (None, "refused: cannot run: no such law")
     with pytest.raises(UsageError, match="not installed"):
-        with_guests_beside(plain, ("no-such-program",))
+        with_simulators(plain, ("no-such-program",))
 
 
-def test_what_is_no_guest_is_kept_whoever_stands_beside() -> None:
-    job, other = Job("x.py", "0"), Job("x.py", "0", guests=("a guest",))
-    ours, theirs = (TradeCell("solver", "H8", 2, (1.0,), name) for name in ("ours", "guest x"))
+def test_cells_of_internal_solvers_do_not_depend_on_simulators() -> None:
+    job, other = Job("x.py", "0"), Job("x.py", "0", simulators=("a program",))
+    ours, theirs = (TradeCell("solver", "H8", 2, (1.0,), name) for name in ("ours", "external x"))
     assert keyed(job, ours).key == keyed(other, ours).key
     assert keyed(job, theirs).key != keyed(other, theirs).key
 

@@ -1,9 +1,11 @@
-"""SOFA (sofa-framework.org; LGPL, a program of its own) as a guest: `scene.py` for SofaPython3 is
-written into the job's folder, and run where `runSofa` is found; it writes the answer itself. Made
-after the published components; SOFA was not at hand: its answer was never seen.
+"""SOFA (sofa-framework.org; LGPL, a program of its own) as an external simulator.
 
-validate run NAME --guest "python benchmarks/guests/sofa_guest.py"
-validate guest job NAME -o FOLDER; python benchmarks/guests/sofa_guest.py FOLDER
+The script writes `scene.py` for SofaPython3 into the folder of the job, and runs `runSofa` if it is
+installed; the scene writes the answer. It follows the published components; no test ran SOFA
+itself.
+
+validate run NAME --external "python benchmarks/external/sofa_simulator.py"
+validate external job NAME -o FOLDER; python benchmarks/external/sofa_simulator.py FOLDER
 runSofa FOLDER/scene.py
 """
 
@@ -201,7 +203,7 @@ def given(job, path, answer):
 
 def main(folder):
     job = json.loads((folder / "job.json").read_text())
-    answer = {"schema": "validate-guest-answer/1", "name": "SOFA", "version": "", "state": "",
+    answer = {"schema": "validate-external-answer/1", "name": "SOFA", "version": "", "state": "",
               "mesh_sha256": job["mesh"]["sha256"], "used": dict(job["material"]),
               "could_not": ["reactions"]}  # fmt: skip
     try:

@@ -1,4 +1,4 @@
-"""The small scenes that guests are checked on: their answers are exact for our own schemes too."""
+"""Small scenes for external simulators: the schemes of the package reach the exact solutions."""
 
 import json
 
@@ -49,21 +49,21 @@ def test_the_ring_down_is_reached_in_second_order() -> None:
 
 
 def test_the_bar_hangs() -> None:
-    """Stood on its clamp it would buckle by its weight: no question to a guest of large strain."""
+    """Upright it would buckle under its weight at large strain."""
     for small in (s for s in SCENES if s.name in ("hanging bar", "ring-down")):
         tip = small.scene.mesh.nodes[:, 2].argmax()
         assert np.sign(small.u[0, tip, 2]) == np.sign(small.scene.loads[0].direction[2]) == 1
 
 
 @pytest.mark.slow
-def test_a_guest_that_can_nothing_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_simulator_that_solves_nothing_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     """Each scene is a row with the reason, and the command fails."""
-    assert command_line(["guest", "check", "false", "--json"]) == 1
+    assert command_line(["external", "check", "false", "--json"]) == 1
     rows = json.loads(capsys.readouterr().out)
     assert [r["scene"] for r in rows] == [s.name for s in SCENES]
     assert {(r["state"], r["error"], r["why"]) for r in rows} == {
         ("invalid", None, "ended with code 1")
     }
-    assert command_line(["guest", "check", "false"]) == 1
+    assert command_line(["external", "check", "false"]) == 1
     assert "hanging bar: ended with code 1" in capsys.readouterr().out
-    assert command_line(["guest", "check", "no-such-program"]) == 2
+    assert command_line(["external", "check", "no-such-program"]) == 2

@@ -22,12 +22,12 @@ def script(root: Path, name: str) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def rates(project_root: Path) -> ModuleType:
-    return script(project_root, "guests_rates")
+    return script(project_root, "external_rates")
 
 
 @pytest.fixture(scope="module")
 def table(project_root: Path) -> ModuleType:
-    return script(project_root, "guests_table")
+    return script(project_root, "external_table")
 
 
 def cells(root: Path, module: ModuleType) -> list[list[str]]:
@@ -50,7 +50,7 @@ def test_at_an_error_stands_the_least_time_on_a_line_of_one_kind(rates: ModuleTy
     assert rates.at_error(points, "other", 1e-3) is None  # near by accident: a finer one is not
     assert rates.at_error(points, "other", 5e-2) == (3.0, "a")
     (row,) = rates.rows("bar", points, (5e-2,))
-    assert row == ["bar", "5 %", f"{significant(2000.0)} (a)", *["-"] * len(rates.GUESTS)]
+    assert row == ["bar", "5 %", f"{significant(2000.0)} (a)", *["-"] * len(rates.SIMULATORS)]
 
 
 def test_the_rates_name_the_cells_that_were_tried_and_no_winner(
@@ -96,7 +96,7 @@ def test_a_row_is_called_as_its_experiment_calls_the_method(
 def test_a_label_names_the_nodes_that_are_solved(
     shared_data: Path, tmp_path: Path, name: str, method: str, cells: str
 ) -> None:
-    code, _, error = here("guest", "job", name, "-o", str(tmp_path / "j"), "--method", method)
+    code, _, error = here("external", "job", name, "-o", str(tmp_path / "j"), "--method", method)
     assert code == 0, error
     mesh = json.loads((tmp_path / "j" / "job.json").read_text("utf-8"))["mesh"]
     assert mesh["kind"] == cells

@@ -1,4 +1,4 @@
-"""What a guest is asked, and what is made of its answers at all other times."""
+"""Requested times of an external simulator, and the run at all times from its answers."""
 
 import json
 from dataclasses import replace

@@ -1,6 +1,6 @@
-// Linear statics of linear tetrahedra under loads, as a guest without any library.
+// Linear statics of linear tetrahedra under loads, as an external simulator without any library.
 //
-// g++ -O2 -std=c++17 -o my_guest example_guest.cpp && validate guest check ./my_guest
+// g++ -O2 -std=c++17 -o my_simulator example_simulator.cpp && validate external check ./my_simulator
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -112,7 +112,7 @@ int main(int, char** argv) {
     string mesh = text(folder + "mesh.vtu"), material = behind(job, "\"material\": ");
     material = material.substr(0, material.find('}') + 1);
     ofstream answer(folder + "answer.json");
-    answer << R"({"schema": "validate-guest-answer/1", "name": "example in C++", "version": "1")"
+    answer << R"({"schema": "validate-external-answer/1", "name": "example in C++", "version": "1")"
            << R"(, "mesh_sha256": ")" << behind(job, "\"sha256\": \"").substr(0, 64) << '"';
     for (string has : {"\"tet4\"", "\"law\": \"linear\"", "\"inertia\": false", "\"drives\": []",
                        "\"weights\": []"})

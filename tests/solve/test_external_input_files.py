@@ -1,5 +1,7 @@
-"""Files for programs that are not here: FEBio's and SOFA's, held to their published formats, to
-what was asked, and to a stand-in that answers as those programs' documentation says."""
+"""Input files of FEBio and SOFA, which are not installed, against formats, jobs and a surrogate.
+
+The surrogate answers as the documentation of the programs describes.
+"""
 
 import json
 import os
@@ -22,7 +24,7 @@ from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
 from validate.solve.external.answer import read_answer
-from validate.solve.external.job import GuestJob, write_job
+from validate.solve.external.job import ExternalJob, write_job
 
 SIZE, COUPLED = (0.02, 0.02, 0.04), Coefficients(volumetric="coupled")
 TET = Scene(
@@ -61,10 +63,10 @@ COMPONENTS = {
 }  # fmt: skip
 
 
-def written(program: str, folder: Path, scene: Scene, **more: Any) -> GuestJob:
+def written(program: str, folder: Path, scene: Scene, **more: Any) -> ExternalJob:
     job = write_job(folder, scene, T, more.pop("inputs", INPUTS), more.pop("inertia", False), 1e-6)
     root = Path(__file__).parents[2]
-    path = root / "benchmarks" / "guests" / f"{program}_guest.py"
+    path = root / "benchmarks" / "external" / f"{program}_simulator.py"
     module = runpy.run_path(str(path))
     module["main"](folder)
     return job
@@ -159,7 +161,7 @@ def test_a_feb_holds_moves_and_pulls_as_the_job_does(
 def test_sofa_weighs_hexahedra_that_are_no_boxes_as_we_do(tmp_path: Path) -> None:
     scene = skewed()
     job = write_job(tmp_path, scene, T, LEANING, False, 1e-6)
-    path = Path(__file__).parents[2] / "benchmarks" / "guests" / "sofa_guest.py"
+    path = Path(__file__).parents[2] / "benchmarks" / "external" / "sofa_simulator.py"
     mass = runpy.run_path(str(path))["weights"](scene.mesh.nodes, scene.mesh.cells, 1000.0)
     assert mass == pytest.approx(-job.system.loads[2::3, 1])
 

@@ -1,9 +1,10 @@
-"""FEBio (febio.org; MIT, a program of its own) as a guest: `body.feb` of format 4.0 is written into
-the job's folder, and run where `febio4` is found. Written after its published format; FEBio was not
-at hand: what it answers was never seen.
+"""FEBio (febio.org; MIT, a program of its own) as an external simulator.
 
-validate run NAME --guest "python benchmarks/guests/febio_guest.py"
-validate guest job NAME -o FOLDER; python benchmarks/guests/febio_guest.py FOLDER
+The script writes `body.feb` of format 4.0 into the folder of the job, and runs `febio4` if it is
+installed. It follows the published format; no test ran FEBio itself.
+
+validate run NAME --external "python benchmarks/external/febio_simulator.py"
+validate external job NAME -o FOLDER; python benchmarks/external/febio_simulator.py FOLDER
 febio4 FOLDER/body.feb
 """
 
@@ -233,7 +234,7 @@ def fields(path, clock, shape):
 
 def main(folder):
     job = json.loads((folder / "job.json").read_text())
-    answer = {"schema": "validate-guest-answer/1", "name": "FEBio", "version": "", "state": "",
+    answer = {"schema": "validate-external-answer/1", "name": "FEBio", "version": "", "state": "",
               "mesh_sha256": job["mesh"]["sha256"], "used": dict(job["material"]),
               "could_not": ["reactions: the sign of what it prints was never tried"]}  # fmt: skip
     try:

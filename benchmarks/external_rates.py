@@ -1,15 +1,15 @@
-"""Time of a step at equal error, ours and guests': the silicone beam and the hanging bar.
+"""Time of a step at equal error, internal and external: the silicone beam and the hanging bar.
 
-OMP_NUM_THREADS=1 python benchmarks/guests_rates.py            prints the tables (some ten minutes)
-OMP_NUM_THREADS=1 python benchmarks/guests_rates.py --write    puts them into docs/results.md, too
+OMP_NUM_THREADS=1 python benchmarks/external_rates.py            prints the tables (ten minutes)
+OMP_NUM_THREADS=1 python benchmarks/external_rates.py --write    puts them into docs/results.md, too
 
-Every simulator solves the same scene on several meshes of each kind of cell that it is given; at an
-error level stands the least time of a step on the line through neighbouring meshes of one kind
-(time over error, both logarithmic), and nothing where none of its meshes comes so near, or a finer
-one leaves it again: an answer that passes the converged one is near it by accident. Wall time on
-one thread, set-up apart, the least of three; let go it is the mean of what 5 ms take (hex27/2: in
-two steps). Of CalculiX it is its program's, with start and files, because it tells no
-other. Errors are against the converged answer of our own finer meshes.
+Every simulator solves the same scene on several meshes of each cell type. The time at an error
+level is the smallest one on the lines through neighbouring meshes of one type (time over error,
+both logarithmic). A level has no time if no mesh reaches it, or if a finer mesh leaves it again:
+such an agreement is accidental. Times are wall times on one thread without set-up, the smallest of
+three. For the released beam they are means over steps of 5 ms (hex27/2: two steps). The time of
+CalculiX includes start and files, because it reports no other. Errors are relative to the converged
+solution of finer internal meshes.
 """
 
 import argparse
@@ -32,7 +32,7 @@ from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
-from validate.solve.external.scheme import Guest
+from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.static.newton import StaticNewton
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,17 +59,18 @@ SWINGS = {
     "hex27": ((2, 1, 1), (3, 1, 1), (4, 2, 2), (6, 2, 2)),
 }
 PARTS = (1, 2, 4)  # of a frame
-GUESTS = {
-    "FElupe": "felupe_guest.py", "CalculiX": "calculix_guest.py", "MuJoCo": "mujoco_guest.py",
+SIMULATORS = {
+    "FElupe": "felupe_simulator.py", "CalculiX": "calculix_simulator.py",
+    "MuJoCo": "mujoco_simulator.py",
 }  # fmt: skip
-CARRIED = {"hex8": tuple(GUESTS), "tet10": ("FElupe", "CalculiX")}  # of the cells here
-CUT = {"MuJoCo": "tet4"}  # of hexahedra its guest makes linear tetrahedra
+CARRIED = {"hex8": tuple(SIMULATORS), "tet10": ("FElupe", "CalculiX")}  # of the cells here
+CUT = {"MuJoCo": "tet4"}  # its script cuts hexahedra into linear tetrahedra
 MOVING = ("CalculiX", "MuJoCo")
 
 
 @dataclass(frozen=True)
 class Point:
-    """One mesh of a simulator: relative error, seconds of a step, bytes of a guest."""
+    """One mesh of a simulator: relative error, seconds of a step, bytes of an external one."""
 
     who: str
     cells: str
@@ -86,7 +87,7 @@ def cells_of(who: str, kind: str) -> str:
 
 def head() -> list[str]:
     """The columns, each with the cells that were tried."""
-    tried = {w: [cells_of(w, k) for k in BEAMS if w in CARRIED.get(k, ())] for w in GUESTS}
+    tried = {w: [cells_of(w, k) for k in BEAMS if w in CARRIED.get(k, ())] for w in SIMULATORS}
     columns = {"ours, ms": list(BEAMS), **tried}
     return ["scene", "error", *(f"{who}: {', '.join(kinds)}" for who, kinds in columns.items())]
 
@@ -161,11 +162,11 @@ def theirs(
     who: str, scene: Scene, t: Floats, pull: float, *, moving: bool
 ) -> tuple[Floats, float, int] | None:
     """Fields, least seconds of a step and bytes; None, with a line, where it has no answer."""
-    script = ROOT / "benchmarks" / "guests" / GUESTS[who]
-    guest = Guest(shlex.join([sys.executable, str(script)]), inertia=moving)
+    script = ROOT / "benchmarks" / "external" / SIMULATORS[who]
+    simulator = ExternalSimulator(shlex.join([sys.executable, str(script)]), inertia=moving)
     best, run = np.inf, None
     for _ in range(1 if moving else REPEATS):
-        run = guest.solve(scene, t, np.full((len(t), 1), pull))
+        run = simulator.solve(scene, t, np.full((len(t), 1), pull))
         if not run.finished or run.step_s is None:
             print(f"{who}: {run.outcome.state}: {run.outcome.why}", flush=True)
             return None
@@ -269,7 +270,7 @@ def _between(own: list[Point], level: float) -> float | None:
 def rows(scene: str, points: list[Point], levels: tuple[float, ...]) -> list[list[str]]:
     found = []
     for level in levels:
-        at = {who: at_error(points, who, level) for who in ("ours", *GUESTS)}
+        at = {who: at_error(points, who, level) for who in ("ours", *SIMULATORS)}
         cells = [f"{significant(1e3 * x[0])} ({x[1]})" if x else "-" for x in at.values()]
         found.append([scene, f"{100 * level:g} %", *cells])
     return found

@@ -1,7 +1,7 @@
-"""CalculiX (Debian: apt-get install calculix-ccx; GPL-2, a program of its own) as a guest, by its
-input deck: statics and dynamics of linear elasticity and neo-Hooke.
+"""CalculiX (Debian: apt-get install calculix-ccx; GPL-2, a program of its own) as an external
+simulator, by its input deck: statics and dynamics of linear elasticity and neo-Hooke.
 
-validate guest check "python benchmarks/guests/calculix_guest.py"
+validate external check "python benchmarks/external/calculix_simulator.py"
 """
 
 import json
@@ -236,7 +236,7 @@ if __name__ == "__main__":
     folder = Path(sys.argv[-1])
     job = json.loads((folder / "job.json").read_text())
     answer = {
-        "schema": "validate-guest-answer/1", "name": "CalculiX", "version": "",
+        "schema": "validate-external-answer/1", "name": "CalculiX", "version": "",
         "mesh_sha256": job["mesh"]["sha256"],
         "could_not": ["say how long each step took: all are their mean, its files included"],
     }  # fmt: skip
