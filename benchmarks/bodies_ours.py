@@ -12,14 +12,14 @@ from validate.commands.questions.scene import geometry_of
 from validate.compare.convergence import GridConvergence
 from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import measured_body, solid
-from validate.pipeline.checks.refined import Refined
+from validate.pipeline.checks.numerical_uncertainty import Refined
 from validate.pipeline.experiment.experiment import Experiment, Variant
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.runs import Road
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.markers.declared import as_declared
+from validate.register.markers.identity_frame import as_declared
 from validate.register.markers.markers import Together, observe_markers
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene, Support

@@ -20,14 +20,14 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
 from validate.register.markers.markers import placed_markers
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, holds_at, validating
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.march import march, output_frames
 from validate.solve.static.newton import StaticNewton
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
 
 SIDE, CELLS = 0.03, 11
 HOLDS = (2e-3, 4e-3, 6e-3)  # m

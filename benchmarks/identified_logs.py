@@ -39,15 +39,15 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.plates.choices import BONDED_PLATES, Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
-from validate.pipeline.run.road import set_out
+from validate.pipeline.run.pipeline import set_out
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 Case = Literal["linear slip", "neo_hooke slip", "linear bonded"]
 CASES: tuple[Case, ...] = ("linear slip", "neo_hooke slip", "linear bonded")

@@ -213,9 +213,9 @@ def left(folder: Path) -> list[str]:
 
 def fault(case: Case, old: dict[str, bytes]) -> str:
     """Why the output is neither the old nor a whole new one; empty where it is one of them."""
+    from validate.checksums import read_sealed
     from validate.errors import ValidateError
     from validate.recording.mcap.read import read_recording
-    from validate.seals import read_sealed
 
     place = case.place
     now = files(place)

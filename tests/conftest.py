@@ -27,7 +27,7 @@ from validate.compare.result import Result
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests

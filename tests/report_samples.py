@@ -15,7 +15,7 @@ from validate.compare.verdict import Check
 from validate.parameters import Parameter
 from validate.recording.types import Clock, Recording, Signal, Source
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.report.long_table import LongTable
 from validate.report.sections.sections import Begun, exhibits, parts

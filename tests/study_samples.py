@@ -15,18 +15,18 @@ from validate.compare.verdict import Accept
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.register.as_declared import follow_signal
+from validate.register.scene_registration import follow_signal
 from validate.pipeline.experiment.experiment import Experiment, Twin
-from validate.pipeline.run.followed import Truth
+from validate.pipeline.run.method_run import Truth
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.twin_record import stamped
 from validate.pipeline.experiment.tree import Built
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
 from validate.solve.dynamic.newmark import Newmark
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
 
 STEPS, DT = 40, 0.01
 FIXED = {n: np.array(x) for n, x in

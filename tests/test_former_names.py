@@ -20,9 +20,22 @@ def test_a_former_name_is_the_module_of_today(former: str) -> None:
         for i in range(1, former.count(".") + 1):
             import_module(".".join(["validate", *former.split(".")[:i]]))
     with pytest.warns(DeprecationWarning, match=f" is called {now.__name__} now"):
-        assert import_module(f"validate.{former}") is now
+        found = import_module(f"validate.{former}")
+    if hasattr(now, "__path__"):
+        name = next(n for n in dir(now) if not n.startswith("_"))
+        assert getattr(found, name) is getattr(now, name)
+    else:
+        assert found is now
     assert now.__spec__ is spec
     assert now.__name__ == f"validate.{FORMER[former]}"
+
+
+def test_an_old_import_hides_no_folder_of_today() -> None:
+    """`replay.ladder` is a module of the folder `pipeline.ladder` today."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import_module("validate.replay.ladder")
+    assert hasattr(import_module("validate.pipeline").ladder, "__path__")
 
 
 def test_a_name_that_never_was_is_not_found() -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from validate.checksums import SEAL, read_sealed, sealed, unsealed
 from validate.errors import RecordingError
-from validate.seals import SEAL, read_sealed, sealed, unsealed
 
 CONTENT = {"b": [1, 2.5, None], "a": {"text": "ä", "big": 2**70}}
 

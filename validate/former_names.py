@@ -6,12 +6,14 @@ An import by a former name gives a `DeprecationWarning` with the new name.
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
 
 FORMER = {
-    "compare.expected": "compare.overall",
+    "compare.expected": "compare.overall_verdict",
+    "compare.overall": "compare.overall_verdict",
     "compare.shape_error": "compare.shapes.shape_error",
     "compare.two_fields": "compare.shapes.two_fields",
     "estimate.batch": "estimate.kalman.batch",
@@ -27,22 +29,25 @@ FORMER = {
     "fem.locate": "fem.assembly.locate",
     "recording.alignment": "recording.clocks.alignment",
     "recording.events": "recording.clocks.events",
+    "recording.formats.recorded": "recording.formats.streams",
+    "register.as_declared": "register.scene_registration",
     "register.fitting": "register.markers.fitting",
-    "register.follow": "register.as_declared",
+    "register.follow": "register.scene_registration",
     "register.quality": "register.markers.quality",
+    "register.registered": "register.registration",
     "register.transform": "register.markers.transform",
     "replay": "pipeline",
     "replay.calibration": "pipeline.calibration.calibration",
     "replay.cards": "pipeline.experiment.tree",
     "replay.compression": "pipeline.plates.compression",
     "replay.experiment": "pipeline.experiment.experiment",
-    "replay.followed": "pipeline.run.followed",
+    "replay.followed": "pipeline.run.method_run",
     "replay.inclusion": "pipeline.plates.inclusion",
     "replay.ladder": "pipeline.ladder.ladder",
     "replay.ladder_solvers": "pipeline.ladder.references",
     "replay.live": "pipeline.live",
     "replay.method": "pipeline.experiment.method",
-    "replay.remade": "pipeline.run.remade",
+    "replay.remade": "pipeline.run.twin_record",
     "replay.swinging_block": "pipeline.swinging_block",
     "replay.tree": "pipeline.experiment.tree",
     "replay.variation": "pipeline.experiment.variation",
@@ -70,7 +75,7 @@ FORMER = {
     "solve.haptic_loop": "solve.haptic.loop",
     "solve.harmonic": "solve.static.without_mechanics",
     "solve.implicit": "solve.dynamic.implicit",
-    "solve.let_go": "solve.dynamic.let_go",
+    "solve.let_go": "solve.dynamic.release",
     "solve.modal": "solve.dynamic.modal",
     "solve.needle": "solve.haptic.needle",
     "solve.newmark": "solve.dynamic.newmark",
@@ -81,9 +86,11 @@ FORMER = {
     "solve.quasi_static": "solve.static.quasi_static",
     "solve.rigid_motion": "solve.static.without_mechanics",
     "solve.stretch_test": "solve.static.stretch_test",
-    "solve.tabulated": "solve.static.tabulated",
+    "solve.tabulated": "solve.static.load_table",
     "solve.touched_krylov": "solve.regions.krylov",
     "solve.viscous_modes": "solve.dynamic.viscous_modes",
+    "twin.stepped": "twin.time_stepping",
+    "twin.tracked": "twin.tracker",
 }
 
 
@@ -93,7 +100,7 @@ FORMER_MEMBERS: Mapping[str, Mapping[str, str]] = {
     "estimate.filterpy.filters": {"FilterpyGuest": "FilterpyFilter"},
     "solve.external.answer": {"GuestAnswer": "ExternalAnswer"},
     "solve.external.job": {"GuestJob": "ExternalJob"},
-    "solve.external.let_go": {"GuestLetGo": "ExternalLetGo"},
+    "solve.external.release": {"GuestLetGo": "ExternalLetGo"},
     "solve.external.scheme": {"Guest": "ExternalSimulator"},
     "solve.external.suite": {"check_guest": "check_simulator"},
 }
@@ -129,12 +136,19 @@ class FormerNames:
         now = f"validate.{FORMER[spec.name.removeprefix('validate.')]}"
         warnings.warn(f"{spec.name} is called {now} now", DeprecationWarning, stacklevel=2)
         module = import_module(now)
+        if hasattr(module, "__path__"):
+            # A module of its own: what is imported below it would become an attribute of today's
+            # package, and hide a folder of that name.
+            folder = ModuleType(spec.name, module.__doc__)
+            folder.__path__ = []
+            vars(folder)["__getattr__"] = partial(getattr, module)
+            return folder
         spec.loader_state = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
         """Give the module its own spec back, which the import of a former name replaced."""
-        if module.__spec__ is not None:
+        if module.__spec__ is not None and not hasattr(module, "__path__"):
             module.__spec__ = module.__spec__.loader_state
 
 

@@ -14,9 +14,9 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.method_run import Cases
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.solve.regions.scheme import AsyncRegions
 from validate.twin.sensors import LoadCell
 

@@ -17,7 +17,7 @@ from validate.fem.critical import lanczos_step
 from validate.fem.system import build
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.solve.regions.scheme import AsyncRegions
 
 from .methods import LINE

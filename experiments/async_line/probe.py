@@ -8,11 +8,11 @@ from validate.arrays import Floats
 from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording, Signal, Source
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.scene.scene import Scene
 from validate.twin.sensors import LoadCell, signal, streams
-from validate.twin.tracked import START_NS
+from validate.twin.tracker import START_NS
 
 PROBE = "probe"
 

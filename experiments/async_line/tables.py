@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, NumberTable
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.scene.scene import Scene
 from validate.solve.regions.krylov import TouchedKrylov
 from validate.solve.regions.scheme import AsyncRegions

@@ -15,7 +15,7 @@ from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.scene import Scene
 from validate.solve.regions.scheme import AsyncRegions
 

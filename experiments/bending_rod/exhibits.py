@@ -12,7 +12,7 @@ from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.method_run import Cases
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Scene

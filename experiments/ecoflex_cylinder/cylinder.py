@@ -16,7 +16,7 @@ from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.plates.scene import pressed_log
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.scene import Scene
 
 from .specimens import specimen_of

@@ -8,7 +8,7 @@ the material's, bonded ones divide it by the stiffening that the same mesh shows
 
 from collections.abc import Mapping
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.parameters import describe
 from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
@@ -19,8 +19,8 @@ from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 from .cylinder import (
     LoggedCylinder,

@@ -9,7 +9,7 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
 from validate.pipeline.exhibits.standard import error_at
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.register.markers.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 

@@ -14,8 +14,8 @@ from validate.scene.geometries.specification import Cone
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
 from validate.solve.explicit.central import CentralDifference
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 from .exhibits import tell_cone
 from .published import CONE_FIGURES

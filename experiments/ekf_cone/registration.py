@@ -11,11 +11,11 @@ import numpy as np
 from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Truth
+from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation, placed_markers
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.scene.geometries.specification import Cone, MeshFile
 from validate.scene.scene import Scene

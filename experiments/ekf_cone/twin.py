@@ -29,7 +29,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Stepper
-from validate.twin.tracked import Camera, Origin, Points, Reading, record_tracked
+from validate.twin.tracker import Camera, Origin, Points, Reading, record_tracked
 
 _FIRST = 1e-4  # of the height: the compression that tells the stiffness at rest
 # x, y of the markers on the side

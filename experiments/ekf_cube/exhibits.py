@@ -10,7 +10,7 @@ from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
-from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.method_run import Cases
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.haptic.rates import HAPTIC_HZ, VISUAL_HZ

@@ -19,7 +19,7 @@ from validate.errors import RecordingError, SceneError
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree, beside
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.scene.geometries.box import box
 from validate.scene.mesh import Mesh, require_positive_cells

@@ -7,7 +7,7 @@ from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.report.scenes.node_sets import node_sets_picture
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene

@@ -6,7 +6,7 @@ body is the data folder's liver where that is here, else one made by formulas
 (`--set body.body=generated`), and neither is a reproduction.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.reduced.reduced_ekf import ReducedEKF

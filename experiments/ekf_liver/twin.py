@@ -14,18 +14,18 @@ import numpy as np
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.followed import Truth, truth_of
+from validate.pipeline.run.method_run import Truth, truth_of
 from validate.recording.types import Recording
-from validate.register.as_declared import follow_signal
 from validate.register.markers.fitting import MarkerFit
-from validate.register.registered import Registered
-from validate.scene.geometries.remeshed import refined
+from validate.register.registration import Registered
+from validate.register.scene_registration import follow_signal
+from validate.scene.geometries.refinement import refined
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import output_frames
-from validate.twin.stepped import SteppedTwin
-from validate.twin.tracked import Origin, Reading
+from validate.twin.time_stepping import SteppedTwin
+from validate.twin.tracker import Origin, Reading
 
 from .body import of_its_body, watched
 from .published import LIVER_FIGURES

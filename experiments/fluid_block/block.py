@@ -17,7 +17,7 @@ from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording, Source
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.scene.scene import Drive, Pin, Scene, Support
 from validate.solve.fluid.cavities import ElasticPressure, ExactPressure

@@ -4,7 +4,7 @@ import numpy as np
 
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases
+from validate.pipeline.run.method_run import Cases
 
 from .curves import condensed_block, curve_exhibit, curve_of, kept, shapes_exhibit
 from .exactness import exactness_exhibit

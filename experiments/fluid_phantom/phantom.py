@@ -24,7 +24,7 @@ from validate.recording.types import Recording
 from validate.register.markers.markers import Together
 from validate.register.observation import Observation
 from validate.register.outlines.outlines import Corner
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.sensing import ForceSensing, PressureSensing
 from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene

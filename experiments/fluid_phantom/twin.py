@@ -22,8 +22,8 @@ from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.march import march
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 from validate.solve.types import Scheme
 from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
 from validate.twin.ultrasound import Scanner, Target, b_mode

@@ -6,13 +6,13 @@ elements; linear and large-strain models are judged against it side by side.
 
 from dataclasses import replace
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.experiment.experiment import EffectSpec, Variant
 from validate.pipeline.experiment.method import Method
 from validate.scene.material import LawName
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 from ..fluid_phantom.experiment import EXPERIMENT as LINEAR
 

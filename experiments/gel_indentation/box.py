@@ -19,7 +19,7 @@ from validate.recording.types import Recording
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.scattered import best_neighbours, local_fit, noise
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import grid
 from validate.scene.geometries.similar_grids import member

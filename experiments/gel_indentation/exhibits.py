@@ -9,7 +9,7 @@ from validate.compare.exhibit import Exhibit, NumberTable
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.register.markers.displacements import DisplacementObservation
 
 from .box import GelIndentation, Same, load

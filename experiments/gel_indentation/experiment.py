@@ -9,7 +9,7 @@ import math
 from functools import partial
 from pathlib import Path
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment, Input, Uncertainty, vary

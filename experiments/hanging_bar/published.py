@@ -10,7 +10,7 @@ from validate.compare.published import Claim, Figure
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.run.followed import MAIN, Cases
+from validate.pipeline.run.method_run import MAIN, Cases
 from validate.scene.geometries.specification import Box
 from validate.scene.scene import Scene
 from validate.solve.march import march

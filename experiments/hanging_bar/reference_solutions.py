@@ -18,9 +18,9 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.tables.npz_points import read_arrays
 from validate.recording.types import Recording, Signal
-from validate.register.as_declared import given_inputs
 from validate.register.observation import Deviation, Role, Selection, Simulated
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import given_inputs
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 

@@ -14,7 +14,7 @@ from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.live import Lived, RecordedPath, live
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.haptic.loop import NAMES, HapticLoop, HapticStepper, between_answers

@@ -21,9 +21,9 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.live import LIVE, as_given, recorded_tip
-from validate.pipeline.run.remade import made_here
+from validate.pipeline.run.twin_record import made_here
 from validate.recording.types import Recording, Signal, Source
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, validating
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
@@ -32,7 +32,7 @@ from validate.solve.haptic.loop import HapticLoop
 from validate.solve.haptic.rates import HAPTIC_HZ
 from validate.solve.march import march
 from validate.twin.sensors import LoadCell, signal, streams
-from validate.twin.tracked import START_NS
+from validate.twin.tracker import START_NS
 
 from ..ekf_liver.body import of_its_body, watched
 from ..needle_pocket.hand import moved, tremor

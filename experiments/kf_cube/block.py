@@ -13,12 +13,12 @@ from validate.arrays import Floats, Ints
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.followed import Truth, truth_of
+from validate.pipeline.run.method_run import Truth, truth_of
 from validate.recording.types import Recording
-from validate.register.as_declared import follow_signal
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import follow_signal
 from validate.register.sensing import PoseShift
 from validate.scene.geometries.box import centroids
 from validate.scene.material import Region
@@ -27,8 +27,8 @@ from validate.scene.scene import Foundation, Scene
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
-from validate.twin.stepped import SteppedTwin
-from validate.twin.tracked import Camera, Origin, Reading
+from validate.twin.time_stepping import SteppedTwin
+from validate.twin.tracker import Camera, Origin, Reading
 
 _EVERY = (0, 1, 2)
 

@@ -19,7 +19,7 @@ from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 
 SEEDS = 50
 VARIANCES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # mm^2

@@ -9,8 +9,8 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.laws.stretch_response import response
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import MAIN, Cases, Followed
-from validate.register.registered import Registered
+from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.register.registration import Registered
 
 from .calibration import words_of
 from .curves import Multimode, point

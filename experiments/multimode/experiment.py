@@ -6,7 +6,7 @@ two stretches (Macromolecules 14 (1981) 154) by `--set material=kawabata1981`, i
 diagonal. Others of the same kind: `--set data=FOLDER --set material=NAME` of files NAME_MODE.csv.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
 from validate.pipeline.experiment.method import Method
 from validate.solve.static.stretch_test import StretchTest

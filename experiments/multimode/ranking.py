@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.register.observation import EVERYTHING
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.stresses import StressObservation
 from validate.scene.laws import Lost, law_kind, lost_stability
 from validate.scene.meshless import StretchMode

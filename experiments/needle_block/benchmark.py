@@ -17,18 +17,18 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, TimeSteps, Tree
-from validate.pipeline.run.followed import Truth, truth_of
+from validate.pipeline.run.method_run import Truth, truth_of
 from validate.recording.types import Recording
-from validate.register.as_declared import follow_signal
 from validate.register.markers.fitting import MarkerFit
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import follow_signal
 from validate.scene.scene import Drive, Scene
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.march import output_frames
 from validate.solve.static.quasi_static import QuasiStatic
-from validate.twin.stepped import SteppedTwin
-from validate.twin.tracked import Camera, Origin, Reading
+from validate.twin.time_stepping import SteppedTwin
+from validate.twin.tracker import Camera, Origin, Reading
 
 from .body import STEP
 
@@ -69,7 +69,7 @@ class Benchmark:
     values: Callable[[Floats], Floats]
     fiducials: Mapping[str, tuple[float, ...]]
 
-    # --- the road ---------------------------------------------------------------------------------
+    # --- the pipeline -----------------------------------------------------------------------------
 
     def place(self, recording: Recording, p: Tree, scene: Scene) -> Registered:
         for drive in scene.drives:

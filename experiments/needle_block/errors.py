@@ -17,7 +17,7 @@ from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compared
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.scene.mesh import Mesh
 from validate.solve.explicit.linear import ExplicitLinear, stable_step
 from validate.solve.march import march

@@ -14,7 +14,7 @@ from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.scene.material import Material
 from validate.scene.scene import PlaneState, Scene
 from validate.solve.dynamic.linear import elastic_forces

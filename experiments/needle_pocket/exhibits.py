@@ -8,7 +8,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
 from validate.solve.haptic.rates import DEVICE_HZ, QUANTILES, TickTimes

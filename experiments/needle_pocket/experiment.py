@@ -5,7 +5,7 @@ slides, pulls and lets go. The recording is a twin of quadratic elements on a fi
 synthetic path. A path of your own: `--set recording=FILE`; in 3-D: `--set body.space=solid`.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.experiment.experiment import Experiment, Twin, Uncertainty, vary
 from validate.pipeline.experiment.method import Method

@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.scene.scene import Scene
 from validate.solve.haptic.needle import NeedleLoop
 from validate.solve.haptic.rates import DEVICE_HZ

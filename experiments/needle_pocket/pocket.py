@@ -12,7 +12,7 @@ from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.tree import Built, Tree, beside
 from validate.recording.types import Recording
 from validate.register.observation import EVERYTHING
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, validating
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle

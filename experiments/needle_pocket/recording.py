@@ -12,7 +12,7 @@ from validate.errors import RecordingError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.live import LIVE, as_given, recorded_tip
-from validate.pipeline.run.remade import made_here
+from validate.pipeline.run.twin_record import made_here
 from validate.recording.types import Recording
 from validate.scene.mesh import Mesh
 

@@ -7,7 +7,7 @@ import numpy as np
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import MAIN, Cases
+from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.tables.npz_points import read_points
 from validate.register.signals import SignalObservation
 

@@ -6,7 +6,7 @@ the last one; no force and no thickness were recorded. The tracker is held again
 Another one: `--set recording=POINTS_mm.npz`.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment, Uncertainty

@@ -15,7 +15,7 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.tables.npz_points import read_points
 from validate.recording.types import Recording, Signal
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.scene.meshless import MaterialPoint
 

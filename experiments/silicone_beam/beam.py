@@ -21,10 +21,10 @@ from validate.pipeline.experiment.experiment import Identified
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Markers, Recording
-from validate.register.as_declared import given_inputs
 from validate.register.markers.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import Deviation, Selection, Simulated
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import given_inputs
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 

@@ -9,7 +9,7 @@ from validate.arrays import Floats, rms
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.identify.ringing import Ringing, spectrum
 from validate.pipeline.experiment.experiment import Progress, Told
-from validate.pipeline.run.followed import MAIN, Cases, Followed
+from validate.pipeline.run.method_run import MAIN, Cases, Followed
 
 from .beam import SETTLED, Resting
 from .settings import FEET, TIPS

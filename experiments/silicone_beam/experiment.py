@@ -8,7 +8,7 @@ silicone relaxes is identified on the ring-down under gravity alone, and with
 `--set recording=NEW.c3d --set masses.load.mass=52g`.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.reduced.reduced_kf import ReducedKf
@@ -18,9 +18,9 @@ from validate.pipeline.experiment.method import Method
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
-from validate.solve.dynamic.let_go import LetGo
+from validate.solve.dynamic.release import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
-from validate.solve.external.let_go import ExternalLetGo
+from validate.solve.external.release import ExternalLetGo
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.static.newton import StaticNewton
 

@@ -7,7 +7,7 @@ Other recordings of the kind: `--set data=FOLDER`. Where the marks of the pads a
 images, the pads can follow the edges of the field: `--set pads.follow=edges --set pads.window=8mm`.
 """
 
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment, MeshLadder, Uncertainty, vary

@@ -11,7 +11,7 @@ from validate.arrays import Floats, rms
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.pipeline.experiment.experiment import Experiment, Told
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import MAIN, Cases, Followed
+from validate.pipeline.run.method_run import MAIN, Cases, Followed
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 

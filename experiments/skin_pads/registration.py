@@ -11,7 +11,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Markers, Recording
 from validate.register.markers.markers import Together, observe_markers
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene
 

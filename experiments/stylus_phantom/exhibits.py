@@ -13,11 +13,11 @@ from validate.errors import RegistrationError
 from validate.pipeline.experiment.experiment import Experiment, Identified, Progress, Told
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import MAIN, Cases
+from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.types import Recording
 from validate.register.markers.transform import Similarity
-from validate.register.tools.digitised import Digitised, TouchedLandmarks
 from validate.register.tools.dwell import Dwell
+from validate.register.tools.landmarks import Digitised, TouchedLandmarks
 from validate.report.scenes.points import Place, points_picture
 
 from .phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of

@@ -20,10 +20,10 @@ from validate.recording.formats.device_set import DeviceSet, read_device_set
 from validate.recording.motion_capture.poses import ROTATION, TRANSLATION
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.register.tools.digitised import Digitised, TouchedLandmarks, match_landmarks
 from validate.register.tools.dwell import dwells, sd_of_mean, tip_path
+from validate.register.tools.landmarks import Digitised, TouchedLandmarks, match_landmarks
 from validate.scene.meshless import RigidBody
 
 FOLDER = "markers/stylus"

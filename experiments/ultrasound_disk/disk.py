@@ -19,7 +19,7 @@ from validate.recording.outlines.outline import Outline, extract_outline
 from validate.recording.readers import recognised
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.outlines.round_outlines import ENDS, RoundOutlines
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.meshless import RigidBody
 

@@ -10,12 +10,12 @@ from validate.compare.score import Score
 from validate.pipeline.experiment.experiment import Experiment, Identified, Progress, Told
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import MAIN, Cases
+from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.images.image import ellipse_through
 from validate.recording.types import Recording
 from validate.register.outlines.round_outlines import RoundOutlines
 from validate.report.scenes.outline_images import outlines_over
-from validate.report.sections.observed import Held
+from validate.report.sections.observations import Held
 
 from .disk import FILE, FOUND, OUTLINES, ImagedDisk, outlined
 

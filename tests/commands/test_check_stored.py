@@ -11,16 +11,16 @@ import pytest
 from command_line import here
 from study_samples import experiment_file
 
+from validate.checksums import sealed
 from validate.engine import identity
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.reused import rests_on
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.cached_runs import rests_on
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.report.stored.plain import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
-from validate.seals import sealed
 
 _LOADS = re.compile(r"load=lambda p, folder: .*,\n")
 _READS = 'load=lambda p, folder: (read_recording(folder.parent / "pulled.mcap"),),\n'

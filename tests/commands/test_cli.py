@@ -46,12 +46,12 @@ from validate.commands import (
 )
 from validate.commands.questions import body as new_body
 from validate.commands.questions import kinds as new_body_questions
-from validate.commands.questions.asking import read_answers
+from validate.commands.questions.answers import read_answers
 from validate.compare.result import Result
 from validate.errors import RecordingError, SceneError, UsageError, ValidateError
 from validate.library import studies
 from validate.scene.geometries.box import box
-from validate.scene.mesh_files.foreign_mesh import ForeignBody
+from validate.scene.mesh_files.third_party_meshes import ForeignBody
 
 COARSE = [
     "--set", "body.cells=6,7,10",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import called
 
-from validate.commands.questions.asking import Question, answered, listed, read_answers
+from validate.commands.questions.answers import Question, answered, listed, read_answers
 from validate.errors import RegistrationError, UsageError
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.find import load_file

@@ -19,12 +19,12 @@ from validate.engine.cell import Where
 from validate.errors import RegistrationError, UsageError
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
-from validate.pipeline.checks.described_motion import described
+from validate.pipeline.checks.motion_summary import described
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of
-from validate.pipeline.run.followed import MAIN, Followed
-from validate.pipeline.run.solved import solve
+from validate.pipeline.run.case_solution import solve
+from validate.pipeline.run.method_run import MAIN, Followed
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.register.markers.markers import MarkerObservation

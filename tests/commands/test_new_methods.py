@@ -7,7 +7,7 @@ import pytest
 
 from validate.commands.questions.motion import _ORDER, _USUAL, NOT_OFFERED
 from validate.estimate.filters import FILTERS
-from validate.pipeline.bodies.moving import METHODS, MovingName, fits_motion
+from validate.pipeline.bodies.body_dynamics import METHODS, MovingName, fits_motion
 from validate.scene.material import LawName
 from validate.solve.schemes import SCHEMES
 

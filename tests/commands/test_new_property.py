@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 from validate.arrays import Floats
-from validate.commands.questions.asking import Question
+from validate.commands.questions.answers import Question
 from validate.commands.questions.new import _asked, fitting
 from validate.errors import ValidateError
 from validate.pipeline import run_in_memory

@@ -12,7 +12,7 @@ from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of
-from validate.pipeline.run.solved import solve
+from validate.pipeline.run.case_solution import solve
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source
 

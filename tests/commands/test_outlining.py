@@ -16,9 +16,9 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.outlines import foreign_outline
-from validate.recording.outlines.followed import EXPERTS
+from validate.recording.outlines import third_party_outlines
 from validate.recording.outlines.outline import extract_outline
+from validate.recording.outlines.outline_tracking import EXPERTS
 from validate.recording.types import Frames, Recording, Source
 
 SIDE = 0.2e-3  # m of a pixel
@@ -345,7 +345,7 @@ def test_files_without_masks_are_refused(
     else:
         nrrd.write(str(file), content)
     with pytest.raises(RecordingError, match=re.escape(says)):
-        foreign_outline._read(file, read_recording(moving).frame("images"), "")
+        third_party_outlines._read(file, read_recording(moving).frame("images"), "")
 
 
 def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
@@ -354,14 +354,14 @@ def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
     frames = read_recording(moving).frame("images")
     (tmp_path / "a.csv").write_text("frame,x,y\n")
     with pytest.raises(UsageError, match=r"--label cyst: a.csv has no labels"):
-        foreign_outline._read(tmp_path / "a.csv", frames, "cyst")
+        third_party_outlines._read(tmp_path / "a.csv", frames, "cyst")
     with pytest.raises(UsageError, match=r"unit kg of a.csv: expected px, or a unit of length"):
-        foreign_outline._scale(tmp_path / "a.csv", frames, "kg")
-    assert foreign_outline._scale(tmp_path / "a.csv", frames, "mm").tolist() == [1e-3, 1e-3]
-    assert foreign_outline._scale(tmp_path / "a.npy", frames, "mm").tolist() == [SIDE, SIDE]
-    monkeypatch.setattr(foreign_outline, "MAX_FILE", 5)
+        third_party_outlines._scale(tmp_path / "a.csv", frames, "kg")
+    assert third_party_outlines._scale(tmp_path / "a.csv", frames, "mm").tolist() == [1e-3, 1e-3]
+    assert third_party_outlines._scale(tmp_path / "a.npy", frames, "mm").tolist() == [SIDE, SIDE]
+    monkeypatch.setattr(third_party_outlines, "MAX_FILE", 5)
     with pytest.raises(RecordingError, match=r"a.csv: 10 bytes, limit 5"):
-        foreign_outline._read(tmp_path / "a.csv", frames, "")
+        third_party_outlines._read(tmp_path / "a.csv", frames, "")
     shapes = {"shapes": [{"label": "a", "points": []}, {"label": "a", "points": []}]}
     with pytest.raises(RecordingError, match=r"a.json: 2 polygons in one image, expected one"):
-        foreign_outline._shape(tmp_path / "a.json", shapes, "a")
+        third_party_outlines._shape(tmp_path / "a.json", shapes, "a")

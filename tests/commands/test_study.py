@@ -17,7 +17,7 @@ from validate.commands.arguments import BAD_INPUT
 from validate.commands.main import run
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.report.stored.store import schema
 
 SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binomtest
 
 from validate.compare.coverage import Share, Term, find_fault, reach, term
-from validate.compare.overall import ALPHA
+from validate.compare.overall_verdict import ALPHA
 
 
 @pytest.mark.parametrize(("number", "count"), [(0, 20), (9, 200), (200, 200), (1, 3)])

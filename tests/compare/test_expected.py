@@ -2,7 +2,7 @@
 
 import pytest
 
-from validate.compare.overall import Expected, moved
+from validate.compare.overall_verdict import Expected, moved
 from validate.compare.verdict import Acceptance, Check, Validation
 from validate.errors import ComparisonError
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from validate.compare.overall import judge_all
+from validate.compare.overall_verdict import judge_all
 from validate.compare.verdict import ALPHA, Acceptance, Check, Validation
 
 _NAMES = count()

@@ -28,7 +28,7 @@ from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Selection
 from validate.register.outlines.outlines import Corner, OutlineObservation
 from validate.register.outlines.plane import cavity_sampler
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.march import march

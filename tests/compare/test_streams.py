@@ -12,7 +12,7 @@ from validate.compare.result import stream_uses
 from validate.pipeline import load
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal

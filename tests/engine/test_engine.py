@@ -17,15 +17,15 @@ import distributed
 import pytest
 from engine_samples import Waited, Waiting, logged, waiting
 
-from validate.engine import finish as finish_module
+from validate.checksums import sealed, unsealed
+from validate.engine import execution as finish_module
 from validate.engine.cell import Record, Where
-from validate.engine.finish import finish
+from validate.engine.execution import finish
 from validate.engine.identity import PACKAGE, OtherCodeError, digest, require_same
 from validate.engine.store import key_of, read_records, write_record
 from validate.errors import UsageError
 from validate.pipeline.experiment.find import module_name
 from validate.pipeline.run.job import Job, file_sha256
-from validate.seals import sealed, unsealed
 
 HERE = Where(workers=0)
 

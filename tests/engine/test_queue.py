@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from validate.engine.cell import Where
-from validate.engine.finish import finish
+from validate.engine.execution import finish
 from validate.engine.pool import Pool
 from validate.engine.queue import Queue
 

@@ -8,8 +8,8 @@ from scipy import sparse
 from scipy.stats import chi2
 
 from validate.arrays import Floats
-from validate.estimate.care import Care, care_of
 from validate.estimate.consistency import nis_consistency
+from validate.estimate.gating import Care, care_of
 from validate.estimate.kalman.covariance import Dense
 from validate.estimate.measurements import Measurements
 

@@ -16,7 +16,7 @@ from validate.estimate.kalman.gains import Claims, gain_sequence, schedule
 from validate.estimate.kalman.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.kalman.modal_kernel import advance, mirrored
 from validate.estimate.kalman.modal_kf import ModalKf
-from validate.estimate.kalman.observable import Spaces, observed
+from validate.estimate.kalman.observation_covariance import Spaces, observed
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore

@@ -15,7 +15,7 @@ from validate.estimate.reduced.load_scale import LoadScale
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
 from validate.register.markers.markers import MarkerObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.testing.pulled_cube import DT, PAPER, case, cube
 

@@ -1,4 +1,4 @@
-"""Paper 004's bodies, oracle and tables: known numbers first, then the road of its experiments."""
+"""Paper 004's bodies, oracle and tables: known numbers first, then its experiments."""
 
 from dataclasses import replace
 

@@ -18,7 +18,7 @@ from validate.compare.exhibit import NumberTable
 from validate.compare.result import Result
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.register.signals import SignalObservation

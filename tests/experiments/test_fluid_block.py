@@ -13,7 +13,7 @@ from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_given
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Source
 from validate.scene.geometries.hollow_block import Cavities, HollowBlock
 from validate.scene.scene import Cavity

@@ -11,7 +11,7 @@ from validate.compare.result import Result
 from validate.errors import RecordingError, RegistrationError, ValidateError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Markers, Recording, Signal
 from validate.register.markers.markers import MarkerObservation

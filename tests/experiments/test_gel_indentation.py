@@ -19,7 +19,7 @@ from validate.errors import RecordingError, RegistrationError, UsageError
 from validate.parameters import with_values
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic

@@ -19,7 +19,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.live import RecordedPath, live, prepared, written
 from validate.pipeline.live.clock import _first_too
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Source

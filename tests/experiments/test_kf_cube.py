@@ -18,7 +18,7 @@ from validate.errors import UsageError
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options, folder_of
-from validate.pipeline.run.road import compare as compare_with
+from validate.pipeline.run.pipeline import compare as compare_with
 
 pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
 

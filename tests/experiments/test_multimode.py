@@ -12,7 +12,7 @@ from validate.fem.laws.stretch_response import response
 from validate.pipeline import load as load_experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording
 from validate.scene.meshless import StretchMode
 

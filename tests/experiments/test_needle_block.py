@@ -1,4 +1,4 @@
-"""The block and the needle: the road in the plane, its checks, and all its claims (slow)."""
+"""The block and the needle: the pipeline in the plane, its checks, and all its claims (slow)."""
 
 import numpy as np
 import pytest

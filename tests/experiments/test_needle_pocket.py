@@ -15,7 +15,7 @@ from validate.errors import RecordingError, SceneError, UsageError
 from validate.parameters import with_given
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree, mesh_of
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Signal, Source

@@ -14,7 +14,7 @@ from validate.parameters import with_given
 from validate.pipeline import load as load_experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.tables.npz_points import StageTest, read_points, read_stage
 
 stretches = beside("rubber_strip", "stretches").stretches

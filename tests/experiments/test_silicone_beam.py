@@ -19,7 +19,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.clocks.clock_check import clock_of
 from validate.recording.types import Markers, Recording, Source
 from validate.register.draws import Draw

@@ -14,7 +14,7 @@ from validate.errors import RecordingError, UsageError
 from validate.parameters import with_values
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.tree import Tree, mesh_of
-from validate.pipeline.run.solved import solve
+from validate.pipeline.run.case_solution import solve
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.scene.mesh import Mesh

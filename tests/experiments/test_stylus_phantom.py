@@ -14,9 +14,9 @@ from validate.parameters import with_values
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare as road
+from validate.pipeline.run.pipeline import compare as road
 from validate.register.markers.transform import Similarity
-from validate.register.tools.digitised import Digitised
+from validate.register.tools.landmarks import Digitised
 
 phantom_module, plus = beside("stylus_phantom", "phantom"), beside("stylus_phantom", "plus")
 shown = beside("stylus_phantom", "exhibits")

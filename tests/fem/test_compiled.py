@@ -5,7 +5,7 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
-from validate.fem.kernels.compiled import compiled, name_apart
+from validate.fem.kernels.jit_cache import compiled, name_apart
 
 
 def _seen_by_one_process(folder: Path) -> IndexDataCacheFile:

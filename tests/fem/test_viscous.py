@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.laws.law import law_of, parts_of, stiffened
 from validate.fem.laws.stretch_response import response
-from validate.fem.laws.viscous import Lagged, branches_of, second_stress
+from validate.fem.laws.viscoelasticity import Lagged, branches_of, second_stress
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material, Prony
 from validate.scene.meshless import MaterialPoint, StretchMode

@@ -8,7 +8,7 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import ComparisonError
 from validate.identify.recorded_motion import RecordedMotion, recorded_motion
-from validate.pipeline.run.solved import between
+from validate.pipeline.run.case_solution import between
 from validate.recording.types import Contours, Recording, Signal, Source
 from validate.report.sections.motion_words import motion_lines, motion_words
 

@@ -54,8 +54,8 @@ def test_shipped_experiments_import_listed_names_only(
 def test_an_import_beyond_the_list_is_found(tmp_path: Path, public: frozenset[str]) -> None:
     path = tmp_path / "experiment.py"
     path.write_text(
-        "import numpy as np\nimport validate.seals\nfrom .twin import record\n"
+        "import numpy as np\nimport validate.checksums\nfrom .twin import record\n"
         "from validate.scene.geometries.specification import Box\n\n\ndef f():\n"
         "    from validate.scene.geometries.specification import Unlisted\n"
     )
-    assert unlisted(path, public) == {"seals", "scene.geometries.specification.Unlisted"}
+    assert unlisted(path, public) == {"checksums", "scene.geometries.specification.Unlisted"}

@@ -10,9 +10,9 @@ from validate.parameters import with_given
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.sensing import ForceSensing
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Box

@@ -17,8 +17,8 @@ from validate.pipeline.experiment.experiment import Input, Uncertainty, vary
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.run.reused import rests_on
-from validate.pipeline.run.road import compare, set_out
+from validate.pipeline.run.cached_runs import rests_on
+from validate.pipeline.run.pipeline import compare, set_out
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
 
@@ -44,7 +44,7 @@ def test_a_calibration_names_parameters_and_residuals_each_once() -> None:
         Calibration("fem", (E, E), on)
 
 
-# --- on the road ----------------------------------------------------------------------------------
+# --- through the pipeline -------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from validate.scene.scene import Scene
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.types import Run
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
 
 TRUTH = (10e3, 0.3)
 STAGE = np.linspace(0, LOADS[-1], STEPS + 1)[1:]

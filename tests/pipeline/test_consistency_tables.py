@@ -13,8 +13,8 @@ from validate.pipeline.checks.consistency import (
     nees_of,
     nis_of,
 )
-from validate.pipeline.run.followed import Followed, Truth
-from validate.register.registered import Registered
+from validate.pipeline.run.method_run import Followed, Truth
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material

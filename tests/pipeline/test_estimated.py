@@ -9,8 +9,8 @@ from test_consistency_tables import STEPS, followed
 
 from validate.errors import UsageError
 from validate.pipeline import load, run_in_memory
-from validate.pipeline.exhibits.gated import doubt, estimated_exhibit, sentences
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.exhibits.gating import doubt, estimated_exhibit, sentences
+from validate.pipeline.run.method_run import Followed
 from validate.solve.types import Trace
 
 

@@ -12,7 +12,7 @@ from validate.commands import check as checking
 from validate.commands import run as running
 from validate.commands.run import run as run_command
 from validate.commands.run_screen import show_run
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.engine.cell import Where
@@ -23,8 +23,8 @@ from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Experiment, Identified, Twin, Uncertainty, vary
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.run.remade import stamped
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
+from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.scene.material import Material
 from validate.scene.scene import Scene

@@ -15,8 +15,8 @@ from validate.pipeline import load
 from validate.pipeline.experiment.external import external_methods, with_simulators
 from validate.pipeline.experiment.options import Options, configure
 from validate.pipeline.run.named_run import run_name
-from validate.pipeline.run.road import compare
-from validate.solve.external.let_go import ExternalLetGo
+from validate.pipeline.run.pipeline import compare
+from validate.solve.external.release import ExternalLetGo
 from validate.solve.external.scheme import ExternalSimulator
 
 FAKE = """

@@ -17,8 +17,8 @@ from validate.pipeline.experiment.experiment import Experiment, Told
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.followed import Cases
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.method_run import Cases
+from validate.pipeline.run.pipeline import compare
 
 FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here", 3.0, 0.0)
 

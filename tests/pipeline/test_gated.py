@@ -3,8 +3,8 @@
 import numpy as np
 from test_consistency_tables import STEPS, T, followed
 
-from validate.pipeline.exhibits.gated import gate_exhibit, gate_warnings
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.exhibits.gating import gate_exhibit, gate_warnings
+from validate.pipeline.run.method_run import Followed
 from validate.solve.types import Trace
 
 

@@ -32,8 +32,8 @@ from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 DIAMETER, HEIGHT, E, NU = 0.03, 0.02, 25e3, 0.45
 AREA = np.pi * DIAMETER**2 / 4

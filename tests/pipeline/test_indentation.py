@@ -1,4 +1,4 @@
-"""A ball pressed into a gel, from its recording to the report: contact walks the road."""
+"""A ball pressed into a gel, from its recording to the report: contact through the pipeline."""
 
 import json
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.ladder.default import body_of, trial_of
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import EVERYTHING
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.report.write import write_report
 from validate.scene.contact import RigidContact, RigidSphere

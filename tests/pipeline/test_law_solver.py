@@ -13,8 +13,8 @@ from validate.pipeline.experiment.options import Options, all_methods
 from validate.scene.material import LawName
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 
 def pressed(label: str, law: LawName = "linear") -> Method:

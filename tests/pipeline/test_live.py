@@ -42,9 +42,9 @@ from validate.pipeline.live.listener import (
     position_bytes,
     position_of,
 )
+from validate.pipeline.live.live_recording import _from_rest
 from validate.pipeline.live.path import recorded_tip
-from validate.pipeline.live.written import _from_rest
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source

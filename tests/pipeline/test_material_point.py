@@ -14,9 +14,9 @@ from validate.pipeline.experiment.experiment import Experiment, Uncertainty, var
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Signal, Source
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.report.write import write_report
 from validate.scene.material import Material, Prony

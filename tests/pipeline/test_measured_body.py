@@ -22,6 +22,9 @@ from validate.errors import (
 from validate.parameters import with_given, with_values
 from validate.pipeline import run_in_memory
 from validate.pipeline.bodies import (
+    body_registration as measured_seen,
+)
+from validate.pipeline.bodies import (
     drive as measured_drive,
 )
 from validate.pipeline.bodies import (
@@ -29,9 +32,6 @@ from validate.pipeline.bodies import (
 )
 from validate.pipeline.bodies import (
     markers as measured_outline,
-)
-from validate.pipeline.bodies import (
-    registered as measured_seen,
 )
 from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import solid
@@ -43,15 +43,15 @@ from validate.recording.types import Contours, Markers, Recording, Signal, Sourc
 from validate.report.scenes.body import _frame as drawn_frame
 from validate.report.scenes.loads import held
 from validate.report.scenes.markers import markers as drawn_markers
-from validate.report.sections.observed import shown_loads
+from validate.report.sections.observations import shown_loads
 from validate.report.sections.registration import registration
 from validate.scene.geometries.box import box
 from validate.scene.geometries.specification import Box, MeshFile
 from validate.scene.material import Material
 from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.scene.places import axis_of, facets_of, place_of, point_of
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
-from validate.scene.tracked import Prescribed
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)

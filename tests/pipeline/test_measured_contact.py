@@ -29,7 +29,7 @@ from validate.scene.contact import (
     RigidPunch,
     RigidSphere,
 )
-from validate.scene.geometries.indented import IndentedBlock, IndentedCylinder
+from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.material import Material
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Load, Scene, Support

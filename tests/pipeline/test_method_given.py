@@ -10,8 +10,8 @@ from machine_logs import machine_log, pressed_cylinder
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
-from validate.pipeline.calibration import asked, calibrated
-from validate.pipeline.checks import refined
+from validate.pipeline.calibration import calibrated, free_parameters
+from validate.pipeline.checks import numerical_uncertainty
 from validate.pipeline.experiment.experiment import Variant
 from validate.pipeline.experiment.find import _executed, load_file
 from validate.pipeline.experiment.method import Method
@@ -19,22 +19,22 @@ from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.ladder import default as ladder_default
 from validate.pipeline.ladder.ladder import turned
 from validate.pipeline.live import prepared as prepared_live
-from validate.pipeline.live.written import as_given
+from validate.pipeline.live.live_recording import as_given
 from validate.pipeline.plates import inclusion
 from validate.pipeline.plates import outline as pressed_outline
 from validate.pipeline.plates.choices import Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
 from validate.pipeline.plates.outline import PressedOutline
-from validate.pipeline.run import remade
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run import twin_record
+from validate.pipeline.run.method_run import Followed
 from validate.recording.types import Recording, Source
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.meshless import Meshless
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.fluid.cavities import NoFluid
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 
 
 @pytest.mark.parametrize("stride", [1, 3])
@@ -109,12 +109,12 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
     ("call", "error", "says"),
     [
         (
-            lambda: asked.asked(bare(), Newmark()),
+            lambda: free_parameters.asked(bare(), Newmark()),
             UsageError,
             "x declares no calibration; name parameters with their bounds: --parameters PATH=LOW:",
         ),
         (
-            lambda: asked._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
+            lambda: free_parameters._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
             UsageError,
             "x has no accepted methods: declare a calibration in its file",
         ),
@@ -168,9 +168,9 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
 
     road = SimpleNamespace(varied=refuse)
     own, other = Variant("m"), Variant("m", split=2)
-    assert refined._solved(road, other) is None  # type: ignore[arg-type]
+    assert numerical_uncertainty._solved(road, other) is None  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="a hole without a node"):
-        refined._solved(road, own)  # type: ignore[arg-type]
+        numerical_uncertainty._solved(road, own)  # type: ignore[arg-type]
 
 
 def test_an_inclusion_without_loads_compares_nothing() -> None:
@@ -188,16 +188,16 @@ def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
     with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
         prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="--parameters mass: not a number that can be varied"):
-        asked._number(Newmark(), "mass", "lumped")
+        free_parameters._number(Newmark(), "mass", "lumped")
 
 
 def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> None:
     recording = Recording("r", Source("r", "", 0, ""), 0)
-    remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
+    twin_record.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
     with pytest.raises(
         UsageError, match=r"r: --set dt=.* would have no effect: the recording does not"
     ):
-        remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
+        twin_record.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
 
 
 def test_a_ladder_that_cannot_be_refined_is_refused() -> None:
@@ -221,12 +221,12 @@ def test_meshes_differ_in_size(sizes: tuple[float, ...], refused: bool) -> None:
     road = SimpleNamespace(parameters=None)
     found = {"mesh": [change(size) for size in sizes]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(refined, "variants", lambda *_: found)
+        patch.setattr(numerical_uncertainty, "variants", lambda *_: found)
         if refused:
             with pytest.raises(ComparisonError, match="fine, mesh: sizes 1, 1, 1; u_num needs two"):
-                refined.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+                numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
         else:
-            sizes_found = refined.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+            sizes_found = numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
             assert sizes_found == [1.0, 2.0, 4.0]
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from validate.parameters import Parameter
-from validate.pipeline.checks.plausible import doubts
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.checks.plausibility import doubts
+from validate.pipeline.run.method_run import Followed
 from validate.recording.types import Frames, Recording, Signal, Source
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material

@@ -24,7 +24,7 @@ from validate.pipeline.plates.outline import with_outline
 from validate.recording.types import Contours, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.outlines.outlines import OutlineObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.cylinder import whole_cylinder
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion

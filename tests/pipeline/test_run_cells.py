@@ -18,7 +18,7 @@ from study_samples import TEXT
 from test_external_methods import FAKE
 
 from validate.catalogue import experiment_files, shipped
-from validate.engine import finish
+from validate.engine import execution
 from validate.engine.cluster import Drain
 from validate.parameters import describe
 from validate.pipeline.calibration.calibrated import middle
@@ -271,8 +271,8 @@ def test_workers_find_the_same_numbers(tmp_path: Path, monkeypatch: pytest.Monke
         return collect(self, one, queue)
 
     monkeypatch.setattr(Drain, "_collect", seen)
-    monkeypatch.setattr(finish, "_WORTH", 0.0)
-    monkeypatch.setattr(finish, "_PATIENCE", 0.01)
+    monkeypatch.setattr(execution, "_WORTH", 0.0)
+    monkeypatch.setattr(execution, "_PATIENCE", 0.01)
     for workers in ("1", "2"):
         out = str(tmp_path / workers)
         code, _, err = here("run", "kf_cube", "--quick", "--out", out, "--workers", workers)

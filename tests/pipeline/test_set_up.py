@@ -1,4 +1,4 @@
-"""What a method's set-up costs: the scene, its assembly and the preparation, by a clock by hand."""
+"""What a method's set-up costs: the scene, its assembly and the prepared, by a clock by hand."""
 
 from itertools import count
 from types import SimpleNamespace
@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import pytest
 
 from validate.pipeline.ladder import default as ladder_default
-from validate.pipeline.run import solved
+from validate.pipeline.run import case_solution
 from validate.scene.geometries.box import box, centroids
 
 
 def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solved, "perf_counter", count(100.0).__next__)
-    monkeypatch.setattr(solved, "build_system", lambda scene: "system")
+    monkeypatch.setattr(case_solution, "perf_counter", count(100.0).__next__)
+    monkeypatch.setattr(case_solution, "build_system", lambda scene: "system")
     scene = SimpleNamespace(mesh=box((1.0, 1.0, 1.0), (1, 1, 1)))
     method = SimpleNamespace(markers=(), prepare=lambda system, seen, given, own: f"on {system}")
     own = SimpleNamespace(methods={})
-    runs = solved._Runs(own, "x", method, None, scene, 0.25, lambda words: None)
+    runs = case_solution._Runs(own, "x", method, None, scene, 0.25, lambda words: None)
     assert runs._stepper(scene, None, {}) == ("on system", 1.25)
     assert runs._stepper(scene, None, {}) == ("on system", 1.25)  # made once
 

@@ -44,10 +44,10 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import CellSize, Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.run.followed import Cases, Truth, truth_of
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.method_run import Cases, Truth, truth_of
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.types import Stepper
 

@@ -24,12 +24,12 @@ from validate.pipeline.bodies.choices import BodyRanges, SeenOf
 from validate.pipeline.checks.uncertain_drives import drive_inputs
 from validate.recording.types import Markers, Signal
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Load, Scene, Support
-from validate.scene.tracked import Prescribed
 
 SD = 2e-5
 STIFFNESS = E * SIZE[0] * SIZE[1] / SIZE[2]

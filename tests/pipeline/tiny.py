@@ -16,12 +16,12 @@ from validate.pipeline.experiment.experiment import Case, Experiment, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.run.followed import Truth, truth_of
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
-from validate.register.as_declared import follow_signal
 from validate.register.markers.markers import placed_markers
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import follow_signal
 from validate.register.signals import driving, holds_at, validating
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
@@ -30,7 +30,7 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.types import Ending, State, Stepper
-from validate.twin.tracked import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
 
 DT, STEPS, SIDE = 0.002, 30, 0.01
 PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}

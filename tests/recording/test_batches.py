@@ -9,9 +9,9 @@ import pytest
 from mcap_samples import T0, markers_json, signal_json, write_foreign
 
 from validate.errors import RecordingError
+from validate.recording.mcap.channel_state import batch
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import MARKERS, SIGNAL, decode
-from validate.recording.mcap.seen import batch
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Recording
 

@@ -11,7 +11,7 @@ import pytest
 from validate.child_process import python
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart
+from validate.recording.formats import subprocess_decoder
 from validate.recording.motion_capture import c3d
 from validate.recording.motion_capture.c3d import _require_whole, read_c3d
 
@@ -114,10 +114,12 @@ def test_a_library_that_crashes_costs_one_line(
     """A decoder of ours on a path of its own, that does what bad libraries do."""
     (tmp_path / "decoder.py").write_text(f"def arrays(path):\n    {source}\n    return {{}}\n")
     start = _RUNNER.format(str(tmp_path))
-    monkeypatch.setattr(apart, "python_module", lambda _, *given: python("-c", start, *given))
+    monkeypatch.setattr(
+        subprocess_decoder, "python_module", lambda _, *given: python("-c", start, *given)
+    )
     (tmp_path / "file").write_bytes(b"x")
     with pytest.raises(RecordingError, match=f"^file: .*{line}"):
-        apart.decoded("decoder", tmp_path / "file")
+        subprocess_decoder.decoded("decoder", tmp_path / "file")
 
 
 _RUNNER = """
@@ -134,7 +136,7 @@ raise SystemExit(apart._decode(decoder, Path(path), Path(out), *limits))
 def test_a_missing_library_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"x")
     with pytest.raises(UsageError, match=re.escape(install_command("dicom"))):
-        apart.decoded("absent_decoder", tmp_path / "file", extra="dicom")
+        subprocess_decoder.decoded("absent_decoder", tmp_path / "file", extra="dicom")
 
 
 @pytest.mark.parametrize("name", [b"FRAMES", b"USED", b"LABELS"])
@@ -327,7 +329,9 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_bytes(b"x" * 7)
-    monkeypatch.setattr(apart, "_LOADING", 0)
-    monkeypatch.setattr(apart, "_SHARED", 0)
+    monkeypatch.setattr(subprocess_decoder, "_LOADING", 0)
+    monkeypatch.setattr(subprocess_decoder, "_SHARED", 0)
     with pytest.raises(RecordingError, match="file: its reader was stopped after 0 s for 7 bytes"):
-        apart.decoded("validate.recording.motion_capture.c3d_arrays", tmp_path / "file")
+        subprocess_decoder.decoded(
+            "validate.recording.motion_capture.c3d_arrays", tmp_path / "file"
+        )

@@ -10,7 +10,7 @@ import scipy.io
 from script_modules import module_of
 
 from validate.errors import RecordingError
-from validate.recording.outlines import followed
+from validate.recording.outlines import outline_tracking
 from validate.recording.outlines.outline import (
     Outline,
     _fitted,
@@ -292,7 +292,7 @@ def test_even_images_are_counted_and_the_first_is_named() -> None:
     with pytest.raises(RecordingError, match=r"2 of 2 images .*, first image 0 \(t = 0.000 s\): "):
         outlines_of(flat(2))
     with pytest.raises(RecordingError, match=r"3 of 3 images .*, first image 0 \(t = 0.000 s\): "):
-        followed.followed(flat(3), followed.Hint(None, None), "images")
+        outline_tracking.followed(flat(3), outline_tracking.Hint(None, None), "images")
 
 
 def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -310,15 +310,15 @@ def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.Mo
     with pytest.raises(
         RecordingError, match=r"lies 4.1 mm from the last outline, whose radius is 4"
     ):
-        followed._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
-    monkeypatch.setattr(followed.RivalRegion, "words", "a region of 3 mm")
-    rival = followed.RivalRegion.__new__(followed.RivalRegion)
+        outline_tracking._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
+    monkeypatch.setattr(outline_tracking.RivalRegion, "words", "a region of 3 mm")
+    rival = outline_tracking.RivalRegion.__new__(outline_tracking.RivalRegion)
     with pytest.raises(
         RecordingError, match=r"confidence 0.52, but 0.6 is needed.*3 mm; .*--confidence 0.51\)"
     ):
-        followed._require_sure((rival,), 0.519, 0.6)
-    followed._require_sure((rival,), 0.6, 0.6)
-    followed._require_sure((), 0.1, 0.6)
+        outline_tracking._require_sure((rival,), 0.519, 0.6)
+    outline_tracking._require_sure((rival,), 0.6, 0.6)
+    outline_tracking._require_sure((), 0.1, 0.6)
 
 
 RING = np.array([[4e-3, 0.0], [0.0, 4e-3], [-4e-3, 0.0]])

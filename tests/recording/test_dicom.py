@@ -11,7 +11,7 @@ from children import lacking
 
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart
+from validate.recording.formats import subprocess_decoder
 from validate.recording.images import dicom, dicom_arrays
 from validate.recording.images import dicom as dicom_files
 from validate.recording.images.dicom import read_dicom
@@ -98,7 +98,7 @@ def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:
 def test_without_the_library_the_line_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(apart, "python_module", lacking("pydicom"))
+    monkeypatch.setattr(subprocess_decoder, "python_module", lacking("pydicom"))
     with pytest.raises(UsageError, match=f"'pydicom'.*{re.escape(install_command('dicom'))}"):
         read_dicom(DATA / "US1_UNCR.dcm", {"m_per_px": "1mm"})
 

@@ -16,10 +16,10 @@ from odf.text import P
 
 from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
-from validate.recording.formats import apart
+from validate.recording.formats import subprocess_decoder
 from validate.recording.readers import recognised
 from validate.recording.tables import sheets_arrays, xlsx_arrays
-from validate.recording.tables.every import every_specimen
+from validate.recording.tables.specimen_export import every_specimen
 from validate.recording.tables.workbook import _chosen, _Sheet, _tests, read_sheets, read_xlsx
 
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
@@ -116,7 +116,7 @@ def test_without_the_library_the_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path, Data=TEST)
-    monkeypatch.setattr(apart, "python_module", lacking("openpyxl"))
+    monkeypatch.setattr(subprocess_decoder, "python_module", lacking("openpyxl"))
     with pytest.raises(UsageError, match=f"openpyxl.*{re.escape(install_command())}"):
         read_xlsx(path, {})
 

@@ -24,7 +24,7 @@ from validate.recording.images.image import (
     png_size,
     sampled,
 )
-from validate.recording.images.numbered import numbered
+from validate.recording.images.numbered_files import numbered
 from validate.recording.images.png_stack import read_png_stack
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import IMAGE, SCHEMAS

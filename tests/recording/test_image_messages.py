@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
+from validate.recording.mcap import channel_state as seen_module
 from validate.recording.mcap import schemas
-from validate.recording.mcap import seen as seen_module
+from validate.recording.mcap.channel_state import _TAIL, ChannelSeen, _looked, pictures
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import IMAGE, decode, image_message
-from validate.recording.mcap.seen import _TAIL, ChannelSeen, _looked, pictures
 
 GREY = [np.random.default_rng(i).integers(0, 255, (30, 40)).astype(np.uint8) for i in range(40)]
 

@@ -21,12 +21,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from validate.errors import RecordingError
 from validate.installation import install_command
-from validate.recording.mcap import decoders, foreign, known_messages
+from validate.recording.mcap import decoders, known_messages, third_party_channels
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import by_name
 from validate.recording.mcap.records import HEAD, Channel, Message, Metadata, Schema, records_in
-from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.mcap.verified_file import Verified, messages_of, opened
 
 Told = tuple[str, dict[str, Any]]
 NO_FIELD = ("__msgtype__", "structure_needs_at_least_one_member")
@@ -289,9 +289,9 @@ def test_too_many_points_and_numbers_are_refused(monkeypatch: pytest.MonkeyPatch
         known_messages._points(0, "lab", np.zeros((2, 3)))
     with pytest.raises(RecordingError, match="2 points, the limit is 1"):
         known_messages._packed(bytes(24), {}, 12, "<", 2)
-    monkeypatch.setattr(foreign, "MAX_NUMBERS", 5)
+    monkeypatch.setattr(third_party_channels, "MAX_NUMBERS", 5)
     gathered = {1: SimpleNamespace(add=lambda message: 3)}
     messages = [Message(1, 0, 0, 0, b"")] * 2
-    foreign.fill(gathered, messages[:1])  # type: ignore[arg-type]
+    third_party_channels.fill(gathered, messages[:1])  # type: ignore[arg-type]
     with pytest.raises(RecordingError, match="more than 5 numbers, the limit; split the file"):
-        foreign.fill(gathered, messages)  # type: ignore[arg-type]
+        third_party_channels.fill(gathered, messages)  # type: ignore[arg-type]

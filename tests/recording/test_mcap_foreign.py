@@ -25,7 +25,7 @@ from mcap_ros2.writer import Writer as RosWriter
 from PIL import Image
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.mcap import foreign
+from validate.recording.mcap import third_party_channels
 from validate.recording.mcap.peek import messages_in
 from validate.recording.mcap.read import read_all
 from validate.recording.preflight import inspect_recording
@@ -356,7 +356,7 @@ def test_a_topic_that_is_not_there_is_reported_with_the_others(tmp_path: Path) -
 
 def test_errors_of_a_file_name_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}, {"a": 2.0}])
-    monkeypatch.setattr(foreign, "MAX_NUMBERS", 1)
+    monkeypatch.setattr(third_party_channels, "MAX_NUMBERS", 1)
     with pytest.raises(
         RecordingError, match=r"x.mcap: more than 1 numbers, the limit; split the fi"
     ):

@@ -14,7 +14,7 @@ from engine_samples import Waited, Waiting, logged, open_folder
 from test_readers import EACH, files_of, sample
 
 from validate.engine.cell import Plan, Where
-from validate.engine.finish import finish
+from validate.engine.execution import finish
 from validate.pipeline.run.job import Job
 from validate.recording.reader import Reader
 from validate.report.scenes import gl

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from validate.errors import RecordingError
 from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
-from validate.recording.mcap.own_protobuf import protobuf_message, protobuf_schema
+from validate.recording.mcap.protobuf_messages import protobuf_message, protobuf_schema
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import (
     CONTOUR,

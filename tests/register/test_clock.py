@@ -14,7 +14,7 @@ from validate.register.clocks import clock_sd, interpolated, slopes
 from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import EVERYTHING, Selection
 from validate.register.outlines.outlines import Corner, OutlineObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving, validating
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace

@@ -15,7 +15,7 @@ from validate.errors import RegistrationError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
 from validate.register.draws import Draw, Exact, from_rest, shifted
-from validate.register.markers import from_rest as from_rest_module
+from validate.register.markers import rest_displacements as from_rest_module
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.markers import MarkerObservation, Together, observe_markers
 from validate.register.observation import EVERYTHING, Observation, Selection, field_at
@@ -24,8 +24,8 @@ from validate.register.outlines.outlines import OutlineObservation, observe_outl
 from validate.register.outlines.round_outlines import RoundOutlines
 from validate.register.signals import SignalObservation
 from validate.register.stresses import StressObservation
-from validate.register.tools.digitised import Digitised, Match, TouchedLandmarks
 from validate.register.tools.dwell import Dwell
+from validate.register.tools.landmarks import Digitised, Match, TouchedLandmarks
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 

@@ -6,8 +6,8 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.register.markers.transform import Similarity
-from validate.register.tools.digitised import match_landmarks
 from validate.register.tools.dwell import _joined, dwells, sd_of_mean, tip_path
+from validate.register.tools.landmarks import match_landmarks
 
 A, B = np.array([0.0, 0.0, 0.0]), np.array([0.05, 0.0, 0.0])
 

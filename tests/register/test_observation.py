@@ -21,7 +21,7 @@ from validate.register.observation import (
 )
 from validate.register.outlines.distances import angular_points
 from validate.register.outlines.outlines import Corner, OutlineObservation, merged, observe_outlines
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import (
     SignalObservation,
     holds_at,

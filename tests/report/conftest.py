@@ -5,7 +5,7 @@ import pytest
 from validate.compare.result import Result
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 
 
 @pytest.fixture(scope="session")

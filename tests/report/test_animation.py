@@ -14,12 +14,12 @@ from report_samples import small_result
 from validate.compare.exhibit import Animation
 from validate.compare.result import Result
 from validate.register.observation import Selection
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.report.charts.encode import gif
 from validate.report.scenes.animation import moving_outline
 from validate.report.scenes.loads import at_times, held, in_steps
-from validate.report.sections.observed import driven, holds
+from validate.report.sections.observations import driven, holds
 from validate.report.write import write_report
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]

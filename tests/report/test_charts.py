@@ -13,10 +13,10 @@ from validate.compare.exhibit import Chart, Series
 from validate.compare.result import Result
 from validate.pipeline import load
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.report.charts import chart as charts
 from validate.report.charts.axes import beneath, floor_of
-from validate.report.charts.looks import TOGETHER, alone, panel_labels, styled
+from validate.report.charts.line_styles import TOGETHER, alone, panel_labels, styled
 from validate.report.charts.style import ACCEPTED, MEASURED, PALETTE, WIDTH, painted
 
 X = np.linspace(0.0, 1.0, 50)

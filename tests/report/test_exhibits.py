@@ -17,6 +17,7 @@ import pytest
 from report_samples import parts_of, sections_of, small_result
 from tracking_samples import AT, STEPS, WHY, T, failed_result, swing, tracking_result
 
+from validate.checksums import unsealed
 from validate.compare.exhibit import Chart, NodeMap, NumberTable, Series, plain
 from validate.compare.result import Result
 from validate.errors import ComparisonError
@@ -30,14 +31,13 @@ from validate.report.html import page
 from validate.report.scenes import gl
 from validate.report.scenes.loads import at_times, held
 from validate.report.scenes.maps import ranges, values
-from validate.report.sections.observed import holds
+from validate.report.sections.observations import holds
 from validate.report.sections.verdicts import band
 from validate.report.stored.exhibit_rows import rounded, thinned
-from validate.report.stored.plain import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document, schema
 from validate.report.write import write_report
 from validate.scene.geometries.box import box
-from validate.seals import unsealed
 
 CREATED = "2026-11-21T04:00:00Z"
 

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from report_samples import small_result
 
+from validate.checksums import sealed
 from validate.report import write
 from validate.report.export.table_file import CSV, PARQUET
 from validate.report.stored.folder import MARK
 from validate.report.stored.history import LINES, current, replaced
-from validate.report.stored.made import Commit, Made
-from validate.report.stored.since import history, since
+from validate.report.stored.provenance import Commit, Made
+from validate.report.stored.run_changes import history, since
 from validate.report.write import write_report
-from validate.seals import sealed
 
 DAYS = [f"2026-11-2{i}T04:00:00+00:00" for i in range(1, 6)]
 

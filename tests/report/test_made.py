@@ -15,7 +15,7 @@ from validate.report.html import page
 from validate.report.sections.provenance import how
 from validate.report.stored import environment as module
 from validate.report.stored.environment import environment
-from validate.report.stored.made import Commit, Made, UsedFile, commit_of, made
+from validate.report.stored.provenance import Commit, Made, UsedFile, commit_of, made
 from validate.report.stored.store import document, schema
 
 CREATED = "2026-11-21T04:00:00Z"

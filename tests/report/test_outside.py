@@ -14,11 +14,11 @@ from junitparser import Error, Failure, JUnitXml, Skipped
 from pylatexenc.latexwalker import LatexEnvironmentNode, LatexWalker, get_default_latex_context_db
 from pylatexenc.macrospec import EnvironmentSpec
 
+from validate.checksums import sealed
 from validate.commands.export import checks_in_latex
 from validate.commands.main import cli
-from validate.report.export.outside import junit
+from validate.report.export.junit_latex import junit
 from validate.report.long_table import long_table
-from validate.seals import sealed
 
 
 def check(name: str, verdict: str, value: float | None = 1.5e-5) -> dict[str, Any]:

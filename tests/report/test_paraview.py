@@ -10,7 +10,7 @@ import pyvista as pv
 from tracking_samples import SIDE, tracking_result
 
 from validate.report.export.paraview import MOST, write_series
-from validate.report.sections.observed import markers_seen
+from validate.report.sections.observations import markers_seen
 from validate.report.write import write_report
 from validate.scene.scene import Scene
 

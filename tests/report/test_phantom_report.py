@@ -10,7 +10,7 @@ from validate.compare.result import Result
 from validate.register.outlines.distances import normal_distances
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.export.tables import shown as read
-from validate.report.sections.observed import outline_seen
+from validate.report.sections.observations import outline_seen
 from validate.report.sections.sections import SECTIONS
 from validate.report.stored.store import document, schema
 

@@ -19,7 +19,7 @@ from validate.report.scenes.body import flattest
 from validate.report.scenes.outline_images import outline_images
 from validate.report.scenes.residual_arrows import arrow_axes, magnified, residual_arrows
 from validate.report.sections.discrimination import noise_rows, over_noise
-from validate.report.sections.observed import Held
+from validate.report.sections.observations import Held
 
 SD = 1e-4  # m
 

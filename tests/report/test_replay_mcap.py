@@ -37,7 +37,7 @@ from validate.report.replay import mcap as replay_mcap
 from validate.report.replay import signals as replay_signals
 from validate.report.replay.mcap import tracks, views, write_replay
 from validate.report.replay.view import Track
-from validate.report.sections import observed
+from validate.report.sections import observations
 from validate.scene.mesh import boundary_facets
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
@@ -175,7 +175,7 @@ def test_tf_comes_first(path: Path) -> None:
 
 def test_forces_and_pressures_are_those_compared(messages: Messages, result: Result) -> None:
     run, seen = result.methods[0].run, result.methods[0].registered[0]
-    for s, name in zip(observed.signals(seen), ("force", "pressure"), strict=True):
+    for s, name in zip(observations.signals(seen), ("force", "pressure"), strict=True):
         for who, y, sd in (("measured", s.y, s.sd), ("simulated", run.traces[s.trace].y, 0.0)):
             found = [c for _, c in messages[f"/{name}/{who}"]]
             assert [c["values"] for c in found] == np.reshape(y, (-1, 1)).tolist()
@@ -198,7 +198,7 @@ def test_our_reader_reads_the_outlines_that_were_judged(path: Path, result: Resu
 def test_a_measured_marker_lands_where_the_comparison_has_it(
     messages: Messages, result: Result
 ) -> None:
-    seen = observed.markers(result.methods[0].registered[0])
+    seen = observations.markers(result.methods[0].registered[0])
     assert seen is not None
     T = parent_from(messages, "pen")
     for i, (_, content) in enumerate(messages["/markers/measured"]):
@@ -231,7 +231,7 @@ def test_simulated_less_measured_markers_are_the_residual(
 
 
 def test_outlines_to_look_at_lie_in_the_image_plane(messages: Messages, result: Result) -> None:
-    seen = observed.outline(result.methods[0].registered[0])
+    seen = observations.outline(result.methods[0].registered[0])
     assert seen is not None
     T = parent_from(messages, "image")
     for i, (ns, content) in enumerate(messages["/outline/simulated"]):
@@ -617,7 +617,7 @@ def decoded(track: Track, i: int) -> Any:
 def test_a_scaled_registration_leaves_markers_in_the_scene(result: Result) -> None:
     """A transform of Foxglove has no scale: the markers are put where the comparison has them."""
     one = result.methods[0]
-    seen = observed.markers(one.registered[0])
+    seen = observations.markers(one.registered[0])
     assert seen is not None
     transform = replace(seen.registration.transform, s=1.01)
     registration = replace(seen.registration, transform=transform)

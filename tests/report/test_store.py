@@ -19,7 +19,7 @@ from validate.report.export.fields import open_fields, write_fields
 from validate.report.sections.discrimination import _row
 from validate.report.sections.registration import _rest as rest_table
 from validate.report.stored.environment import without_folder
-from validate.report.stored.plain import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import Json, _rest, document, schema
 
 CREATED = "2026-11-21T04:00:00Z"

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from report_samples import section, small_result
 
+from validate.checksums import read_sealed
 from validate.commands.main import cli
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.compare.row import LongRow, RowBlock
@@ -19,13 +20,12 @@ from validate.report.export.table_file import stored_table
 from validate.report.export.tables import shown
 from validate.report.long_table import LongTable
 from validate.report.stored.exhibit_rows import stored_exhibits
-from validate.report.stored.plain import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 from validate.report.views.drawers import figures, page, save, terminal
-from validate.report.views.filled import filled
 from validate.report.views.standard import STANDARD, VIEWS
+from validate.report.views.view_filling import filled
 from validate.report.write import table_of, write_report
-from validate.seals import read_sealed
 
 HEAD = {"methods": [{"name": "kf", "label": "Kalman filter", "accepted": True}]}
 ONE = LongRow(part="score", method="kf", quantity="tip", statistic="rms", unit="m")

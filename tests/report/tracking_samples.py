@@ -13,7 +13,7 @@ from validate.compare.track import track_error, track_scores
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.register.markers.markers import observe_markers
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving
 from validate.scene.geometries.box import box
 from validate.scene.material import Material

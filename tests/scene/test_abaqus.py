@@ -13,8 +13,8 @@ from validate.scene.mesh_files import abaqus_arrays
 from validate.scene.mesh_files import abaqus_text as abaqus_lines
 from validate.scene.mesh_files.abaqus_arrays import placed
 from validate.scene.mesh_files.abaqus_text import KeywordBlock
-from validate.scene.mesh_files.foreign_mesh import read_foreign
 from validate.scene.mesh_files.mesh_file import read_mesh
+from validate.scene.mesh_files.third_party_meshes import read_foreign
 
 SHAPES = {"tet4": "C3D4T", "tet10": "c3d10mh", "hex8": "C3D8R"}
 LIVER = "mesh/liver/Liver_Iso_935n_4408t.inp"

@@ -10,7 +10,7 @@ from experiments.needle_block.body import needle_block
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.geometries.box import box, grid
-from validate.scene.geometries.remeshed import linear, refined
+from validate.scene.geometries.refinement import linear, refined
 from validate.scene.material import Material
 from validate.scene.mesh import (
     Mesh,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.scene.geometries.indented import clustered, clustered_block
+from validate.scene.geometries.indented_bodies import clustered, clustered_block
 from validate.scene.mesh import cell_volumes, require_positive_cells
 
 

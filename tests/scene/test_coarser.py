@@ -9,7 +9,7 @@ import pytest
 from validate.errors import SceneError
 from validate.fem.system import build, responses
 from validate.scene.geometries.box import box, grid
-from validate.scene.geometries.remeshed import _filling, coarser, size_against
+from validate.scene.geometries.refinement import _filling, coarser, size_against
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.scene import Drive, Scene, Support

@@ -15,11 +15,11 @@ from validate.commands.main import cli
 from validate.errors import SceneError, UsageError, ValidateError
 from validate.scene.body_facts import facts, odd_size, quality
 from validate.scene.geometries.box import grid
-from validate.scene.geometries.filled import filled
+from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
-from validate.scene.mesh_files import foreign_mesh, meshio_arrays, vtu_series
-from validate.scene.mesh_files.foreign_mesh import read_foreign
+from validate.scene.mesh_files import meshio_arrays, third_party_meshes, vtu_series
 from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files.third_party_meshes import read_foreign
 
 SIZE = (0.01, 0.02, 0.03)
 
@@ -320,7 +320,7 @@ def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]
     found = {"points": np.zeros((4, 3)), "cells.tetra": np.array(cells)}
     low, high = np.min(cells), np.max(cells)
     with pytest.raises(SceneError, match=f"x.vtu: its elements name nodes {low} to {high} of 4; d"):
-        foreign_mesh._body("x.vtu", found, 1.0, None, turn=False)
+        third_party_meshes._body("x.vtu", found, 1.0, None, turn=False)
 
 
 @pytest.mark.parametrize(

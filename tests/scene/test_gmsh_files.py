@@ -10,8 +10,8 @@ from validate.commands.main import cli
 from validate.errors import SceneError, UsageError
 from validate.scene.body_facts import quality
 from validate.scene.mesh import cell_volumes
-from validate.scene.mesh_files.foreign_mesh import read_foreign
 from validate.scene.mesh_files.mesh_file import read_mesh
+from validate.scene.mesh_files.third_party_meshes import read_foreign
 
 FILES = Path(__file__).parent / "gmsh"
 SIDES = {f"side{i}": n for i, n in enumerate((6, 6, 12, 12, 12, 12), 1)}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.scene.geometries.box import box
-from validate.scene.geometries.remeshed import refined
+from validate.scene.geometries.refinement import refined
 from validate.scene.material import Material, Region
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene

@@ -10,7 +10,7 @@ from validate.errors import SceneError
 from validate.fem.assembly.loads import uniform_shares
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
-from validate.scene.geometries.remeshed import refined
+from validate.scene.geometries.refinement import refined
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.places import InBox, Labelled, Nearest, OnPlane, Site, facets_of, nodes_of

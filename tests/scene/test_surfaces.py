@@ -11,13 +11,13 @@ import vtk
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.body_facts import quality
-from validate.scene.geometries import filled as filled_module
+from validate.scene.geometries import tetrahedral_filling as filled_module
 from validate.scene.geometries.box import grid
-from validate.scene.geometries.filled import filled
+from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_files import surface_arrays
-from validate.scene.mesh_files.foreign_mesh import read_foreign
 from validate.scene.mesh_files.surface_arrays import _oriented, _signed_volume, _surface
+from validate.scene.mesh_files.third_party_meshes import read_foreign
 
 BOX = trimesh.creation.box((10.0, 20.0, 30.0))
 X, T = np.array(BOX.vertices), np.array(BOX.faces)

@@ -12,7 +12,7 @@ from validate.scene.material import Material, Prony, Region
 from validate.scene.places import OnPlane
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
-from validate.solve.dynamic.let_go import LetGo
+from validate.solve.dynamic.release import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
 from validate.solve.march import march, run_scheme
 from validate.solve.static.newton import StaticNewton

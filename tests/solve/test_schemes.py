@@ -19,8 +19,8 @@ from validate.scene.tool import Needle
 from validate.solve.dynamic.modal import Modal
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.schemes import SCHEMES, SOLVERS, schemes_that
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 from validate.solve.types import Scheme
 from validate.testing import scheme_contract
 

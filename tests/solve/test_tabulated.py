@@ -9,8 +9,8 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from validate.errors import SceneError
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
-from validate.solve.static.tabulated import Tabulated
 from validate.solve.types import State
 
 

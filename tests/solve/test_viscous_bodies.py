@@ -15,7 +15,7 @@ from validate.fem.critical import critical_step
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import stiffened
 from validate.fem.laws.stretch_response import response
-from validate.fem.laws.viscous import cell_branches
+from validate.fem.laws.viscoelasticity import cell_branches
 from validate.fem.system import System, build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Prony, Region

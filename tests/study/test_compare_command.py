@@ -11,7 +11,14 @@ from PIL import Image
 from test_stored import method, stored
 
 from validate.errors import UsageError
-from validate.study.stored_runs.stored import SORTS, Row, narrowed, ordered, read_run, side_by_side
+from validate.study.stored_runs.score_comparison import (
+    SORTS,
+    Row,
+    narrowed,
+    ordered,
+    read_run,
+    side_by_side,
+)
 
 
 def score(name: str, value: float, unit: str = "m") -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from validate.commands.main import run
-from validate.compare.overall import ALPHA
+from validate.compare.overall_verdict import ALPHA
 from validate.engine.cell import Record, Where
 from validate.errors import ComparisonError, UsageError
 from validate.pipeline.experiment.experiment import Experiment
@@ -23,7 +23,7 @@ from validate.study.coverage import bench as coverage_bench
 from validate.study.coverage import study as coverage_module
 from validate.study.coverage import worlds as coverage_worlds
 from validate.study.coverage.bench import ExactReading, opened_here
-from validate.study.coverage.found import Quantity
+from validate.study.coverage.coverage_results import Quantity
 from validate.study.coverage.page import sentence
 from validate.study.coverage.plan import (
     World,

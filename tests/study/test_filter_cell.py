@@ -1,4 +1,4 @@
-"""One cell: sharing gains changes nothing, scores are the road's own, failures are rows."""
+"""One cell: sharing gains changes nothing, scores are the pipeline's own, failures are rows."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,17 +11,17 @@ from study_samples import experiment_file
 
 from validate.compare.track import rmse, track_error
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.finish import finish
-from validate.engine.kept import fingerprint
+from validate.engine.execution import finish
 from validate.engine.store import read_records
+from validate.engine.worker_cache import fingerprint
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.kalman.batch import Batch
 from validate.estimate.kalman.displacement_filter import DisplacementStepper
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.followed import Truth
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.method_run import Truth
+from validate.pipeline.run.pipeline import compare
 from validate.study.filters.bench import Bench, Ready, open_bench
 from validate.study.filters.cell import run_cell
 from validate.study.filters.plan import FilterPlan, plan

@@ -21,7 +21,7 @@ from validate.study.filters.score import (
     withheld_scores,
 )
 from validate.study.filters.study import Best, _best, _edges, usual_score
-from validate.study.filters.withheld import Innovations, Withheld
+from validate.study.filters.withheld_errors import Innovations, Withheld
 from validate.study.sweep import axes
 
 ONE_SEGMENT = 0.1  # s

@@ -19,7 +19,7 @@ from validate.pipeline.experiment.experiment import Case, Experiment, Told, vary
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options, chosen_cases
 from validate.pipeline.run.named_run import run_name
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.study.filters import plan as filter_plan
 from validate.study.filters.bench import Bench
 from validate.study.filters.cell import run_cell

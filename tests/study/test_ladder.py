@@ -20,9 +20,9 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.ladder.default import body_of, trial_of
 from validate.pipeline.ladder.ladder import LARGEST, Rival, StabilityBody, Turned
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.geometries.box import box
-from validate.scene.geometries.remeshed import linear, of_element, refined
+from validate.scene.geometries.refinement import linear, of_element, refined
 from validate.scene.material import Material, Region
 from validate.scene.mesh import boundary_facets, cell_volumes
 from validate.scene.meshless import MaterialPoint

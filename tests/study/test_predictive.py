@@ -15,7 +15,7 @@ from validate.study.filters.predictive import predictive_likelihood, with_likeli
 from validate.study.filters.ranking import rankings
 from validate.study.filters.score import LOG_LOSS, FilterScores
 from validate.study.filters.study import study
-from validate.study.filters.withheld import PredictionErrors, Segments, prediction_errors
+from validate.study.filters.withheld_errors import PredictionErrors, Segments, prediction_errors
 
 SAMPLES, SEGMENTS = 40_000, 100
 T = np.arange(1.0, SAMPLES + 1)

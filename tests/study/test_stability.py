@@ -16,7 +16,7 @@ import pytest
 from scipy import sparse
 
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.finish import Finished, finish
+from validate.engine.execution import Finished, finish
 from validate.errors import SceneError
 from validate.fem.critical import cell_altitudes
 from validate.fem.system import build

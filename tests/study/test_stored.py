@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
+from validate.checksums import sealed
 from validate.commands.arguments import BAD_INPUT
 from validate.commands.main import run
 from validate.errors import ComparisonError, UsageError
 from validate.report.export.table_file import stored_table, write_long_table
 from validate.report.long_table import content_of
-from validate.seals import sealed
-from validate.study.stored_runs.stored import pairs, read_run, read_table, side_by_side
+from validate.study.stored_runs.score_comparison import pairs, read_run, read_table, side_by_side
 
 
 def stored(folder: Path, **changes: Any) -> Path:

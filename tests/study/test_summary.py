@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from command_line import here, refused
 
+from validate.checksums import sealed, unsealed
 from validate.errors import UsageError
 from validate.report.export import parquet
 from validate.report.export.table_file import stored_table, write_long_table
-from validate.seals import sealed, unsealed
 from validate.study.stored_runs.predictions import predictions, stored_runs
 from validate.study.stored_runs.summary import Summary, summary
 from validate.study.stored_runs.summary_page import _ROWS, _against, _points, document

@@ -10,8 +10,8 @@ from validate.report.views.records import table
 from validate.study.filters.exhibits import _pareto_chart, _pareto_exhibit, _ranking_exhibit
 from validate.study.stability import exhibits as stability_exhibits
 from validate.study.stability.exhibits import _COST, _map, _marks
-from validate.study.stability.still import _cells
-from validate.study.stability.still import _map as gain_map
+from validate.study.stability.static_map import _cells
+from validate.study.stability.static_map import _map as gain_map
 from validate.study.stability.study import points
 
 BASE = Turned(4e3, 0.45, 1e3, 1.0, 1e-3, 5)

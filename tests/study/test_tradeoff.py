@@ -15,7 +15,7 @@ from validate.commands import study as studying
 from validate.commands.main import run
 from validate.commands.screen import show
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.finish import finish
+from validate.engine.execution import finish
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.estimate.kalman import displacement_filter
 from validate.fem.linear_solvers.factor import factorise

@@ -12,7 +12,7 @@ from validate.errors import UsageError
 from validate.pipeline.run.job import Job
 from validate.recording.types import Recording, Source
 from validate.scene.geometries.box import grid
-from validate.scene.geometries.remeshed import of_element
+from validate.scene.geometries.refinement import of_element
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene

@@ -16,7 +16,7 @@ from validate.estimate.kalman.formulas import Gaussian, kf_update
 from validate.fem.assembly.locate import barycentric_rows
 from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Contours
 from validate.register.outlines.outlines import observe_outlines
 from validate.register.outlines.plane import cavity_sampler
@@ -28,7 +28,7 @@ from validate.study.filters.exhibits import against_first, study_exhibits
 from validate.study.filters.plan import FilterCell, plan
 from validate.study.filters.score import AHEAD, HELD_OUT, WITHHELD, FilterScores
 from validate.study.filters.study import study
-from validate.study.filters.withheld import (
+from validate.study.filters.withheld_errors import (
     Innovations,
     MarkerTracks,
     Segments,

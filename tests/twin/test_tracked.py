@@ -19,7 +19,7 @@ from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march
 from validate.solve.types import Outcome
-from validate.twin.tracked import (
+from validate.twin.tracker import (
     Camera,
     Origin,
     Points,

@@ -28,7 +28,7 @@ from validate.recording.merge import (
 )
 from validate.recording.readers import read_recording
 from validate.recording.types import Signal
-from validate.report.charts.aligned import aligned
+from validate.report.charts.clock_alignment import aligned
 from validate.report.charts.encode import png
 
 

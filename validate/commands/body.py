@@ -9,13 +9,19 @@ from validate.commands.display import say, table
 from validate.errors import SceneError, UsageError
 from validate.places import try_file
 from validate.scene.body_facts import POOR, SAME, facts, largest_side, odd_size, quality
-from validate.scene.geometries.filled import SUFFIXES as SURFACES
-from validate.scene.geometries.filled import filled
+from validate.scene.geometries.tetrahedral_filling import SUFFIXES as SURFACES
+from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.mesh_files.foreign_mesh import ForeignBody, cells_of, only, pieces, read_foreign
 from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
 from validate.scene.mesh_files.meshio_arrays import SURFACE
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.third_party_meshes import (
+    ForeignBody,
+    cells_of,
+    only,
+    pieces,
+    read_foreign,
+)
 from validate.scene.places import facets_of, place_of
 from validate.units import in_si, split
 

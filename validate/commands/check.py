@@ -12,17 +12,17 @@ from validate.commands.run import each
 from validate.commands.run_screen import figures_line
 from validate.commands.screen import Passage, check_passages, rows, sentences, show
 from validate.compare.result import KINDS, Result
-from validate.engine.finish import CELLS
+from validate.engine.execution import CELLS
 from validate.engine.pool import Pool
-from validate.pipeline.checks.described_motion import described
+from validate.pipeline.checks.motion_summary import described
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.cached_runs import stored_run
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder
-from validate.pipeline.run.reused import stored_run
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.report.long_table import long_table
-from validate.report.stored.plain import members
+from validate.report.stored.json_values import members
 from validate.report.stored.store import check_members, figure_members, overall_members
 
 Json = dict[str, Any]

@@ -17,7 +17,7 @@ from validate.report.stored.folder import try_results
 from validate.report.views.layout import laid, width, wrapped
 from validate.report.views.numbers import shown_unit, significant, text
 from validate.study.stored_runs.compare_page import write_comparison
-from validate.study.stored_runs.stored import Pair, Row, SideBySide, pairs
+from validate.study.stored_runs.score_comparison import Pair, Row, SideBySide, pairs
 
 _LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
 _ROUNDING = 1e-9  # relative: the same computation in another order

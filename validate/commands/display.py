@@ -43,8 +43,8 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 def print_views(found: "LongTable", *names: str) -> None:
     """Views of a run as text, those without a row left out."""
     from validate.report.views.drawers import terminal
-    from validate.report.views.filled import filled
     from validate.report.views.standard import view_of
+    from validate.report.views.view_filling import filled
 
     screen = console()
     for exhibit in (filled(view_of(name), found) for name in names):

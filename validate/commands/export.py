@@ -5,11 +5,11 @@ from pathlib import Path
 from validate.commands.display import say
 from validate.errors import UsageError
 from validate.places import try_file, write_whole
-from validate.report.export.outside import junit, tabular
+from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
-from validate.report.views.filled import filled
 from validate.report.views.standard import view_of
-from validate.study.stored_runs.stored import read_table
+from validate.report.views.view_filling import filled
+from validate.study.stored_runs.score_comparison import read_table
 
 
 def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:

@@ -11,7 +11,15 @@ from validate.catalogue import experiment_files, reports_of
 from validate.commands.display import relative, say, shown
 from validate.errors import UsageError
 from validate.parameters import nearest_names
-from validate.report.stored.since import Move, PastCheck, PastRun, Since, history, since, with_unit
+from validate.report.stored.run_changes import (
+    Move,
+    PastCheck,
+    PastRun,
+    Since,
+    history,
+    since,
+    with_unit,
+)
 
 _FIGURES = 3  # headline figures of a run
 _CHANGED, _MOVED = 8, 5  # parameters and checks that changed, of a run

@@ -26,7 +26,7 @@ from validate.commands.arguments import (
 )
 from validate.commands.external import external
 from validate.commands.help import Sections, outlives_reader
-from validate.commands.on_recordings import COMMANDS
+from validate.commands.recording_commands import COMMANDS
 from validate.errors import UsageError, ValidateError
 from validate.memory import imports_stay
 from validate.places import of_the_place, why_not

@@ -13,14 +13,14 @@ from validate.errors import RecordingError, UsageError
 from validate.files import safe_name
 from validate.places import try_file
 from validate.recording.mcap.write import write_recording
-from validate.recording.outlines.followed import EXPERTS, FollowedOutline, Hint, followed
-from validate.recording.outlines.foreign_outline import foreign_outlines
 from validate.recording.outlines.outline import RivalRegion
+from validate.recording.outlines.outline_tracking import EXPERTS, FollowedOutline, Hint, followed
+from validate.recording.outlines.third_party_outlines import foreign_outlines
 from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Frames, Recording
 from validate.report.charts.encode import png
 from validate.report.scenes.outline_images import PlaceSaid, outlines_over
-from validate.report.sections.observed import Held
+from validate.report.sections.observations import Held
 from validate.units import in_si, split
 
 _SHOWN = 6  # images of the picture

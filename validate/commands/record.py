@@ -9,7 +9,7 @@ from validate.commands.run import ask_about
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.pipeline.experiment.find import find
-from validate.pipeline.run.remade import stamped
+from validate.pipeline.run.twin_record import stamped
 from validate.places import try_file, write_whole
 from validate.recording.digest import digest, to_text
 from validate.recording.mcap.write import write_recording

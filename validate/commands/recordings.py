@@ -12,7 +12,7 @@ from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.chain import require_chain
 from validate.recording.clocks.alignment import declared_offset, shift
-from validate.recording.formats.unread import known_unread
+from validate.recording.formats.unsupported_formats import known_unread
 from validate.recording.images.image import AS_IT_IS
 from validate.recording.mcap.recover import recover
 from validate.recording.mcap.write import write_recording
@@ -26,7 +26,7 @@ from validate.recording.readers import (
     recognises,
 )
 from validate.recording.scales import odd_scales
-from validate.recording.tables.every import ALL, every_specimen
+from validate.recording.tables.specimen_export import ALL, every_specimen
 from validate.recording.types import Recording
 
 _NAMED = 6  # streams or fields that are named one by one

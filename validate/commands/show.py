@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from validate.catalogue import experiment_files, reports_of
+from validate.checksums import read_sealed
 from validate.commands.display import console, relative, say
 from validate.commands.screen import rows
 from validate.compare.exhibit import Exhibit
@@ -14,10 +15,9 @@ from validate.report.long_table import LongTable
 from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.views.drawers import drawable, save, terminal
-from validate.report.views.filled import filled
 from validate.report.views.standard import VIEWS
-from validate.seals import read_sealed
-from validate.study.stored_runs.stored import read_table
+from validate.report.views.view_filling import filled
+from validate.study.stored_runs.score_comparison import read_table
 
 
 def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | None) -> None:

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from validate.checksums import read_sealed
 from validate.commands.arguments import FAILED, OK, Detail, command_line, pairs
 from validate.commands.display import relative, say, table
 from validate.commands.progress import progress
 from validate.commands.screen import Passage, cut, rows, sentences, show
 from validate.compare.exhibit import Entry, TableCell, plain
 from validate.engine.cell import Where
-from validate.engine.finish import Finished
+from validate.engine.execution import Finished
 from validate.library import studies
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.report.stored.folder import MARK
 from validate.report.views.numbers import MISSING, significant
-from validate.seals import read_sealed
 from validate.study.choose.exhibits import words
 from validate.study.choose.study import Choice, error_of
 from validate.study.filters import page as filter_page

@@ -45,7 +45,7 @@ _HOMES = {
         "Boundaries",
         "boundary_scores",
     ),
-    "overall": (
+    "overall_verdict": (
         "Overall",
         "judge_all",
         "Expected",

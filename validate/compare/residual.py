@@ -18,7 +18,7 @@ from validate.errors import ComparisonError
 from validate.register.observation import Deviation, Role, Selection
 
 if TYPE_CHECKING:
-    from validate.register.registered import Registered
+    from validate.register.registration import Registered
     from validate.solve.types import Run
 
 

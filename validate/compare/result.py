@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from validate.compare.exhibit import Exhibit
-from validate.compare.overall import Expected, MovedVerdict, Overall, judge_all, moved
+from validate.compare.overall_verdict import Expected, MovedVerdict, Overall, judge_all, moved
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.row import RowBlock
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from validate.compare.inputs import Declared, Joint
     from validate.identify.budget import IdentifiedValue
     from validate.recording.types import Recording
-    from validate.register.registered import Registered
+    from validate.register.registration import Registered
     from validate.scene.meshless import AnyScene
     from validate.solve.types import Run
 

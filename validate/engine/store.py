@@ -14,12 +14,12 @@ from typing import Any, Generic, Literal, Union, get_args, get_origin, get_type_
 import numpy as np
 from numpy.typing import NDArray
 
+from validate.checksums import LARGEST, read_sealed, sealed
 from validate.engine.cell import R, Record
 from validate.engine.identity import code_sha256
 from validate.errors import RecordingError
 from validate.files import read_bytes
 from validate.places import replacing, write_whole
-from validate.seals import LARGEST, read_sealed, sealed
 
 _APART = 200  # numbers: an array of more, or of none, lies in the .npz
 _ARRAY, _NUMBER, _ARRAYS = "array", "=number", "arrays_sha256"

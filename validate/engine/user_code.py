@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from validate.engine.identity import PACKAGE
-from validate.engine.kept import fingerprint
+from validate.engine.worker_cache import fingerprint
 
 _OURS = PACKAGE.name
 _PYTHON = sys.stdlib_module_names - {"__main__"}

@@ -6,11 +6,11 @@ A new one of the package is one file beside this and its name here.
 from typing import ClassVar, Protocol
 
 from validate.arrays import Floats
-from validate.estimate.care import NoiseSettings
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.filterpy.filters import FilterpyFilter
+from validate.estimate.gating import NoiseSettings
 from validate.estimate.kalman.batch import Batch
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf

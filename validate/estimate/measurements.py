@@ -12,7 +12,7 @@ from validate.errors import ComparisonError
 from validate.register.clocks import interpolated
 from validate.register.markers.markers import MarkerObservation
 from validate.register.outlines.outlines import OutlineObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.mesh import Mesh
 
 OFF_STEP = 0.01  # of a step: clock jitter that moves no estimate; more would be a wrong time

@@ -16,7 +16,7 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import lame_constants, shape_gradients
-from validate.fem.laws.viscous import taut
+from validate.fem.laws.viscoelasticity import taut
 from validate.fem.system import System, build
 from validate.scene.material import Material
 from validate.scene.scene import Scene

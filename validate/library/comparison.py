@@ -9,7 +9,13 @@ from validate.display import Screen
 from validate.library.run_result import RunResult
 from validate.report.long_table import frame
 from validate.report.views.numbers import shown_unit, significant, text
-from validate.study.stored_runs.stored import SideBySide, narrowed, ordered, read_run, side_by_side
+from validate.study.stored_runs.score_comparison import (
+    SideBySide,
+    narrowed,
+    ordered,
+    read_run,
+    side_by_side,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -8,16 +8,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from validate.compare.result import Result
-from validate.engine.finish import CELLS, Report
+from validate.engine.execution import CELLS, Report
 from validate.engine.pool import Pool
 from validate.pipeline.calibration.calibrated import Identify, here
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.options import Options, doubtful
+from validate.pipeline.run.cached_runs import rests_on
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder
-from validate.pipeline.run.reused import rests_on
-from validate.pipeline.run.road import compare
+from validate.pipeline.run.pipeline import compare
 from validate.report.stored.folder import STUDIES, locked, try_results
 from validate.report.stored.history import replaced
 from validate.report.write import kept_report, write_report

@@ -14,11 +14,11 @@ from validate.library.view_result import ShownView
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
-from validate.report.stored.plain import Json
-from validate.report.views.filled import filled
+from validate.report.stored.json_values import Json
 from validate.report.views.numbers import text, with_unit
 from validate.report.views.standard import view_of
-from validate.study.stored_runs.stored import read_table
+from validate.report.views.view_filling import filled
+from validate.study.stored_runs.score_comparison import read_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame

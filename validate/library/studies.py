@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from validate.engine.cell import Where
-from validate.engine.finish import CELLS, Report
+from validate.engine.execution import CELLS, Report
 from validate.errors import UsageError
 from validate.library.run_report import Progress, no_progress, warn_of_units
 from validate.pipeline.experiment.experiment import Experiment
@@ -18,7 +18,7 @@ from validate.pipeline.experiment.find import sources_of
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.named_run import differences, study_folder, tag
 from validate.report.stored.folder import locked, try_results
-from validate.report.stored.made import made
+from validate.report.stored.provenance import made
 from validate.study.choose.climb import Climb
 from validate.study.choose.facts import stored_effects
 from validate.study.choose.study import Choice, choose, wanted
@@ -31,7 +31,7 @@ from validate.study.filters.study import FilterStudy, study
 from validate.study.identify import page as identify_page
 from validate.study.identify.study import STARTS, IdentifyStudy, identification
 from validate.study.stability import page as stability_page
-from validate.study.stability import still as still_page
+from validate.study.stability import static_map as still_page
 from validate.study.stability.gain import GainMap, gain_map
 from validate.study.stability.study import Stability, stability
 from validate.study.study_page import Findings, write_study

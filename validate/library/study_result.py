@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from validate.checksums import read_sealed
 from validate.display import Screen
 from validate.files import LARGEST, read_text
 from validate.library.plots import Plots
 from validate.report.long_table import frame
 from validate.report.stored.folder import MARK
-from validate.report.stored.plain import Json
-from validate.seals import read_sealed
+from validate.report.stored.json_values import Json
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -26,7 +26,7 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.ladder.ladder import Ladder
-from validate.pipeline.run import road
+from validate.pipeline.run import pipeline
 
 __all__ = [
     "Calibrates",
@@ -66,4 +66,4 @@ def run_in_memory(
     as for `--set`. `validate.run` does the same with stored computations and a report. Raises
     children of `ValidateError` for bad input.
     """
-    return road.compare(experiment, Options(dict(values or {}), methods, quick))
+    return pipeline.compare(experiment, Options(dict(values or {}), methods, quick))

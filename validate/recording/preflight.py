@@ -19,6 +19,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.chain import chain_faults
 from validate.recording.clocks.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.clocks.clock_check import GAP_FACTOR, clock_of
+from validate.recording.mcap.channel_state import AllSeen, ChannelSeen
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP, read_recording
@@ -32,9 +33,8 @@ from validate.recording.mcap.schemas import (
     SIGNAL,
     Sample,
 )
-from validate.recording.mcap.seen import AllSeen, ChannelSeen
 from validate.recording.mcap.streams import our_channels
-from validate.recording.mcap.verified import Verified, messages_of, opened
+from validate.recording.mcap.verified_file import Verified, messages_of, opened
 from validate.recording.motion_capture.poses import ROTATION
 from validate.recording.motion_capture.text_rows import ASSUMED, cut_lines
 from validate.recording.reader import Options, Reader, require_known, source_of

@@ -10,7 +10,7 @@ from validate.recording.chain import require_chain
 from validate.recording.formats.matlab import MATLAB
 from validate.recording.formats.rosbag import ROSBAG
 from validate.recording.formats.slicer import FCSV, MARKUPS
-from validate.recording.formats.unread import known_unread
+from validate.recording.formats.unsupported_formats import known_unread
 from validate.recording.images.dicom import DICOM
 from validate.recording.images.image_stack import IMAGE_STACK
 from validate.recording.images.metaimage import METAIMAGE

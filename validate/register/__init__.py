@@ -10,7 +10,7 @@ _HOMES = {
     "markers.quality": ("Registration", "register_points"),
     "markers.transform": ("Similarity", "fit_rigid", "fit_similarity"),
     "markers.two_step": ("fit_two_step",),
-    "registered": ("Registered",),
+    "registration": ("Registered",),
     "observation": ("Deviation", "Observation", "Selection"),
     "markers.markers": ("MarkerObservation", "observe_markers"),
     "outlines.outlines": ("OutlineObservation", "observe_outlines"),

@@ -7,7 +7,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.compare.row import MEASURED, SAMPLE, LongRow, RowBlock
-from validate.report.sections.observed import signals
+from validate.report.sections.observations import signals
 
 _VOLUME = ".volume_ratio"
 

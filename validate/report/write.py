@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from validate.checksums import read_sealed
 from validate.compare.result import Result
-from validate.engine.finish import CELLS
+from validate.engine.execution import CELLS
 from validate.errors import RecordingError
 from validate.files import json_value
 from validate.report.export.fields import write_fields
@@ -17,10 +18,9 @@ from validate.report.samples import samples
 from validate.report.sections.verdicts import band
 from validate.report.stored.folder import MARK, STUDIES, replace_folder
 from validate.report.stored.history import carried, write_lines
-from validate.report.stored.made import Made
-from validate.report.stored.plain import Json, write_json
+from validate.report.stored.json_values import Json, write_json
+from validate.report.stored.provenance import Made
 from validate.report.stored.store import document
-from validate.seals import read_sealed
 
 if TYPE_CHECKING:  # what draws is imported when something is drawn
     from validate.report.exhibits import Beside

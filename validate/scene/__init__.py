@@ -7,8 +7,8 @@ _HOMES = {
         "Mesh",
         "quadratic",
     ),
-    "geometries.filled": ("filled",),
-    "mesh_files.foreign_mesh": (
+    "geometries.tetrahedral_filling": ("filled",),
+    "mesh_files.third_party_meshes": (
         "ForeignBody",
         "read_foreign",
     ),
@@ -59,8 +59,8 @@ _HOMES = {
         "Capsule",
         "block_with_inclusion",
     ),
-    "geometries.remeshed": ("refined",),
-    "tracked": ("Prescribed",),
+    "geometries.refinement": ("refined",),
+    "prescribed_motion": ("Prescribed",),
     "places": (
         "InBox",
         "Labelled",

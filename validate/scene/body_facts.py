@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.scene.mesh import Mesh, cell_volumes
-from validate.scene.mesh_files.foreign_mesh import pieces
+from validate.scene.mesh_files.third_party_meshes import pieces
 from validate.scene.shape_functions import CORNERS, brick_rule
 from validate.units import in_si
 

@@ -28,8 +28,8 @@ from validate.scene.places import (
     place_of,
     resting_points,
 )
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.tool import Needle, require_usable
-from validate.scene.tracked import Prescribed
 from validate.units import SYMBOLIC
 
 Dilatation = Literal["pointwise", "nodal_mean", "mixed", "by_element"]

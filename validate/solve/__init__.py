@@ -1,4 +1,4 @@
-"""Schemes: settings, preparation and step apart; `march` walks the steps."""
+"""Schemes: settings, prepared and step apart; `march` walks the steps."""
 
 from validate.exports import lazily, names
 

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from validate.plugins import Registry, settings_faults
 from validate.scene.mesh import Kind
 from validate.solve.candidates import RUNGS, Asked, Rival
-from validate.solve.dynamic.from_equilibrium import FromEquilibrium
+from validate.solve.dynamic.equilibrium_start import FromEquilibrium
 from validate.solve.dynamic.implicit import NewtonDynamics
-from validate.solve.dynamic.let_go import LetGo
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
+from validate.solve.dynamic.release import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.external.let_go import ExternalLetGo
+from validate.solve.external.release import ExternalLetGo
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
@@ -30,11 +30,11 @@ from validate.solve.haptic.needle import NeedleLoop
 from validate.solve.regions.krylov import TouchedKrylov
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.static.contact import ContactNewton
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.proportional import Proportional
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.stretch_test import StretchTest
-from validate.solve.static.tabulated import Tabulated
 from validate.solve.static.without_mechanics import Harmonic, RigidMotion
 from validate.solve.stepping import Stepping
 from validate.solve.types import SceneSolver, Scheme

@@ -11,7 +11,7 @@ from typing import Any
 from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
 from validate.report.stored.folder import MARK, replace_folder
-from validate.report.stored.plain import Json, write_json
+from validate.report.stored.json_values import Json, write_json
 
 
 def write_loose(

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.engine.finish import CELLS
+from validate.engine.execution import CELLS
 from validate.parameters import Parameter
 from validate.pipeline.experiment.experiment import Experiment
 from validate.report.export.tables import write_csv
 from validate.report.stored.folder import replace_folder
 from validate.report.stored.history import carried, write_lines
-from validate.report.stored.made import Made
+from validate.report.stored.provenance import Made
 from validate.report.stored.store import document
 from validate.study.loose_page import fill_page, without_runs
 

@@ -4,8 +4,8 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "sensors": ("OutlineSensor", "Pen", "StageProfile"),
-    "stepped": ("SteppedTwin",),
-    "tracked": ("Camera", "Origin", "Reading"),
+    "time_stepping": ("SteppedTwin",),
+    "tracker": ("Camera", "Origin", "Reading"),
     "ultrasound": ("Scanner",),
 }
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.recorded import recorded
+from validate.recording.formats.streams import recorded
 from validate.recording.reader import MapOption, Options, Reader, head, source_of
 from validate.recording.types import Recording, Signal
 from validate.units import in_si

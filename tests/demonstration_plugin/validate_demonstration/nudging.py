@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats
-from validate.estimate.care import NoiseSettings
+from validate.estimate.gating import NoiseSettings
 from validate.estimate.kalman.batch import Batch
 from validate.estimate.measurements import Measurements, Timetable, timetable
 from validate.fem.system import System

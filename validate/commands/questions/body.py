@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.commands.holdings import beside
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.contact import of_the_indenter
 from validate.commands.questions.kind import (
     NewKind,
@@ -45,6 +44,7 @@ from validate.commands.questions.motion import (
     require_dynamic,
 )
 from validate.commands.questions.scene import CELLS, answered_mesh, imports, rendered, tree_of
+from validate.commands.recording_summary import beside
 from validate.errors import UsageError
 from validate.pipeline.bodies.markers import AS_SEEN
 from validate.pipeline.bodies.mesh import unknowns_of
@@ -55,7 +55,7 @@ from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile
 from validate.scene.laws import law_kind
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.places import axis_of
 
 _SHAPES = ("file", "block", "cylinder")
@@ -63,7 +63,7 @@ _ACCEPTED = {"force": ("N", "force"), "marker": ("m", "displacement of a marker,
              "contour": ("m", "distance between outlines, as 0.5mm")}  # fmt: skip
 _MOVED = {"validate.pipeline.bodies.measured": ("solid",)}
 _PRESSED = {"validate.pipeline.bodies.measured": ("touching",)}
-_MOVING = {"validate.pipeline.bodies.moving": ("moving",)}
+_MOVING = {"validate.pipeline.bodies.body_dynamics": ("moving",)}
 
 
 def _fits(recording: Recording) -> bool:

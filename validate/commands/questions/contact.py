@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, by_path, parsed
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.scene.contact import ROUND, Indenter
-from validate.scene.geometries.indented import IndentedBlock, IndentedCylinder
+from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.geometries.similar_grids import divided
 from validate.scene.geometries.specification import Geometry
 from validate.scene.places import axis_of

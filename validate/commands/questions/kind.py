@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.errors import UsageError
 from validate.pipeline.run.cost import MESHES, linear_seconds
 from validate.recording.types import Recording

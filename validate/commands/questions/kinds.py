@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from validate.commands.questions.asking import Question
+from validate.commands.questions.answers import Question
 from validate.commands.questions.kind import quantity_in
 from validate.errors import UsageError
 from validate.parameters import with_values

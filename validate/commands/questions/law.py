@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.parameters import with_values
 from validate.scene.laws import LAWS, Coefficients, law_kind
 

@@ -3,14 +3,14 @@
 from functools import lru_cache
 from pathlib import Path
 
-from validate.commands.holdings import beside
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.kind import quadratic_fits
 from validate.commands.questions.kinds import known_size, there
+from validate.commands.recording_summary import beside
 from validate.pipeline.bodies.mesh import PLATES, sizes_of_mesh
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
 from validate.scene.mesh_files.mesh_file import read_mesh
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 
 
 def mesh_questions(found: Answers, *, needed: bool) -> list[Question]:

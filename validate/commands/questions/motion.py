@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from validate.arrays import Floats
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.kinds import RELEASE, by_path, parsed
 from validate.commands.questions.scene import CELLS, IDENTIFIED, damping, held, sides_of, tree_of
 from validate.errors import UsageError, ValidateError
@@ -17,19 +17,19 @@ from validate.estimate.filters import FILTERS
 from validate.estimate.reduced.load_scale import OVERDAMPED
 from validate.fem.system import build
 from validate.identify.recorded_motion import FRACTION, motion_of
-from validate.pipeline.bodies.drive import drive_kind, mover, weight_beside
-from validate.pipeline.bodies.first_modes import first_frequencies, model_of
-from validate.pipeline.bodies.markers import leading
-from validate.pipeline.bodies.measured import static_scene
-from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
-from validate.pipeline.bodies.moving import (
+from validate.pipeline.bodies.body_dynamics import (
     EXPLICIT_FILTERS,
     METHODS,
     against_mode,
     fits_motion,
     model_law,
 )
-from validate.pipeline.bodies.moving_registered import started, steps_of, without_rest
+from validate.pipeline.bodies.drive import drive_kind, mover, weight_beside
+from validate.pipeline.bodies.dynamics_registration import started, steps_of, without_rest
+from validate.pipeline.bodies.first_modes import first_frequencies, model_of
+from validate.pipeline.bodies.markers import leading
+from validate.pipeline.bodies.measured import static_scene
+from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile

@@ -15,8 +15,7 @@ import click
 
 from validate.commands.arguments import complain, require_new
 from validate.commands.display import say
-from validate.commands.holdings import beside, channels, plain, topics
-from validate.commands.questions.asking import (
+from validate.commands.questions.answers import (
     Answers,
     Question,
     answered,
@@ -28,11 +27,12 @@ from validate.commands.questions.body import BODY
 from validate.commands.questions.inclusion import INCLUSION
 from validate.commands.questions.kind import NewKind
 from validate.commands.questions.plates import PLATES
+from validate.commands.recording_summary import beside, channels, plain, topics
 from validate.commands.recordings import ask_back
 from validate.compare.result import Kind
 from validate.errors import SceneError, UsageError
 from validate.pipeline.run.estimate import RunEstimate, estimated
-from validate.pipeline.run.remade import kind_of_recordings
+from validate.pipeline.run.twin_record import kind_of_recordings
 from validate.places import try_folder, write_whole
 from validate.recording.readers import read_recording
 from validate.recording.types import Recording

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.kind import (
     accept_line,
     limit_question,

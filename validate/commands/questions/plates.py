@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from validate.commands.questions import outline as new_outline
-from validate.commands.questions.asking import Answers, Question
+from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.kind import NewKind, quantity_in, reason_question
 from validate.commands.questions.law import (
     LINEAR,

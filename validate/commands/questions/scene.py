@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from validate.commands.questions.asking import Answers
+from validate.commands.questions.answers import Answers
 from validate.commands.questions.contact import CONTACT_WORDS, contact_settings, indented, reach_of
 from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, sides, unit_of
 from validate.commands.questions.law import coefficient_values, left_open
@@ -24,10 +24,10 @@ from validate.scene.geometries.similar_grids import divided
 from validate.scene.geometries.specification import Box, Cylinder, Geometry, MeshFile
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.places import axis_of, nodes_of, place_of
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Drive, Load, Pressure, Scene, Support, Weight
-from validate.scene.tracked import Prescribed
 from validate.units import in_si, split
 
 # --- Parts of a declaration as the lines of an experiment's file: what differs from the

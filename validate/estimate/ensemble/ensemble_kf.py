@@ -16,9 +16,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.estimate.care import NoiseSettings
 from validate.estimate.ensemble.member_filter import HANDLES, MemberModel, MemberStepper, sight
 from validate.estimate.ensemble.members import Members
+from validate.estimate.gating import NoiseSettings
 from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.sampled_kalman import Corrected, Reach, ensemble_update
 from validate.fem.system import System

@@ -13,15 +13,6 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate.care import (
-    Care,
-    care_of,
-    clock_setting,
-    gate_numbers,
-    gate_setting,
-    gate_units,
-    gated_out,
-)
 from validate.estimate.ensemble.members import (
     Coordinates,
     Members,
@@ -32,6 +23,15 @@ from validate.estimate.ensemble.members import (
 from validate.estimate.ensemble.parameters import Doubts, doubts
 from validate.estimate.extended import kernels as kernel
 from validate.estimate.extended.explicit_step import FAR, MARGIN, explicit_step
+from validate.estimate.gating import (
+    Care,
+    care_of,
+    clock_setting,
+    gate_numbers,
+    gate_setting,
+    gate_units,
+    gated_out,
+)
 from validate.estimate.kalman.batch import OneAtATime
 from validate.estimate.kalman.formulas import Innovation, innovation_units, nothing
 from validate.estimate.measurements import Measurements, Timetable, timetable

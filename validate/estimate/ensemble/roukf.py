@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import helmert, solve, solve_triangular
 
 from validate.arrays import Floats
-from validate.estimate.care import NoiseSettings
 from validate.estimate.ensemble.member_filter import HANDLES, MemberModel, MemberStepper, sight
+from validate.estimate.gating import NoiseSettings
 from validate.estimate.kalman.formulas import best_gain, innovation
 from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.sampled_kalman import Corrected

@@ -11,8 +11,8 @@ from validate.arrays import Floats, Ints
 from validate.fem.kernels import central_difference as central_kernel
 from validate.fem.kernels import explicit as explicit_kernels
 from validate.fem.kernels.central_difference import pull
-from validate.fem.kernels.compiled import compiled
 from validate.fem.kernels.explicit import add_forces_and_blocks
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.large_strain.explicit import PackedBody
 
 _UNSIGNED = np.int64(0x7FFFFFFFFFFFFFFF)  # all bits of a double but its sign

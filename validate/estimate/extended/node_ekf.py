@@ -16,7 +16,10 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.care import (
+from validate.estimate.extended import kernels as kernel
+from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
+from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.gating import (
     Care,
     NoiseSettings,
     care_of,
@@ -24,9 +27,6 @@ from validate.estimate.care import (
     gate_setting,
     gated_out,
 )
-from validate.estimate.extended import kernels as kernel
-from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
 from validate.estimate.kalman.covariance import noise
 from validate.estimate.kalman.formulas import Innovation
 from validate.estimate.measurements import Measurements, timetable

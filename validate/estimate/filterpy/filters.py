@@ -14,7 +14,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.care import (
+from validate.estimate.filterpy.linear_model import LinearModel, require_symmetric
+from validate.estimate.gating import (
     Care,
     NoiseSettings,
     care_of,
@@ -22,7 +23,6 @@ from validate.estimate.care import (
     gate_setting,
     gated_out,
 )
-from validate.estimate.filterpy.linear_model import LinearModel, require_symmetric
 from validate.estimate.kalman.formulas import Innovation, best_gain, innovation, nothing
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced.linear_system import LoadDoubt, ReducedModel, reduced_model

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.care import Care, gate_numbers, gate_units
+from validate.estimate.gating import Care, gate_numbers, gate_units
 from validate.estimate.kalman.batch import Batch, batch_of, in_amplitudes, stacked_gains
 from validate.estimate.kalman.coordinates import (
     Coordinates,
@@ -33,7 +33,7 @@ from validate.estimate.kalman.formulas import (
 )
 from validate.estimate.kalman.gains import Claims, GainSequence
 from validate.estimate.kalman.modal_kernel import walked
-from validate.estimate.kalman.observable import shared_gains
+from validate.estimate.kalman.observation_covariance import shared_gains
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System

@@ -17,7 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.care import Care, NoiseSettings, care_of, clock_setting, gate_setting
+from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.coordinates import (
     Coordinates,
     InModes,
@@ -34,7 +34,7 @@ from validate.estimate.kalman.displacement_filter import (
     load_shapes,
 )
 from validate.estimate.kalman.gains import GainSequence, schedule
-from validate.estimate.kalman.observable import shared_gains
+from validate.estimate.kalman.observation_covariance import shared_gains
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.smoother import smooth_setting
 from validate.fem.system import System, once

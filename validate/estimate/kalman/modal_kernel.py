@@ -3,7 +3,7 @@
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.fem.kernels.compiled import compiled
+from validate.fem.kernels.jit_cache import compiled
 
 
 @compiled(fastmath={"contract", "reassoc"})

@@ -14,7 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.estimate.care import Care, NoiseSettings, care_of, clock_setting, gate_setting
+from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Dense
 from validate.estimate.kalman.displacement_filter import load_shapes
 from validate.estimate.kalman.formulas import (

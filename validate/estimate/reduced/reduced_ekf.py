@@ -23,9 +23,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate.care import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
 from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Recursion
 from validate.estimate.kalman.formulas import Gain, Innovation, innovation
 from validate.estimate.kalman.gains import Event, events, schedule

@@ -13,8 +13,8 @@ from scipy.linalg import LinAlgError, solve_discrete_are
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.estimate.care import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.filterpy.linear_model import LinearModel
+from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Recursion, Steady, claimed
 from validate.estimate.kalman.formulas import (
     Gain,

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.care import Care, gate_numbers, gate_units
+from validate.estimate.gating import Care, gate_numbers, gate_units
 from validate.estimate.kalman.batch import OneAtATime
 from validate.estimate.kalman.formulas import Innovation, innovation_units
 from validate.estimate.measurements import Measurements, Timetable

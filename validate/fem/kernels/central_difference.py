@@ -1,7 +1,6 @@
 """The compiled steps of central difference on lumped masses (paper 003, eq 18)."""
 
 from validate.arrays import Floats, Ints
-from validate.fem.kernels.compiled import compiled
 from validate.fem.kernels.explicit import (
     MODULES,
     Cells,
@@ -9,6 +8,7 @@ from validate.fem.kernels.explicit import (
     add_forces_in_parts,
     add_late_forces,
 )
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.kernels.tensors import FAST, inlined
 
 Springs = tuple[Cells, Cells, Floats]

@@ -46,7 +46,7 @@ from validate.fem.kernels.cells import (
     add_late,
     cells_looked_at,
 )
-from validate.fem.kernels.compiled import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.kernels.nodes_in_lanes import BLOCK, FOUR
 from validate.fem.kernels.points import INVARIANTS
 from validate.fem.kernels.tensors import FAST

@@ -28,7 +28,7 @@ from validate.fem.kernels.lanes import on_lines
 from validate.fem.kernels.nodes_in_lanes import BLOCK
 from validate.fem.kernels.points import NEO_HOOKE, SVK
 from validate.fem.large_strain.brick_packing import packed_bricks, require_bricks
-from validate.fem.laws.viscous import cell_branches, taut
+from validate.fem.laws.viscoelasticity import cell_branches, taut
 from validate.scene.laws import coupled_lambda, further_laws, ogden_terms
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells

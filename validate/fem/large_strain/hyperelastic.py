@@ -38,7 +38,7 @@ from validate.fem.assembly.surface import foundation_stiffness
 from validate.fem.laws.law import Law, parts_of
 from validate.fem.laws.plane_stress import PlaneStress
 from validate.fem.laws.tensors import green_strain, volume_change
-from validate.fem.laws.viscous import Branches, Lagged, Remembered, second_stress
+from validate.fem.laws.viscoelasticity import Branches, Lagged, Remembered, second_stress
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene

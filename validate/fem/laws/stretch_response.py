@@ -12,7 +12,7 @@ from validate.arrays import Floats, checked
 from validate.errors import SceneError
 from validate.fem.laws.law import Law, instant, law_of
 from validate.fem.laws.tensors import volume_change
-from validate.fem.laws.viscous import Lagged, branches_of, second_stress
+from validate.fem.laws.viscoelasticity import Lagged, branches_of, second_stress
 from validate.scene.material import Material
 from validate.scene.meshless import MaterialPoint, StretchMode
 

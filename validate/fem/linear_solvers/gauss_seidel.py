@@ -1,7 +1,7 @@
 """Gauss-Seidel sweeps over a sparse matrix: the compiled kernel, and plain loops to check it by."""
 
 from validate.arrays import Floats, Ints
-from validate.fem.kernels.compiled import compiled
+from validate.fem.kernels.jit_cache import compiled
 
 
 def sweeps_loops(

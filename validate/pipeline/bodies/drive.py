@@ -20,8 +20,8 @@ from validate.recording.types import Recording, Signal
 from validate.register.clocks import clock_sd, interpolated
 from validate.register.signals import SignalObservation
 from validate.scene.contact import Indenter, RigidContact
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Drive, Load, Pressure, Scene, Weight
-from validate.scene.tracked import Prescribed
 
 Kind = Literal["weighs", "pulls", "moves", "follows", "presses", "releases"]
 Mover = Drive | RigidContact | Prescribed | Load | Pressure | Weight

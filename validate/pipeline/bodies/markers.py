@@ -12,11 +12,11 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.readers import recognised
 from validate.recording.types import Contours, Markers, Recording
 from validate.register.clocks import clock_sd
-from validate.register.markers.declared import as_declared
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.from_rest import noise, rested
+from validate.register.markers.identity_frame import as_declared
 from validate.register.markers.markers import MarkerObservation, observe_markers, vector
 from validate.register.markers.measures import FEWEST
+from validate.register.markers.rest_displacements import noise, rested
 from validate.register.observation import nearest_sample
 from validate.register.outlines.distances import enclosed
 from validate.register.outlines.outlines import OutlineObservation, observe_outlines

@@ -16,6 +16,8 @@ import numpy as np
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
+from validate.pipeline.bodies.body_dynamics import doubting, following, in_motion
+from validate.pipeline.bodies.body_registration import place
 from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.drive import drive_kind, mover, placed_points, pressing
 from validate.pipeline.bodies.first_modes import Changes, element_of, is_quadratic, law_of, model_of
@@ -28,8 +30,6 @@ from validate.pipeline.bodies.mesh import (
     unknowns_of,
 )
 from validate.pipeline.bodies.modulus import identify_body, model_name
-from validate.pipeline.bodies.moving import doubting, following, in_motion
-from validate.pipeline.bodies.registered import place
 from validate.pipeline.calibration.fitted_moduli import modulus_in
 from validate.pipeline.experiment.experiment import (
     CORNER_ORDER,

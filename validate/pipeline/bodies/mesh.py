@@ -13,7 +13,7 @@ from validate.errors import SceneError, UsageError
 from validate.files import modified
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cost import NODAL_MEAN
-from validate.scene.geometries.indented import IndentedBlock, IndentedCylinder
+from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.geometries.specification import Box, Cylinder, Geometry, MeshFile
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.scene import Scene

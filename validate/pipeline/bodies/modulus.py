@@ -18,9 +18,9 @@ from validate.errors import ComparisonError, SceneError, UsageError
 from validate.identify.budget import NOISE, IdentifiedValue
 from validate.identify.residual_pattern import pattern
 from validate.identify.scaled_curve import PROPORTIONAL, ScaledFit, fit_proportional
+from validate.pipeline.bodies.body_registration import LOW
 from validate.pipeline.bodies.drive import drive_kind, mover
 from validate.pipeline.bodies.first_modes import Changes, law_of
-from validate.pipeline.bodies.registered import LOW
 from validate.pipeline.calibration.fitted_moduli import (
     COMMON,
     Moves,
@@ -37,12 +37,12 @@ from validate.pipeline.calibration.fitted_moduli import (
 from validate.pipeline.experiment.experiment import Experiment, Identified, Input
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.solved import run_on
+from validate.pipeline.run.case_solution import run_on
 from validate.recording.scatter import repeats_share
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.geometries.indented import IndentedBlock, IndentedCylinder
+from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.geometries.specification import Box, Cylinder, MeshFile
 from validate.scene.laws import Coefficients
 from validate.scene.scene import Drive, Scene, Support

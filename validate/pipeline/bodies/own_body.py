@@ -18,8 +18,8 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.run.runs import solves_here
 from validate.recording.types import Recording
-from validate.register.registered import Registered
-from validate.scene.geometries.remeshed import refined
+from validate.register.registration import Registered
+from validate.scene.geometries.refinement import refined
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.meshless import AnyScene, Meshless

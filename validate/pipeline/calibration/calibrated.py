@@ -22,7 +22,13 @@ from validate.parameters import describe, with_values
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.calibration.fitted_moduli import on_meshes
 from validate.pipeline.calibration.problem import Calibrated, Part, Problem, with_free
-from validate.pipeline.calibration.words import headlines, lines, not_identified, scores, unit_of
+from validate.pipeline.calibration.sentences import (
+    headlines,
+    lines,
+    not_identified,
+    scores,
+    unit_of,
+)
 from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
@@ -34,7 +40,7 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.variation import Change
-from validate.pipeline.run.remade import made_by
+from validate.pipeline.run.twin_record import made_by
 from validate.recording.types import Recording
 from validate.report.views.numbers import with_unit
 

@@ -17,7 +17,7 @@ from validate.parameters import with_values
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.solved import solve
+from validate.pipeline.run.case_solution import solve
 from validate.recording.types import Recording
 
 _SHOWN = 8  # names of residuals in a message
@@ -55,7 +55,7 @@ class Problem:
     def residual(self, x: Floats) -> Floats:
         """All residuals at coordinates x (p,), independent and of variance one.
 
-        Raises `ComparisonError` where a named residual is not there, and what the road raises.
+        Raises `ComparisonError` where a named residual is not there, and what the pipeline raises.
         """
         values = dict(zip(self.space.names, self.space.values(x), strict=True))
         found = [whitened(r.values, r.sd, r.systematic, r.freedom, r.name)

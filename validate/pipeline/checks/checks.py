@@ -26,9 +26,9 @@ from validate.compare.verdict import (
 from validate.errors import ComparisonError
 from validate.fem.assembly.locate import probe_rows
 from validate.pipeline.checks.consistency import claims_hold
-from validate.pipeline.checks.refined import Refined, mesh_errors, variants
+from validate.pipeline.checks.numerical_uncertainty import Refined, mesh_errors, variants
 from validate.pipeline.experiment.experiment import Change, EffectSpec, Input, Uncertainty, Variant
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.pipeline.run.runs import Road
 from validate.register.outlines.outlines import OutlineObservation
 
@@ -36,7 +36,7 @@ _NO_UNIT = "-"  # of a quantity that no observation has
 
 
 def variants_of(road: Road) -> list[Variant]:
-    """Every variant that the road will solve on the experiment's own recordings."""
+    """Every variant that the pipeline will solve on the experiment's own recordings."""
     wanted = [Variant(name) for name in road.methods]
     accepted = [name for name in road.experiment.accepted if name in road.methods]
     uncertainty = road.experiment.uncertainty

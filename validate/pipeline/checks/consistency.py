@@ -16,7 +16,7 @@ from validate.estimate.consistency import (
     whiteness,
 )
 from validate.fem.assembly.locate import probe_rows
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 
 _LAGS = 10
 _HELD = 1e-12  # m: a component without error and without doubt is held, and no estimate

@@ -21,7 +21,7 @@ from validate.errors import ValidateError
 from validate.identify.recorded_motion import RecordedMotion, recorded_motion
 from validate.identify.ringing import Ringing
 from validate.pipeline.bodies.first_modes import first_frequencies
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.register.observation import History
 from validate.report.views.numbers import with_unit
 

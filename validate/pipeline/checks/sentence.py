@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-from validate.compare.overall import Overall, judge_all
+from validate.compare.overall_verdict import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.result import Kind, MethodResult
 from validate.compare.verdict import Check

@@ -16,11 +16,11 @@ from validate.arrays import Floats
 from validate.pipeline.experiment.experiment import Experiment, Input
 from validate.pipeline.experiment.method import Method
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.meshless import AnyScene, RigidBody
+from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Scene
-from validate.scene.tracked import Prescribed
 
 
 def with_uncertain_drives(

@@ -9,7 +9,7 @@ from validate.compare.exhibit import Exhibit, NumberTable, TableCell
 from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.external import external_methods
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.method_run import Followed
 from validate.pipeline.run.runs import Road
 from validate.solve.external.scheme import ExternalSimulator, changes
 

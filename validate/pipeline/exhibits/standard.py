@@ -9,9 +9,9 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable
 from validate.compare.row import LongRow, RowBlock
 from validate.compare.track import TrackError, nrmse, track_error
 from validate.pipeline.checks.consistency import consistency_exhibit, nis_of
-from validate.pipeline.exhibits.gated import estimated_exhibit, gate_exhibit
+from validate.pipeline.exhibits.gating import estimated_exhibit, gate_exhibit
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.run.followed import Cases, Followed
+from validate.pipeline.run.method_run import Cases, Followed
 from validate.register.markers.markers import MarkerObservation
 
 _MM = 1e3

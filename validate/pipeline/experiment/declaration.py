@@ -23,8 +23,8 @@ from validate.errors import UsageError, ValidateError
 from validate.estimate.filters import FILTERS
 from validate.former_names import new_name
 from validate.parameters import describe, has_path, nearest_names
-from validate.pipeline.experiment.completed import DECLARED, completed, of_a_kind
 from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.experiment_kinds import DECLARED, completed, of_a_kind
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import follows
 from validate.pipeline.experiment.variation import ByPath, Shift, Values
@@ -91,15 +91,15 @@ FORMAT = 1
 _LEAVES = (str, bool, int, float, type(None))
 #: Modules whose dataclasses a declaration is made of, by the names of the classes.
 _MODULES = (
-    "compare.effects", "compare.overall", "compare.published", "compare.verdict",
+    "compare.effects", "compare.overall_verdict", "compare.published", "compare.verdict",
     "estimate.filters", "register.markers.fitting", "register.sensing",
     "pipeline.calibration.calibration", "pipeline.experiment.tree", "pipeline.plates.choices",
     "pipeline.experiment.experiment", "pipeline.plates.inclusion", "pipeline.plates.inclusion_body",
     "pipeline.bodies.choices", "pipeline.experiment.method", "pipeline.experiment.tree",
     "pipeline.experiment.variation", "scene.contact", "scene.geometries.specification",
-    "scene.geometries.hollow_block", "scene.geometries.indented", "scene.contact", "scene.laws",
+    "scene.geometries.hollow_block", "scene.geometries.indented_bodies", "scene.laws",
     "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.sheet",
-    "scene.tool", "scene.tracked", "solve.schemes",
+    "scene.tool", "scene.prescribed_motion", "solve.schemes",
 )  # fmt: skip
 _RUNS_PROGRAMS = ("ExternalSimulator", "ExternalLetGo")  # settings with a command to run
 

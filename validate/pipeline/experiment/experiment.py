@@ -11,7 +11,7 @@ from typing import Any
 
 from validate.compare.effects import Sensor
 from validate.compare.exhibit import Exhibit
-from validate.compare.overall import Expected
+from validate.compare.overall_verdict import Expected
 from validate.compare.published import Figure
 from validate.compare.residual import Residual
 from validate.compare.result import Kind
@@ -36,9 +36,9 @@ from validate.pipeline.experiment.variation import Change as Change
 from validate.pipeline.experiment.variation import Shift, bound, change_of, shares, swept
 from validate.pipeline.experiment.variation import unchanged as unchanged
 from validate.pipeline.ladder.ladder import Ladder
-from validate.pipeline.run.followed import Cases, Truth
+from validate.pipeline.run.method_run import Cases, Truth
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.meshless import AnyScene
 
 Progress = Callable[[str], None]

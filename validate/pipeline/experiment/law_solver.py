@@ -15,9 +15,9 @@ from validate.scene.laws import further_laws
 from validate.scene.material import LawName
 from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.handles import LARGE, Handles
+from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic
-from validate.solve.static.tabulated import Tabulated
 
 _LINEAR, _LARGE = (ExactPressure, NoFluid, QuasiStatic), (StaticNewton, Tabulated)
 

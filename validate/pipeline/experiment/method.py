@@ -9,7 +9,7 @@ from validate.estimate.measurements import Measurements, measurements
 from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.pipeline.experiment.variation import ByPath
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.

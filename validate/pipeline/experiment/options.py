@@ -14,7 +14,7 @@ from validate.pipeline.experiment.law_solver import with_law
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import valued
 from validate.scene.mesh_files.abaqus_text import files_named
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 
 RECORDED = "recorded"  # the case that the experiment's own recording is
 _MESHES = (".npz", *FOREIGN)

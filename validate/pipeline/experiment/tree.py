@@ -16,16 +16,16 @@ from validate.files import modified
 from validate.parameters import describe, part, quantity, value_at, with_given
 from validate.pipeline.experiment.variation import change_of
 from validate.recording.types import Recording
-from validate.register.as_declared import as_declared
-from validate.register.registered import Registered
-from validate.scene.geometries.remeshed import size_against
+from validate.register.registration import Registered
+from validate.register.scene_registration import as_declared
+from validate.scene.geometries.refinement import size_against
 from validate.scene.geometries.specification import Geometry, MeshFile, cell_size
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import Meshless
 from validate.scene.scene import Scene
-from validate.twin.tracked import Camera, require_noise
+from validate.twin.tracker import Camera, require_noise
 
 # --- What the parameters of several experiments have in common: cards, and changes of them.
 

@@ -28,6 +28,7 @@ from validate.pipeline.ladder.ladder import (
     squeezed,
     turned,
 )
+from validate.pipeline.ladder.probe_ladder import touched_ladder
 from validate.pipeline.ladder.references import (
     ORDERS,
     exact_in_ramps,
@@ -35,9 +36,8 @@ from validate.pipeline.ladder.references import (
     still_pair,
     swinging_pair,
 )
-from validate.pipeline.ladder.touched import touched_ladder
 from validate.scene.geometries.box import centroids
-from validate.scene.geometries.remeshed import linear, of_element
+from validate.scene.geometries.refinement import linear, of_element
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.scene import Load, Scene

@@ -2,9 +2,9 @@
 
 from validate.pipeline.live.clock import Lived, live, realtime
 from validate.pipeline.live.listener import Listener
+from validate.pipeline.live.live_recording import LIVE, as_given, written
 from validate.pipeline.live.path import RecordedPath, recorded_tip
-from validate.pipeline.live.prepared import Prepared, prepared
-from validate.pipeline.live.written import LIVE, as_given, written
+from validate.pipeline.live.preparation import Prepared, prepared
 
 __all__ = [
     "LIVE",

@@ -32,7 +32,7 @@ from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import Sampling, Together, placed_markers
 from validate.register.outlines.outlines import Corner, observe_outlines
 from validate.register.outlines.plane import cavity_sampler
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
 from validate.scene.geometries.inclusion import InclusionShape
 from validate.scene.scene import Contact as Contact

@@ -22,7 +22,7 @@ from validate.register.observation import Selection, nearest_samples
 from validate.register.outlines.distances import enclosed
 from validate.register.outlines.outlines import OutlineObservation, observe_outlines
 from validate.register.outlines.plane import cavity_sampler
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Cylinder
 from validate.scene.mesh import Mesh

@@ -27,7 +27,7 @@ from validate.pipeline.plates.choices import BONDED_PLATES
 from validate.recording.types import Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Role
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, windows_of
 from validate.scene.geometries.specification import Cylinder, MeshFile
 from validate.scene.scene import Scene, Support

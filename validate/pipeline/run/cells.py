@@ -14,10 +14,10 @@ from typing import Any
 from uuid import uuid4
 
 from validate.engine.cell import Plan, Record
-from validate.engine.finish import CELLS, finish
-from validate.engine.kept import fingerprint
+from validate.engine.execution import CELLS, finish
 from validate.engine.pool import Pool
 from validate.engine.store import key_of, oldest_removed
+from validate.engine.worker_cache import fingerprint
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.experiment.experiment import Experiment, Told
@@ -26,8 +26,8 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, configure, folder_of, mesh_files
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Meshes
-from validate.pipeline.run.followed import NO_TRUTH, Cases, Truth
 from validate.pipeline.run.job import Job, job_on
+from validate.pipeline.run.method_run import NO_TRUTH, Cases, Truth
 from validate.pipeline.run.runs import Road, RunFound, RunWanted
 from validate.solve.external.program import version_of
 from validate.solve.external.scheme import ExternalSimulator

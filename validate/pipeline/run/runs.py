@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from validate.compare.residual import Residual
 from validate.compare.result import Kind
-from validate.engine.finish import Report
+from validate.engine.execution import Report
 from validate.errors import ComparisonError
 from validate.fem.linear_solvers.factor import next_to_nothing, require_solvable
 from validate.pipeline.calibration.calibrated import middle
@@ -23,9 +23,9 @@ from validate.pipeline.experiment.experiment import (
 )
 from validate.pipeline.experiment.method import Limited, Method
 from validate.pipeline.experiment.options import folder_of
-from validate.pipeline.run.followed import MAIN, NO_TRUTH, Cases, Followed, Truth
-from validate.pipeline.run.remade import kind_of_recordings, made_by, require_known
-from validate.pipeline.run.solved import placed, solve
+from validate.pipeline.run.case_solution import placed, solve
+from validate.pipeline.run.method_run import MAIN, NO_TRUTH, Cases, Followed, Truth
+from validate.pipeline.run.twin_record import kind_of_recordings, made_by, require_known
 from validate.recording.types import Recording
 from validate.scene.meshless import Meshless
 from validate.solve.types import Run

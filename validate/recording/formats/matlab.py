@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.apart import decoded
 from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
 from validate.recording.formats.options import (
     M_PER_PX,
@@ -28,7 +27,8 @@ from validate.recording.formats.options import (
     length,
     spread,
 )
-from validate.recording.formats.recorded import begun, recorded
+from validate.recording.formats.streams import begun, recorded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.reader import MapOption, Options, Reader, head, require_known, source_of
 from validate.recording.tables.displacement_field import FieldColumns, field_columns
 from validate.recording.tables.vocabulary import role_of_name

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from validate.errors import RecordingError
 from validate.files import ANY_SIZE, member, members, open_file, read_text
-from validate.recording.formats.apart import decoded
 from validate.recording.formats.rosbag_arrays import ROS1
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.mcap.read import OPTIONS, read_all
 from validate.recording.reader import Options, Reader, head, source_of
 from validate.recording.types import Recording, Source

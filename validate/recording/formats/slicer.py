@@ -10,7 +10,7 @@ import numpy as np
 from validate.errors import RecordingError
 from validate.files import json_value
 from validate.recording.formats.options import SD, UNIT, frame, length, spread
-from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import TextRow, TextRows, text_rows
 from validate.recording.reader import Options, Reader, head, source_of
 from validate.recording.tables.encoding import whole_file

@@ -8,7 +8,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import (
     LENS_FILE,
     M_PER_PX,
@@ -19,10 +18,11 @@ from validate.recording.formats.options import (
     frame,
     length,
 )
-from validate.recording.formats.recorded import recorded
+from validate.recording.formats.streams import recorded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import shallow
 from validate.recording.images.lens import straightened
-from validate.recording.images.numbered import OTHERS, pictures
+from validate.recording.images.numbered_files import OTHERS, pictures
 from validate.recording.images.png_stack import by_size, offered
 from validate.recording.reader import Options, Reader, head, source_of
 from validate.recording.types import Frames, Recording, Source

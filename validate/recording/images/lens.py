@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.apart import decoded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import Pixels, undistorted
 from validate.recording.reader import Options, require_readable
 

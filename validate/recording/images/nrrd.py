@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
-from validate.recording.formats.apart import decoded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.sequence import MAX_PIXELS, OPTIONS, Sequence, by_frame, recorded
 from validate.recording.reader import Options, Reader, head
 from validate.recording.types import Recording

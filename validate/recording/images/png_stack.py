@@ -12,7 +12,7 @@ from validate.recording.clocks.clock_check import clock_of
 from validate.recording.formats.options import LENS_FILE, M_PER_PX, RATE, TOPIC, above_zero, asked
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.images.lens import straightened
-from validate.recording.images.numbered import OTHERS, numbered, pictures
+from validate.recording.images.numbered_files import OTHERS, numbered, pictures
 from validate.recording.reader import Options, Reader, head
 from validate.recording.scales import odd_pixel
 from validate.recording.types import Frames, Recording, Source

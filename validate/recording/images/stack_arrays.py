@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
-from validate.recording.images.numbered import SUFFIXES, numbered
+from validate.recording.images.numbered_files import SUFFIXES, numbered
 from validate.recording.reader import head
 
 LIBRARIES = ("PIL.Image",)

@@ -12,7 +12,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.files import ANY_SIZE, open_file
-from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import (
     LENS_FILE,
     M_PER_PX,
@@ -23,7 +22,8 @@ from validate.recording.formats.options import (
     frame,
     length,
 )
-from validate.recording.formats.recorded import recorded
+from validate.recording.formats.streams import recorded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.lens import straightened
 from validate.recording.reader import MapOption, Options, Reader, head, source_of
 from validate.recording.types import Frames, Recording

@@ -41,7 +41,7 @@ from validate.recording.mcap.records import (
     records_in,
     statistics_messages,
 )
-from validate.recording.mcap.verified import Cut, Span, Verified
+from validate.recording.mcap.verified_file import Cut, Span, Verified
 from validate.recording.types import Source
 
 # --- SHA-256 and CRC-32 of bytes that come one after another, taken by a thread beside the

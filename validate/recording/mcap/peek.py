@@ -8,7 +8,7 @@ from typing import Any
 from validate.errors import RecordingError, UsageError
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.verified import messages_of, opened
+from validate.recording.mcap.verified_file import messages_of, opened
 
 LONGEST = 64  # elements of a list that are shown
 

@@ -13,7 +13,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.mcap.channels import replacing
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.records import HEAD, MAGIC, Op
-from validate.recording.mcap.verified import Cut, Verified, opened
+from validate.recording.mcap.verified_file import Cut, Verified, opened
 
 RECORD = "validate.recovered"
 _BLOCK = 2**20  # bytes copied at once

@@ -29,7 +29,7 @@ from validate.recording.mcap.schemas import (
     decode,
     parse_json,
 )
-from validate.recording.mcap.verified import Verified
+from validate.recording.mcap.verified_file import Verified
 from validate.recording.types import Contours, Frames, Markers, Record, Signal, Stream
 
 OURS = (MARKERS, SIGNAL, CONTOUR)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.apart import decoded
 from validate.recording.formats.options import SD, UNIT, frame, metres, spread
-from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.streams import distinct, recorded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.motion_capture.c3d_bytes import BLOCK, MOST, layout, records
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.motion_capture.text_rows import LEFT_OUT, told_zeros, without_zeros

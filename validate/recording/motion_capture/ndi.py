@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.options import RATE, UNIT, above_zero, frame, length
-from validate.recording.formats.recorded import begun, distinct, recorded
+from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,

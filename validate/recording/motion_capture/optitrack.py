@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.options import SD, UNIT, frame, metres, spread
-from validate.recording.formats.recorded import begun, distinct, recorded
+from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
 from validate.recording.motion_capture.text_rows import (
     TextRow,

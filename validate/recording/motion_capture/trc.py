@@ -7,7 +7,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.options import RATE, SD, UNIT, above_zero, frame, metres, spread
-from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
     TextRow,

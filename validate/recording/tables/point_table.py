@@ -24,7 +24,7 @@ from validate.recording.formats.options import (
     metres,
     spread,
 )
-from validate.recording.formats.recorded import distinct, recorded
+from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
     LEFT_OUT,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from validate.errors import RecordingError, UsageError
 from validate.files import open_file
-from validate.recording.formats.apart import decoded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.reader import MapOption, Options, Reader, head
 from validate.recording.tables.blocks import parse_tables
 from validate.recording.tables.columns import OPTIONS, role_of

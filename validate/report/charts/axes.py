@@ -19,7 +19,7 @@ from matplotlib.ticker import (
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Series
-from validate.report.charts.looks import Drawn, is_jagged
+from validate.report.charts.line_styles import Drawn, is_jagged
 from validate.report.charts.style import MEASURED
 
 _LEVELS = (("#4A4A4A", (4, 2)), ("#6E6E6E", (1, 1.5)), ("#8C8C8C", (6, 2, 1, 2)))

@@ -23,7 +23,7 @@ from validate.report.charts.axes import (
     name_levels,
     readable,
 )
-from validate.report.charts.looks import Drawn, alone, panel_labels, panel_series, styled
+from validate.report.charts.line_styles import Drawn, alone, panel_labels, panel_series, styled
 from validate.report.charts.style import (
     WIDTH,
     Drawing,

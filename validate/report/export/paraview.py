@@ -12,7 +12,7 @@ from validate.compare.result import MethodResult, Result
 from validate.fem.assembly.cell_fields import cell_fields
 from validate.files import safe_name
 from validate.register.markers.markers import MarkerObservation
-from validate.report.sections.observed import markers_seen
+from validate.report.sections.observations import markers_seen
 from validate.scene.scene import Scene
 from validate.solve.types import Run
 

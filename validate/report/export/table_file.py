@@ -15,6 +15,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from validate.checksums import SEAL, read_sealed
 from validate.compare.row import (
     CHART,
     POINT,
@@ -32,8 +33,7 @@ from validate.report.export import parquet
 from validate.report.long_table import LongTable, long_table, traces_of
 from validate.report.stored.exhibit_rows import exhibit_rows
 from validate.report.stored.folder import MARK
-from validate.report.stored.plain import Json
-from validate.seals import SEAL, read_sealed
+from validate.report.stored.json_values import Json
 
 PARQUET, CSV = "results.parquet", "results.csv.gz"
 _LAST = (POINT, SAMPLE)  # parts that are read only where they are asked for

@@ -32,7 +32,7 @@ import numpy as np
 
 from validate.compare.result import MethodResult, Result
 from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
-from validate.recording.mcap.own_protobuf import protobuf_schema
+from validate.recording.mcap.protobuf_messages import protobuf_schema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL
 from validate.report.replay import foxglove
 from validate.report.replay.layout import Shown, layout
@@ -40,7 +40,7 @@ from validate.report.replay.signals import images, signals
 from validate.report.replay.space import markers, outlines, surface, transforms
 from validate.report.replay.view import ReplayView, Track, over_time
 from validate.report.scenes.loads import HOW
-from validate.report.sections.observed import shown_method
+from validate.report.sections.observations import shown_method
 from validate.report.stored.environment import file_name
 
 MAX_BYTES = 5_000_000

@@ -7,13 +7,13 @@ import numpy as np
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
-from validate.recording.mcap.own_protobuf import protobuf_message
+from validate.recording.mcap.protobuf_messages import protobuf_message
 from validate.recording.mcap.schemas import SIGNAL, signal_message
 from validate.recording.types import Frames
 from validate.report.replay.foxglove import IMAGE, picture
 from validate.report.replay.view import ReplayView, Track, pose_records
-from validate.report.sections.observed import holds
-from validate.report.sections.observed import signals as scalar_signals
+from validate.report.sections.observations import holds
+from validate.report.sections.observations import signals as scalar_signals
 
 _SAMPLES = 4000  # messages of one signal, at most
 _IMAGE_BYTES = 1_500_000  # of one stream of images, about

@@ -14,7 +14,7 @@ import matplotlib as mpl
 import numpy as np
 
 from validate.arrays import Floats
-from validate.recording.mcap.own_protobuf import protobuf_message
+from validate.recording.mcap.protobuf_messages import protobuf_message
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, Json, contour_message, markers_message
 from validate.recording.types import Markers
 from validate.report.replay import foxglove
@@ -22,7 +22,7 @@ from validate.report.replay.foxglove import CLOUD, SCENE, TRANSFORMS, Entity, Rg
 from validate.report.replay.signals import one_in, thinned
 from validate.report.replay.view import ReplayView, Track, load_of, pose_records
 from validate.report.scenes.skin import OUTSIDE, SurfacePart, skins
-from validate.report.sections import observed
+from validate.report.sections import observations
 
 Who = Literal["measured", "simulated"]
 Times = Floats | list[float]
@@ -40,7 +40,7 @@ _MARKER_FRAMES = 1500  # instants of measured markers, at most
 def transforms(view: ReplayView, others: Sequence[Track]) -> list[Track]:
     """Image and marker frames in the scene's, once, at the first time of the `others`."""
     children = list[tuple[str, Floats]]()
-    image, seen = observed.outline(view.registered), observed.markers(view.registered)
+    image, seen = observations.outline(view.registered), observations.markers(view.registered)
     if image is not None:
         children.append((view.local("image"), image.pose))
     recorded = _recorded(view)
@@ -82,7 +82,7 @@ class _Kind:
 
 def outlines(view: ReplayView) -> list[Track]:
     """All measured outlines; the simulated ones at the loads; both as lines, simulated moving."""
-    seen = observed.outline(view.registered)
+    seen = observations.outline(view.registered)
     if seen is None:
         return []
     frames = view.frame, view.local("image")
@@ -95,7 +95,7 @@ def outlines(view: ReplayView) -> list[Track]:
 
 def markers(view: ReplayView) -> list[Track]:
     """Measured markers in their own frame where it is known; the simulated ones in the scene's."""
-    seen = observed.markers(view.registered)
+    seen = observations.markers(view.registered)
     if seen is None:
         return []
     recorded, names = _recorded(view), seen.names
@@ -172,7 +172,7 @@ def _looks(
 
 def _recorded(view: ReplayView) -> Markers | None:
     """The markers as recorded, in their own frame; None when no shift and turn leads from it."""
-    seen = observed.markers(view.registered)
+    seen = observations.markers(view.registered)
     if seen is None or seen.registration.transform.s != 1.0:  # a transform of Foxglove has no scale
         return None
     for stream in view.recording.markers.values():

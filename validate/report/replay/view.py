@@ -10,9 +10,9 @@ from validate.compare.result import MethodResult
 from validate.recording.mcap.metadata import POSE, POSE_KEY
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.report.scenes.loads import HOW, Instant, at_times, held
-from validate.report.sections.observed import drive, holds, outline
+from validate.report.sections.observations import drive, holds, outline
 from validate.report.views.numbers import fixed_with_unit, significant, spaced
 from validate.solve.types import Run
 

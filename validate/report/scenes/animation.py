@@ -13,7 +13,7 @@ from validate.compare.exhibit import Animation
 from validate.compare.result import MethodResult
 from validate.report.charts.style import ACCEPTED, MEASURED, film, legend_below
 from validate.report.scenes.loads import HOW, Instant, in_steps
-from validate.report.sections.observed import drive, holds, outline_seen
+from validate.report.sections.observations import drive, holds, outline_seen
 from validate.report.views.numbers import fixed_with_unit, spaced
 
 _MM = 1e3

@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
-from validate.report.sections.observed import Held, holds, outline, shown_method
+from validate.report.sections.observations import Held, holds, outline, shown_method
 from validate.report.views.numbers import significant, spaced, with_unit
 from validate.scene.contact import Shape
 from validate.scene.mesh import Mesh

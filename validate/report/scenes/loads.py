@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from validate.arrays import Floats
-from validate.register.registered import Registered
-from validate.report.sections.observed import Held, drive, driven, holds
+from validate.register.registration import Registered
+from validate.report.sections.observations import Held, drive, driven, holds
 from validate.solve.types import Run
 
 HOW = "between the loads interpolated linearly in the drive"

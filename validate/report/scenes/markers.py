@@ -26,7 +26,7 @@ from validate.report.charts.style import (
     panels,
 )
 from validate.report.scenes.body import flattest
-from validate.report.sections.observed import (
+from validate.report.sections.observations import (
     Held,
     axis_label,
     distinct,

@@ -17,7 +17,7 @@ from validate.register.observation import nearest_sample
 from validate.register.outlines.circle import Circle, fit_circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.scenes.animation import closed
-from validate.report.sections.observed import Held
+from validate.report.sections.observations import Held
 from validate.report.views.numbers import spaced, with_unit
 
 _MM = 1e3

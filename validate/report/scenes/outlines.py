@@ -25,7 +25,7 @@ from validate.report.charts.style import (
 )
 from validate.report.scenes.animation import closed, image_axes, moving_outline
 from validate.report.scenes.outline_images import outline_images
-from validate.report.sections.observed import (
+from validate.report.sections.observations import (
     Held,
     distinct,
     finished,

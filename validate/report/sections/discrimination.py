@@ -16,7 +16,7 @@ from validate.compare.exhibit import Exhibit, Picture
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.report.charts.style import ACCEPTED, MEASURED, NOISE, WIDTH, draw, panels
-from validate.report.sections.observed import finished, last_residual
+from validate.report.sections.observations import finished, last_residual
 from validate.report.views.numbers import at_load, with_unit
 
 _LOWEST = 0.02  # ratios below lie there, as a sign that points on

@@ -7,7 +7,7 @@ from validate.compare.result import Result
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.types import Recording
 from validate.report.stored.environment import environment, file_name, without_folder
-from validate.report.stored.made import Commit, Made
+from validate.report.stored.provenance import Commit, Made
 from validate.report.views.numbers import text, with_unit
 
 _STREAMS = (

@@ -11,12 +11,12 @@ from validate.report.scenes.bodies import body
 from validate.report.scenes.markers import markers
 from validate.report.scenes.outlines import outlines
 from validate.report.sections.discrimination import discrimination
-from validate.report.sections.observed import drive
+from validate.report.sections.observations import drive
 from validate.report.sections.provenance import parameters, recording
 from validate.report.sections.registration import registration
 from validate.report.sections.verdicts import found_besides, verdicts
-from validate.report.views.filled import filled
 from validate.report.views.standard import VIEWS
+from validate.report.views.view_filling import filled
 
 Made = Callable[[Result], Exhibit | None]
 

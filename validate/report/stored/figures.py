@@ -9,15 +9,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from PIL import Image
 
+from validate.checksums import read_sealed
 from validate.compare.view import View
 from validate.report.charts.style import painted
 from validate.report.export.table_file import stored_table
 from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.views.drawers import drawable, figure_of
-from validate.report.views.filled import filled
 from validate.report.views.standard import VIEWS
-from validate.seals import read_sealed
+from validate.report.views.view_filling import filled
 
 _DPI = 130
 _DRAWN = re.compile("^(chart|intervals|heat)_")  # of files of what is drawn from numbers

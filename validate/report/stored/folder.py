@@ -21,7 +21,7 @@ from glob import escape
 from pathlib import Path
 from uuid import uuid4
 
-from validate.engine.finish import CELLS
+from validate.engine.execution import CELLS
 from validate.errors import UsageError
 from validate.places import (
     REPORT_BYTES,

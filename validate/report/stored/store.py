@@ -13,18 +13,18 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.compare.domain import Domain, domains
-from validate.compare.overall import Overall
+from validate.compare.overall_verdict import Overall
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.identify.budget import IdentifiedValue
-from validate.report.sections.observed import timed
+from validate.report.sections.observations import timed
 from validate.report.stored.environment import environment, file_name
 from validate.report.stored.exhibit_rows import exhibits, rounded
-from validate.report.stored.made import Made
-from validate.report.stored.plain import Json, members, recorded
+from validate.report.stored.json_values import Json, members, recorded
+from validate.report.stored.provenance import Made
 from validate.solve.types import Run
 
 SCHEMA_VERSION = 2

@@ -87,7 +87,7 @@ def save(found: Exhibit, run: "HasMethods", path: Path) -> None:
     elif suffix == ".csv":
         write_csv(path, found.tables[0].headings, found.tables[0].rows)
     else:
-        from validate.report.export.outside import tabular
+        from validate.report.export.junit_latex import tabular
 
         path.write_text(tabular(found.tables[0]), encoding="utf-8")
 

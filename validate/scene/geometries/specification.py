@@ -28,9 +28,9 @@ from validate.scene.geometries.cylinder import (
     quarter_cylinder,
     whole_cylinder,
 )
-from validate.scene.geometries.filled import filled
-from validate.scene.geometries.remeshed import coarser, linear, refined
+from validate.scene.geometries.refinement import coarser, linear, refined
 from validate.scene.geometries.similar_grids import member
+from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
 from validate.scene.mesh_files.mesh_file import read_mesh

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from validate.errors import RecordingError, SceneError
 from validate.files import npz_arrays
 from validate.places import replacing
-from validate.scene.geometries.filled import SUFFIXES as SURFACES
+from validate.scene.geometries.tetrahedral_filling import SUFFIXES as SURFACES
 from validate.scene.mesh import Kind, Mesh, require_positive_cells
-from validate.scene.mesh_files.foreign_mesh import SUFFIXES as FOREIGN
-from validate.scene.mesh_files.foreign_mesh import metres, read_foreign
+from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
+from validate.scene.mesh_files.third_party_meshes import metres, read_foreign
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra
 _FACETS = "facets."

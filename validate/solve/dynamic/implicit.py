@@ -22,7 +22,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import stiffness_damping
 from validate.fem.large_strain.hyperelastic import Body
-from validate.fem.laws.viscous import Branches, Remembered, cell_branches, relaxed
+from validate.fem.laws.viscoelasticity import Branches, Remembered, cell_branches, relaxed
 from validate.fem.linear_solvers.factor import elimination_order, factorise_indefinite
 from validate.fem.system import System
 from validate.parameters import quantity

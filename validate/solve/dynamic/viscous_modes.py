@@ -21,7 +21,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.locate import probe_rows
 from validate.fem.large_strain.hyperelastic import Body
-from validate.fem.laws.viscous import Branches, Remembered, relaxed
+from validate.fem.laws.viscoelasticity import Branches, Remembered, relaxed
 from validate.fem.modes import lowest
 from validate.fem.system import build
 from validate.parameters import quantity

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.files import npz_arrays
-from validate.recording.formats.apart import decoded
+from validate.recording.formats.subprocess_decoder import decoded
 from validate.scene.scene import Weight
 from validate.solve.external.job import ExternalJob
 from validate.solve.external.program import plain

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.kernels.compiled import compiled
+from validate.fem.kernels.jit_cache import compiled
 
 _EVERY = 64  # pivots between two measurements of the drift
 _DRIFT = 1e-11  # of the largest displacement: beyond it the matrix is made afresh

@@ -22,7 +22,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.large_strain.hyperelastic import Body
-from validate.fem.laws.viscous import Branches, cell_branches, relaxed
+from validate.fem.laws.viscoelasticity import Branches, cell_branches, relaxed
 from validate.fem.linear_solvers.factor import Factor, factorise
 from validate.fem.linear_solvers.frontal import Fronts
 from validate.scene.material import LawName, Material, Prony

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.engine.cell import Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.ladder.default import trial_of

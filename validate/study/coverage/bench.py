@@ -18,11 +18,11 @@ from validate.pipeline.calibration.problem import Problem
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.case_solution import solve
 from validate.pipeline.run.job import Job
-from validate.pipeline.run.road import set_out
+from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.pipeline import set_out
 from validate.pipeline.run.runs import Road
-from validate.pipeline.run.solved import solve
 from validate.register.observation import Drawable, Observation
 from validate.study.coverage.plan import ReadingCell, TermsCell, in_world, numbered, true_method
 

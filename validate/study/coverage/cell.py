@@ -12,15 +12,15 @@ from math import isfinite
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.compare.overall import judge_all
+from validate.compare.overall_verdict import judge_all
 from validate.compare.residual import Residual, residuals, stacked
 from validate.compare.verdict import Check, PointErrors, errors_of, name_of, nothing_compared
-from validate.pipeline.run.followed import Followed
+from validate.pipeline.run.case_solution import run_on
 from validate.pipeline.run.job import Job
+from validate.pipeline.run.method_run import Followed
 from validate.pipeline.run.runs import Road
-from validate.pipeline.run.solved import run_on
 from validate.register.draws import AnyDraw, Draw, Exact
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.study.coverage.bench import ExactReading, Opening, Stated, drawable
 from validate.study.coverage.plan import FILTER_DRAWS, WRONG_DRAWS, DrawCell
 

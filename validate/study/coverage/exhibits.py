@@ -6,7 +6,7 @@ from functools import partial
 from validate.compare.coverage import FALSE_ACCEPTANCE, LEAST, MOST, Share
 from validate.compare.exhibit import Chart, Emphasis, Entry, Exhibit, NumberTable, TableCell
 from validate.report.views.records import Shown, chart, grouped, sized, table
-from validate.study.coverage.found import Power
+from validate.study.coverage.coverage_results import Power
 from validate.study.coverage.plan import CHECKS, WRONG
 from validate.study.coverage.study import Coverage
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from validate.compare.coverage import Share, Term
 from validate.compare.exhibit import NumberTable
-from validate.report.stored.plain import members
+from validate.report.stored.json_values import members
+from validate.study.coverage.coverage_results import Power, Quantity
 from validate.study.coverage.exhibits import coverage_exhibits
-from validate.study.coverage.found import Power, Quantity
 from validate.study.coverage.study import Coverage
 from validate.study.study_page import Findings
 

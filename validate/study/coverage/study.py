@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 
 from validate.engine.cell import Plan, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.store import key_of
 from validate.errors import ComparisonError, UsageError
 from validate.pipeline.experiment.experiment import Experiment
@@ -21,7 +21,14 @@ from validate.pipeline.run.job import job_of
 from validate.pipeline.run.named_run import study_folder
 from validate.study.coverage.bench import AllStated, Stated, opened_here, run_terms
 from validate.study.coverage.cell import DrawBench, Draws, Given, run_draws
-from validate.study.coverage.found import JointShare, Power, Quantity, power, quantity, together
+from validate.study.coverage.coverage_results import (
+    JointShare,
+    Power,
+    Quantity,
+    power,
+    quantity,
+    together,
+)
 from validate.study.coverage.plan import (
     BLOCK,
     CHECKS,

@@ -14,7 +14,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.engine.cell import C, Plan, R, Record, Where
-from validate.engine.finish import Finished, Report, finish
+from validate.engine.execution import Finished, Report, finish
 from validate.errors import ComparisonError
 from validate.pipeline.run.job import Job
 from validate.study.coverage.bench import CoverageBench, ExactReading, Opening, run_reading

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.engine.kept import Kept, fingerprint
+from validate.engine.worker_cache import Kept, fingerprint
 from validate.errors import ComparisonError
 from validate.estimate.measurements import Measurements
 from validate.fem.system import System
@@ -17,19 +17,24 @@ from validate.pipeline.bodies.own_body import meshed
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.followed import Truth
+from validate.pipeline.run.case_solution import KeptFields, run_on
 from validate.pipeline.run.job import Job
-from validate.pipeline.run.road import set_out
-from validate.pipeline.run.solved import KeptFields, run_on
+from validate.pipeline.run.method_run import Truth
+from validate.pipeline.run.pipeline import set_out
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.register.observation import Observation
 from validate.register.outlines.outlines import OutlineObservation
-from validate.register.registered import Registered
+from validate.register.registration import Registered
 from validate.scene.scene import Scene
 from validate.solve.types import Run, Stepper
 from validate.study.filters.plan import CASE, FilterCell, set_up
-from validate.study.filters.withheld import MarkerTracks, Segments, marker_tracks, segments_of
+from validate.study.filters.withheld_errors import (
+    MarkerTracks,
+    Segments,
+    marker_tracks,
+    segments_of,
+)
 
 _MANY = 40  # recordings and registrations kept, of seeds mostly
 

@@ -9,7 +9,7 @@ from validate.compare.exhibit import NumberTable
 from validate.engine.cell import Record
 from validate.parameters import describe
 from validate.pipeline.experiment.options import Options, configure
-from validate.report.stored.plain import members
+from validate.report.stored.json_values import members
 from validate.report.views.records import Shown, objects, table
 from validate.study.filters.exhibits import over, study_exhibits
 from validate.study.filters.plan import FilterCell

@@ -16,7 +16,7 @@ from validate.engine.cell import Record
 from validate.study.filters.blocks import Blocks, blocks_of
 from validate.study.filters.plan import FilterCell
 from validate.study.filters.score import LOG_LOSS, FilterScores
-from validate.study.filters.withheld import Innovations, PredictionErrors
+from validate.study.filters.withheld_errors import Innovations, PredictionErrors
 
 Records = Mapping[str, Record[FilterScores]]
 

@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from validate.arrays import Floats
 from validate.compare.track import rmse, track_error
 from validate.estimate.consistency import Consistency, nis_consistency
-from validate.study.filters.withheld import Innovations, PredictionErrors, Withheld
+from validate.study.filters.withheld_errors import Innovations, PredictionErrors, Withheld
 
 # --- Units in which a study shows its scores.
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from validate.compare.exhibit import Exhibit
 from validate.engine.cell import Plan, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.store import key_of
-from validate.estimate.care import NoiseSettings
+from validate.estimate.gating import NoiseSettings
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.case_solution import KeptFields
 from validate.pipeline.run.named_run import study_folder
-from validate.pipeline.run.solved import KeptFields
 from validate.register.markers.markers import MarkerObservation
 from validate.report.views.records import Shown, objects, table
 from validate.study.filters.bench import Bench, Ready, open_bench

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from validate.engine.cell import Plan, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names
 from validate.pipeline.experiment.experiment import Experiment

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from validate.engine.kept import Kept
+from validate.engine.worker_cache import Kept
 from validate.identify.least_squares import Fit, fit
 from validate.identify.profile import Side, side
 from validate.identify.scaled_curve import linear_fit
-from validate.pipeline.calibration.asked import asked
 from validate.pipeline.calibration.calibrated import problem_of
+from validate.pipeline.calibration.free_parameters import asked
 from validate.pipeline.calibration.problem import Problem, with_free
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options, all_methods, configure

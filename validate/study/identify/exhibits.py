@@ -9,7 +9,7 @@ from validate.identify.identification import Profiled
 from validate.identify.profile import RISE
 from validate.parameters import describe
 from validate.pipeline.calibration.problem import Calibrated
-from validate.pipeline.calibration.words import helping, lines
+from validate.pipeline.calibration.sentences import helping, lines
 from validate.report.views.numbers import scale, shown_unit
 from validate.report.views.records import Shown, sized, table
 from validate.study.identify.study import IdentifyStudy

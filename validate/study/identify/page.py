@@ -6,8 +6,8 @@ from typing import Any
 from validate.compare.exhibit import NumberTable
 from validate.parameters import describe
 from validate.pipeline.calibration.problem import Calibrated
-from validate.pipeline.calibration.words import headline, not_identified
-from validate.report.stored.plain import members
+from validate.pipeline.calibration.sentences import headline, not_identified
+from validate.report.stored.json_values import members
 from validate.study.identify.exhibits import exhibits, units
 from validate.study.identify.study import IdentifyStudy
 from validate.study.study_page import Findings

@@ -13,7 +13,7 @@ from typing import Any
 
 from validate.arrays import Floats
 from validate.engine.cell import C, Plan, R, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.pool import Pool
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
@@ -21,8 +21,8 @@ from validate.identify.identification import Identification, identify
 from validate.identify.least_squares import Fit
 from validate.identify.profile import Side
 from validate.identify.space import Space
-from validate.pipeline.calibration.asked import asked
 from validate.pipeline.calibration.calibrated import Identify, identified
+from validate.pipeline.calibration.free_parameters import asked
 from validate.pipeline.calibration.problem import Calibrated, Problem
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
@@ -159,7 +159,7 @@ def beside(
     report: Report | None = None,
     where: Where | Pool | None = None,
 ) -> Identify:
-    """For the road: what stands open, by the cells that `validate identify` keeps."""
+    """For the pipeline: what stands open, by the cells that `validate identify` keeps."""
     return InCells(experiment, options, (), None, out, where, report, after=len(experiment.methods))
 
 

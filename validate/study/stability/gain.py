@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.engine.cell import Plan, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
 from validate.fem.system import Responses, build, responses

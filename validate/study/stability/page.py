@@ -7,7 +7,7 @@ from typing import Any
 
 from validate.compare.exhibit import NumberTable
 from validate.engine.cell import Record
-from validate.report.stored.plain import members
+from validate.report.stored.json_values import members
 from validate.report.views.records import Shown, table
 from validate.study.stability.cell import Stepped
 from validate.study.stability.exhibits import stability_exhibits

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.ladder.default import body_of

@@ -1,4 +1,4 @@
 """Stored runs side by side, and statements over all of them; nothing is run.
 
-Start with `stored`.
+Start with `score_comparison`.
 """

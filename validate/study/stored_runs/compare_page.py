@@ -6,7 +6,7 @@ from typing import Any
 from validate.compare.exhibit import Exhibit, NumberTable, Picture
 from validate.report.views.records import table
 from validate.study.loose_page import write_loose
-from validate.study.stored_runs.stored import Pair, Row, SideBySide, pairs
+from validate.study.stored_runs.score_comparison import Pair, Row, SideBySide, pairs
 
 _PICTURES = 6  # pairs that are drawn
 _DRAWN = 40  # scores of a picture

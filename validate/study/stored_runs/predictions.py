@@ -17,7 +17,7 @@ from validate.compare.verdict import NO_EVIDENCE
 from validate.errors import RecordingError
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, checks_of
-from validate.report.stored.plain import Json
+from validate.report.stored.json_values import Json
 from validate.report.stored.tables import report_folders
 
 # Parameters that say where recordings lie: which ones they are, their hashes say.

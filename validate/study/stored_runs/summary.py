@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.compare.bias import Predicted, Statement, area_metric, statement
 from validate.errors import UsageError
-from validate.report.stored.plain import Json
+from validate.report.stored.json_values import Json
 from validate.study.stored_runs.predictions import Foretold, Seen, predictions, stored_runs
 
 Range = tuple[float, float] | None

@@ -13,7 +13,7 @@ from typing import Literal
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Richardson, richardson
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.finish import CELLS, Finished, Report, finish
+from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.errors import ComparisonError
 from validate.fem.locking import locking_notes
 from validate.pipeline.experiment.experiment import Experiment

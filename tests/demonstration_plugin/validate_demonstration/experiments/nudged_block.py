@@ -13,18 +13,18 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.followed import Truth, truth_of
+from validate.pipeline.run.method_run import Truth, truth_of
 from validate.recording.types import Recording
-from validate.register.as_declared import follow_signal
-from validate.register.registered import Registered
+from validate.register.registration import Registered
+from validate.register.scene_registration import follow_signal
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import output_frames
-from validate.twin.stepped import SteppedTwin
-from validate.twin.tracked import Origin, Reading
+from validate.twin.time_stepping import SteppedTwin
+from validate.twin.tracker import Origin, Reading
 
 LARGE = {
     "material.law": "gent",

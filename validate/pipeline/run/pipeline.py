@@ -1,0 +1,366 @@
+"""The pipeline: recording -> scene -> registration -> system -> run -> comparison.
+
+One for every experiment, at holds or over time, with a twin's truth beside or without one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+from validate.compare.exhibit import captioned
+from validate.compare.inputs import Declared
+from validate.compare.published import Published
+from validate.compare.residual import rest_residuals, unanswered
+from validate.compare.result import Kind, MethodResult, Result
+from validate.compare.score import Score, run_scores, scores_of
+from validate.compare.track import track_scores
+from validate.engine.execution import Report
+from validate.fem.locking import locking_notes
+from validate.memory import MemoryShortError
+from validate.parameters import Changed, Parameter, changed, describe, value_at
+from validate.pipeline.calibration.calibrated import (
+    Identify,
+    calibrated,
+    here,
+    identified_by,
+    middle,
+    with_inputs,
+)
+from validate.pipeline.calibration.problem import Calibrated
+from validate.pipeline.calibration.sentences import predicted
+from validate.pipeline.checks.checks import checks_of, effects_of, joint_inputs, variants_of
+from validate.pipeline.checks.consistency import consistency_scores
+from validate.pipeline.checks.likely_causes import Difference, Failed, difference_of, explained_by
+from validate.pipeline.checks.plausibility import doubts
+from validate.pipeline.checks.sentence import figures_sentence, verdict_sentence
+from validate.pipeline.checks.uncertain_drives import with_uncertain_drives
+from validate.pipeline.exhibits.external import external_exhibits
+from validate.pipeline.exhibits.gating import gate_warnings
+from validate.pipeline.exhibits.standard import error_at, speed_rows, standard_exhibits
+from validate.pipeline.experiment.experiment import Experiment, Identified, SolvesVariants, Told
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import Options, all_methods, chosen_cases, configure
+from validate.pipeline.experiment.origins import Opened, marked, opened
+from validate.pipeline.run.memory import coarser, require_room
+from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.pipeline.run.runs import Road, Solves
+from validate.recording.types import Recording
+from validate.register.markers.markers import MarkerObservation
+from validate.solve.external.scheme import ExternalSimulator
+
+_AGAINST: Mapping[Kind, str] = {
+    "measured": "measured recording",
+    "twin": "recording of a twin",
+    "same law, finer mesh": "recording of the same law on a finer mesh",
+    "same model": "recording of the same model",
+    "reference": "computation by third-party code",
+}
+
+
+def compare(
+    experiment: Experiment,
+    options: Options,
+    report: Report | None = None,
+    identify: Identify = here,
+    by: Solves | None = None,
+) -> Result:
+    """Runs an experiment and judges it; `identify` finds what its calibrations leave open, `by`
+    solves its runs (none: in this process).
+
+    Raises children of `ValidateError` for bad input.
+    """
+    try:
+        return _compared(experiment, options, report, identify, by)
+    except MemoryShortError as short:
+        parameters, _ = configure(experiment, options)
+        step = coarser(experiment.name, parameters, short.share)
+        raise MemoryShortError(f"{short}, {step}", short.share) from short
+
+
+@dataclass(frozen=True)
+class SetOut:
+    """An experiment as its recordings have it, and its road with nothing run on it yet.
+
+    `differing` parameters are not as the experiment declares them; `fitted` are the calibrations
+    that were carried out.
+    """
+
+    experiment: Experiment
+    road: Road
+    found: Opened
+    identified: Identified | None
+    differing: tuple[Changed, ...]
+    fitted: tuple[Calibrated, ...]
+
+
+def set_out(
+    experiment: Experiment,
+    options: Options,
+    report: Report | None = None,
+    identify: Identify = here,
+    *,
+    since: float = 0.0,
+    by: Solves | None = None,
+) -> SetOut:
+    """Loads, requests memory and identifies. Raises children of `ValidateError` for bad input."""
+    parameters, methods = configure(experiment, options)
+    cases = chosen_cases(experiment, options)
+    found = opened(experiment, parameters)
+    declared = _settings(experiment.parameters, experiment.methods)
+    differing = changed(declared, _settings(parameters, methods))
+    experiment = _following(experiment, found, differing)
+    shipped, parameters = found.recordings, found.parameters
+    if report:
+        report(0, 1, "requests memory")
+    asked = middle(experiment, parameters)
+    require_room(experiment, methods, asked, shipped[0], quick=options.quick)
+    if report and (experiment.identify or experiment.calibrations):
+        report(0, 1, "identifies parameters")
+    every = all_methods(experiment, options)
+    surrogate = experiment.uncertainty.surrogate if experiment.uncertainty else ""
+    fitted, refused = calibrated(
+        experiment, parameters, every, shipped, identify, wanted={*methods, surrogate} - {""},
+        anyway=options.anyway,
+    )  # fmt: skip
+    experiment = with_inputs(experiment, fitted)
+    began = since or perf_counter()
+
+    def solves(asked: Any) -> SolvesVariants:
+        road = Road(experiment, every, asked, report, quick=options.quick, since=began, by=by)
+        road.start(shipped, remake=False)
+        road.expect(variants_of(road))
+        return road.residuals
+
+    identified = identified_by(experiment, shipped, parameters, every, fitted, solves)
+    used = identified.parameters if identified else parameters
+    experiment = identified.of(experiment) if identified else experiment
+    if identified is None or identified.inputs is None:  # else the identification counts them
+        experiment = with_uncertain_drives(experiment, methods, shipped, used)
+    road = Road(
+        experiment, methods, used, report,
+        quick=options.quick, cases=cases, calibrated=identified.calibrated if identified else (),
+        since=began, refused=refused, by=by,
+    )  # fmt: skip
+    return SetOut(experiment, road, found, identified, differing, fitted)
+
+
+def _compared(
+    experiment: Experiment,
+    options: Options,
+    report: Report | None,
+    identify: Identify,
+    by: Solves | None,
+) -> Result:
+    out = set_out(experiment, options, report, identify, since=perf_counter(), by=by)
+    experiment, road, found, identified = out.experiment, out.road, out.found, out.identified
+    methods = road.methods
+    variants = variants_of(road)
+    road.expect(variants)
+    remade = road.start(found.recordings)
+    road.ahead(variants)
+    main = {name: road.main(name) for name in methods}
+    others = {case.name: road.other(case) for case in road.cases}
+    told = _told(road, {MAIN: main, **others})
+    results = tuple(_method(road, main[name], others) for name in methods)
+    effects = effects_of(road, results)
+    because, causes = explained_by(
+        results, lambda name, failed: _differences(main[name], methods[name], failed)
+    )
+    published = _published(road, results, identified, told)
+    first = main[next(iter(methods))]
+    locking = locking_notes(
+        (f.label, f.scene)
+        for name, f in main.items()
+        if not isinstance(methods[name].settings, ExternalSimulator)  # its elements are its own
+    )
+    parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
+    warnings = (
+        *(identified.doubts if identified else ()),
+        *doubts(parameters_used, found.stated, found.recordings, first),
+        *gate_warnings({name: main[name] for name in methods if name in experiment.accepted}),
+    )
+    return Result(
+        name=experiment.name,
+        title=experiment.title,
+        source=experiment.source,
+        sentence=_doubtful(warnings)
+        + _opening(identified)
+        + (f"{predicted(results)}. " if out.fitted else "")
+        + verdict_sentence(results, road.kind, quick=options.quick)
+        + because
+        + figures_sentence(published),
+        parameters=parameters_used,
+        methods=results,
+        recordings=road.recordings,
+        rest=rest_residuals(first.seen, first.run),
+        effects=effects,
+        published=published,
+        identified=identified.scores if identified else (),
+        notes=_notes(remade, identified, main, locking),
+        locking=locking,
+        warnings=warnings,
+        quick=options.quick,
+        kind=road.kind,
+        seed=experiment.seed,
+        twin_notice="" if road.kind == "measured" else experiment.twin_notice,
+        inputs=_inputs(experiment),
+        joint=joint_inputs(road) if any(m.accepted for m in results) else (),
+        exhibits=tuple(
+            captioned(exhibit, experiment.captions)
+            for exhibit in (
+                *causes,
+                *external_exhibits(road, main),
+                *standard_exhibits(experiment, main, others),
+                *told.exhibits,
+            )
+        ),
+        rows=(*speed_rows(experiment, main), *told.rows),
+        views=experiment.views,
+        changed=out.differing,
+        specimens=_specimens(experiment, road.recordings),
+        expected=() if options.quick else experiment.expected,
+        identified_values=identified.values if identified else (),
+    )
+
+
+def _differences(followed: Followed, method: Method, failed: Failed) -> list[Difference]:
+    """Histories of the observations that a failed quantity is of."""
+    handles = getattr(method.settings, "handles", None)
+    inertia = handles is None or handles.inertia
+    units = {o.name: tuple(o.units) for o in followed.seen.observations}
+    return [
+        difference_of(followed, h, inertia) for h in followed.histories
+        if any(f == q or f.startswith(f"{q}.") for f in failed for q in units[h.name])
+    ]  # fmt: skip
+
+
+def _specimens(experiment: Experiment, recordings: tuple[Recording, ...]) -> tuple[str, ...]:
+    named = experiment.specimen or (lambda _: experiment.name)
+    return tuple(named(recording) for recording in recordings)
+
+
+def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, ...]) -> Experiment:
+    """The experiment as its recordings have it; no figure belongs to what the user changed, before
+    the recordings filled what stood open."""
+    followed: Experiment = experiment.follows(experiment, found.recordings, found.parameters)
+    if differing:  # declared verdicts are those of what is shipped
+        followed = replace(followed, expected=())
+    own = [f"{c.path} = {c.value}" for c in differing if c.path not in experiment.locates]
+    if not own:
+        return followed
+    other = f"printed for this experiment's default settings; not compared with {', '.join(own)}"
+    return replace(
+        followed, published=tuple(replace(f, other=f.other or other) for f in followed.published)
+    )
+
+
+def _settings(parameters: Any, methods: Mapping[str, Method]) -> tuple[Parameter, ...]:
+    return describe(parameters) + describe(methods, "methods.")
+
+
+def _told(road: Road, cases: Cases) -> Told:
+    """What the experiment adds; only when all of it was run."""
+    experiment = road.experiment
+    if experiment.exhibits is None or road.quick or not road.whole:
+        return Told()
+    return road.told(cases)
+
+
+def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
+    experiment, accepted = road.experiment, mine.method in road.experiment.accepted
+    followed = [mine, *(case[mine.method] for case in others.values() if mine.method in case)]
+    return MethodResult(
+        name=mine.method,
+        label=mine.label,
+        accepted=accepted,
+        scene=mine.scene,
+        registered=mine.registered,
+        runs=mine.runs,
+        residuals=mine.residuals,
+        scores=(
+            *(s for f in followed for s in truth_scores(f, experiment.axis)),
+            *(s for r in mine.residuals.values() for s in scores_of(r, _AGAINST[road.kind])),
+            *run_scores(mine.run),
+            *_outside(mine),
+            *(s for f in followed for s in consistency_scores(f)),
+        ),
+        checks=checks_of(road, mine) if accepted else (),
+        band=value_at(road.parameters, experiment.band)[0] if experiment.band else 0.0,
+        chosen=road.methods[mine.method].chosen,
+    )
+
+
+def truth_scores(followed: Followed, axis: str) -> tuple[Score, ...]:
+    """Errors at every probe against the truth; none for a run that did not reach the end."""
+    return tuple(
+        score
+        for name in followed.scored
+        for score in track_scores(
+            error_at(followed, name, axis), "truth of the twin", followed.case
+        )
+    )
+
+
+def _outside(followed: Followed) -> tuple[Score, ...]:
+    """How many samples lie beyond the law's validity and were not compared."""
+    outside = sum(r.outside for r in followed.registered)
+    if outside == 0:
+        return ()
+    words = "samples beyond the law's validity, not compared"
+    count = outside + sum(len(r.t) for r in followed.registered)
+    return (Score("samples.outside_law", float(outside), "1", count, "none", words),)
+
+
+def _published(
+    road: Road, results: tuple[MethodResult, ...], identified: Identified | None, told: Told
+) -> tuple[Published, ...]:
+    """Printed figures beside ours; none in a quick run.
+
+    One that is not computed stands among them with its fault; not where a part was left out.
+    """
+    if road.quick:
+        return ()
+    values = {m.name: {s.name: s.value for s in m.scores} for m in results}
+    values["identified"] = {s.name: s.value for s in (identified.scores if identified else ())}
+    values["told"] = dict(told.numbers)
+    figures = [figure.beside(values) for figure in road.experiment.published]
+    return tuple(figure for figure in figures if road.whole or not figure.missing)
+
+
+def _doubtful(warnings: tuple[str, ...]) -> str:
+    return "With warnings on the input; " if warnings else ""
+
+
+def _opening(identified: Identified | None) -> str:
+    return f"{identified.headline}; " if identified and identified.headline else ""
+
+
+def _notes(
+    remade: tuple[str, ...],
+    identified: Identified | None,
+    main: Mapping[str, Followed],
+    locking: tuple[str, ...],
+) -> tuple[str, ...]:
+    """What was made anew, identified, noticed by registration or schemes, not compared; locks."""
+    first = next(iter(main.values()))
+    found = [f for r in first.registered for f in r.findings]
+    markers = [m for r in first.registered for m in r.of(MarkerObservation)]
+    found += [f for m in markers for f in m.registration.findings]
+    found += [f"{f.label}: {w}" for f in main.values() for run in f.runs for w in run.said]
+    found += [
+        f for pair in zip(first.registered, first.runs, strict=True) for f in unanswered(*pair)
+    ]
+    said = (
+        *remade,
+        *(identified.notes if identified else ()),
+        *found,
+        *gate_warnings(main),
+        *locking,
+    )
+    return tuple(dict.fromkeys(said))
+
+
+def _inputs(experiment: Experiment) -> tuple[Declared, ...]:
+    declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
+    return tuple(Declared(i.name, i.doc, i.source) for i in declared)

@@ -1,0 +1,217 @@
+"""Changes between two runs: parameters, files, code, and scores beyond their uncertainty."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from validate.errors import UsageError
+from validate.report.stored.history import LINES, lines_of
+from validate.report.stored.json_values import Json
+
+BEYOND = 2.0  # standard uncertainties of the difference: as a check's |E| against u_val
+_ROUNDING = 1e-9  # relative: the same computation on another machine
+
+
+@dataclass(frozen=True)
+class PastCheck:
+    """A check of an accepted method: error E and its standard uncertainties, SI."""
+
+    method: str
+    name: str
+    value: float | None
+    limit: float | None
+    u_val: float
+    u_num: float
+    unit: str
+    verdict: str
+    within_noise: bool
+
+
+@dataclass(frozen=True)
+class PastRun:
+    """A run as its folder remembers it; `files` are hashes by name, `line` is all that is kept."""
+
+    folder: str
+    created: str
+    verdict: str
+    commit: str
+    code: str
+    methods: tuple[str, ...]
+    recordings: tuple[str, ...]
+    files: Mapping[str, str]
+    parameters: Mapping[str, tuple[Any, str]]
+    checks: tuple[PastCheck, ...]
+    line: Json
+
+
+@dataclass(frozen=True)
+class Move:
+    """A check whose error moved by so many standard uncertainties; None: there is none."""
+
+    method: str
+    name: str
+    one: float
+    other: float
+    unit: str
+    ratio: float | None
+
+
+@dataclass(frozen=True)
+class Since:
+    """What differs of a run from the one before it: texts before and after, by name.
+
+    Settings of a method that only one of them has are no difference: it is `added` or `left_out`.
+    `moved` beyond their uncertainty, `within` so many more that did not, by at most `most` standard
+    uncertainties.
+    """
+
+    parameters: Mapping[str, tuple[str, str]]
+    files: Mapping[str, tuple[str, str]]
+    code: tuple[str, str] | None
+    verdict: tuple[str, str] | None
+    added: tuple[str, ...]
+    left_out: tuple[str, ...]
+    moved: tuple[Move, ...]
+    within: int
+    most: float
+
+
+def history(reports: Path, name: str) -> tuple[PastRun, ...]:
+    """Every run of an experiment below a folder of reports, the oldest first.
+
+    Raises `UsageError` for a damaged line.
+    """
+    found = [run for folder in _folders(reports, name) for run in _runs(folder)]
+    mine = (r for r in found if r.line["experiment"] == name)
+    return tuple(sorted(mine, key=lambda r: r.created))
+
+
+def _folders(reports: Path, name: str) -> list[Path]:
+    if not reports.is_dir():
+        return []
+    return sorted(
+        f for f in reports.iterdir()
+        if f.is_dir() and (f.name == name or f.name.startswith(f"{name}+"))
+    )  # fmt: skip
+
+
+def _runs(folder: Path) -> Iterator[PastRun]:
+    try:
+        for line in lines_of(folder):
+            yield _past(folder.name, line)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"{folder / LINES} has a line that `validate` did not write ({error!r:.60}); "
+            "correct or remove the file"
+        ) from error
+
+
+def _past(folder: str, line: Json) -> PastRun:
+    made = line.get("made") or {}
+    files = [*line["inputs"], *made.get("files", [])]
+    return PastRun(
+        folder, str(line["created"]), _verdict(line), _commit(made),
+        str(made.get("code_sha256") or ""),
+        tuple(str(m) for m in line["methods"]),
+        tuple(str(i["sha256"]) for i in line["inputs"]),
+        {str(f["path"]): str(f["sha256"]) for f in files},
+        {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
+        tuple(_check(c) for c in line["checks"]), line,
+    )  # fmt: skip
+
+
+def _verdict(line: Json) -> str:
+    overall = line.get("overall")
+    if not overall:
+        return "passed" if line.get("passed") else "failed"
+    return f"{overall['verdict']}; evidence: {overall['evidence']} of {overall['checks']} checks"
+
+
+def _commit(made: Json) -> str:
+    sha = str(made.get("commit") or "")[:10]
+    return f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
+
+
+def _check(c: Json) -> PastCheck:
+    value, raw = c["value"], c.get("raw")
+    return PastCheck(
+        str(c["method"]), str(c["name"]), value, c["limit"], float(c["u_val"] or 0),
+        float(c["u_num"] or 0), str(c["unit"]), str(c["verdict"]), bool(value == 0 and raw),
+    )  # fmt: skip
+
+
+# --- from one to the next ------------------------------------------------------------------------
+
+
+def since(one: PastRun, other: PastRun) -> Since:
+    """What changed from `one` to `other`.
+
+    Two runs of the same recordings share their noise and their inputs' ranges, so a difference of
+    theirs has the uncertainty of the numbers alone (u_num); with other recordings it is all of
+    u_val. A check moved where |E' - E| > 2 sqrt(u'^2 + u^2).
+    """
+    moves: list[Move] = []
+    same = one.recordings == other.recordings
+    before = {(c.method, c.name): c for c in one.checks}
+    for c in other.checks:
+        earlier = before.get((c.method, c.name))
+        if earlier and earlier.unit == c.unit:
+            moves += _moves(earlier, c, same=same)
+    moved = [m for m in moves if m.ratio is None or m.ratio > BEYOND]
+    rest = [m.ratio for m in moves if m.ratio is not None and m.ratio <= BEYOND]
+    return Since(
+        parameters=_apart(_shown(one, other), _shown(other, one)),
+        files=_apart(one.files, other.files),
+        code=_code(one, other),
+        verdict=None if one.verdict == other.verdict else (one.verdict, other.verdict),
+        added=tuple(m for m in other.methods if m not in one.methods),
+        left_out=tuple(m for m in one.methods if m not in other.methods),
+        moved=tuple(sorted(moved, key=lambda m: -(m.ratio or math.inf))),
+        within=len(rest),
+        most=max(rest, default=0.0),
+    )
+
+
+def _moves(one: PastCheck, other: PastCheck, *, same: bool) -> Iterator[Move]:
+    if one.value is None or other.value is None:
+        return
+    by = abs(other.value - one.value)
+    u = math.hypot(one.u_num, other.u_num) if same else math.hypot(one.u_val, other.u_val)
+    if by <= _ROUNDING * max(abs(one.value), abs(other.value)):
+        ratio: float | None = 0.0
+    else:
+        ratio = by / u if u else None
+    yield Move(other.method, other.name, one.value, other.value, other.unit, ratio)
+
+
+def _code(one: PastRun, other: PastRun) -> tuple[str, str] | None:
+    if one.code == other.code and one.commit == other.commit:
+        return None
+    return one.commit, other.commit
+
+
+def _shown(run: PastRun, beside: PastRun) -> dict[str, str]:
+    """Parameters as texts, those of methods that only this run has left out."""
+    alone = tuple(f"methods.{m}." for m in run.methods if m not in beside.methods)
+    return {k: with_unit(*v) for k, v in run.parameters.items() if not k.startswith(alone)}
+
+
+def with_unit(value: Any, unit: str) -> str:
+    """A parameter's value in SI as text."""
+    return _plain(value) if unit == "1" else f"{_plain(value)} {unit}"
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_plain, value))
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "not set" if value is None else str(value)
+
+
+def _apart(one: Mapping[str, str], other: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    """By name, what differs or one of them lacks ("-")."""
+    names: Sequence[str] = list(dict.fromkeys([*one, *other]))
+    return {n: (one.get(n, "-"), other.get(n, "-")) for n in names if one.get(n) != other.get(n)}

@@ -1,0 +1,238 @@
+"""A tracker's recording of a simulated motion: named points, fixed fiducials, inputs and forces.
+
+What a camera sees are positions in its own frame, so such a recording is registered as a measured
+one is (`register.placed`). Fiducials are points of a held face: they do not move, carry the
+registration, and stand in the layout beside the tracked points.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from validate.arrays import Floats, Ints, checked
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks.alignment import RECORD
+from validate.recording.types import Markers, Record, Recording, Source
+from validate.scene.scene import Scene
+from validate.solve.types import Run
+from validate.twin.sensors import signal, streams
+
+START_NS = 1_700_000_000_000_000_000  # of every tracked recording: an arbitrary round moment
+_AT_REST = 1e-12  # m, what counts as no displacement in the first sample
+
+
+@dataclass(frozen=True)
+class Points:
+    """Material points: t (nt,) s, rest (k, 3) m, displacements u (nt, k, 3) m."""
+
+    t: Floats
+    names: tuple[str, ...]
+    rest: Floats
+    u: Floats
+
+    def __post_init__(self) -> None:
+        k = len(self.names)
+        for name, shape in (("t", (None,)), ("rest", (k, 3)), ("u", (len(self.t), k, 3))):
+            value = checked(getattr(self, name), f"points {name}", shape, error=RecordingError)
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A known input or a measured number at the points' times: y (nt,) in `unit`, white noise."""
+
+    y: Floats
+    unit: str
+    sd: float = 0.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A tracker: noise sd m per axis, own frame (Euler angles in degrees, m).
+
+    `every`: it looks at each that many steps. `missing`: share of the looks at which a point is not
+    seen. `still`: looks at rest whose mean is the first sample, which the registration rests on; 1
+    leaves the registration as uncertain as any look. `outliers`: share of the looks at which a
+    point is taken for something else, `astray` m off in any direction. `late`: sd s by which the
+    time of a look is off, the same for all points; the recording declares it as its clock's.
+    """
+
+    sd: float
+    every: int = 1
+    missing: float = 0.0
+    still: int = 100
+    outliers: float = 0.0
+    astray: float = 1e-3
+    late: float = 0.0
+    turn: tuple[float, float, float] = (62.0, -17.0, 128.0)
+    shift: tuple[float, float, float] = (0.412, -0.236, -1.137)
+
+    def __post_init__(self) -> None:
+        if not (self.sd >= 0 and self.every >= 1 and 0 <= self.missing < 1 and self.still >= 1):
+            raise RecordingError(
+                f"camera with sd {self.sd:g} m, every {self.every}, missing {self.missing:g}, "
+                f"still {self.still}: expected sd >= 0, every and still >= 1, 0 <= missing < 1"
+            )
+        if not (0 <= self.outliers < 1 and self.astray > 0 and self.late >= 0):
+            raise RecordingError(
+                f"camera with outliers {self.outliers:g}, astray {self.astray:g} m, late "
+                f"{self.late:g} s: expected 0 <= outliers < 1, astray > 0, late >= 0"
+            )
+
+    @property
+    def rotation(self) -> Floats:
+        """R (3, 3): scene directions in the camera's frame."""
+        return np.asarray(Rotation.from_euler("xyz", self.turn, degrees=True).as_matrix())
+
+    def looks(self, points: Points, seeds: Mapping[str, np.random.Generator]) -> Markers:
+        """Every point at each `every`-th time; the first sample is seen whole."""
+        pick = np.arange(0, len(points.t), self.every)
+        x = points.rest + self._shown(points, pick, seeds["odd"])
+        noise = self.sd * seeds["markers"].standard_normal(x.shape)
+        noise[0] /= np.sqrt(self.still)
+        x = (x + noise) @ self.rotation.T + np.array(self.shift)
+        x += self._strayed(x.shape, seeds["odd"])
+        unseen = seeds["missing"].random(x.shape[:2]) < self.missing
+        unseen[0] = False
+        x[unseen] = np.nan
+        return Markers(points.t[pick], points.names, x, self.sd, "camera")
+
+    def _shown(self, points: Points, pick: Ints, rng: np.random.Generator) -> Floats:
+        """Displacements (k, p, 3) m when the camera really looked."""
+        if not self.late:
+            return points.u[pick]
+        t = points.t[pick] + np.append(0.0, self.late * rng.standard_normal(len(pick) - 1))
+        t = np.clip(t, points.t[0], points.t[-1])
+        flat = points.u.reshape(len(points.t), -1)
+        seen = np.stack([np.interp(t, points.t, column) for column in flat.T], axis=1)
+        return seen.reshape(len(pick), *points.u.shape[1:])
+
+    def _strayed(self, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
+        """How far off (k, p, 3) m looks are; the first one is not."""
+        off = np.zeros(shape)
+        if self.outliers:
+            odd = rng.random(shape[:2]) < self.outliers
+            odd[0] = False
+            way = rng.standard_normal((int(odd.sum()), 3))
+            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
+        return off
+
+
+def require_noise(variance: float) -> None:
+    """Raises `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
+    if not variance > 0:
+        raise UsageError(
+            f"twin.noise = {variance:g} m2: expected a variance above 0; for a tracker without "
+            "noise use 1e-16"
+        )
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a recording comes from: its name, the noise's seed, and what is declared of it.
+
+    `same_model`: the model that made it is the one it will judge (an inverse crime, to be printed).
+    """
+
+    name: str
+    seed: int
+    same_model: bool
+    declared: Record = field(default_factory=dict)
+
+
+def points_of(run: Run, scene: Scene) -> Points:
+    """All probes of a finished run; those of a 2-D scene lie in the plane z = 0.
+
+    Raises `RecordingError` for a run that did not finish and for a scene without probes.
+    """
+    if not run.finished or not scene.probes:
+        raise RecordingError(
+            f"run '{run.method}' is {run.outcome.state} after {len(run.t)} steps with "
+            f"{len(scene.probes)} probes: only a finished run with probes can be recorded"
+        )
+    axes = "xyz"[: scene.mesh.dimension]
+    u = [[run.traces[f"{p.name}.{axis}"].y for axis in axes] for p in scene.probes]
+    rest = np.array([p.point for p in scene.probes])
+    moved = np.transpose(u, (2, 0, 1))
+    flat = 3 - len(axes)
+    return Points(
+        run.t,
+        tuple(p.name for p in scene.probes),
+        np.pad(rest, ((0, 0), (0, flat))),
+        np.pad(moved, ((0, 0), (0, 0), (0, flat))),
+    )
+
+
+def record_tracked(
+    origin: Origin,
+    points: Points,
+    fiducials: Mapping[str, Floats],
+    camera: Camera,
+    readings: Mapping[str, Reading],
+) -> Recording:
+    """Markers "markers" (points, then fiducials (3,) m) and a signal for every reading.
+
+    Rest at t = 0 is put in front of points that begin later (`march` gives the ends of steps);
+    readings are zero there. Signals keep every step. Records: "marker_layout" (m, the scene's
+    frame), "camera" ("up": the scene's z there), "provenance". Each sensor has its own stream.
+    Raises `RecordingError` for points displaced at t = 0, names that clash and lengths that differ.
+    """
+    clash = sorted(set(points.names) & set(fiducials))
+    if clash:
+        raise RecordingError(f"markers {clash} are both tracked points and fiducials; rename them")
+    lead = 1 if points.t[0] > 0 else 0
+    seen = _with_fiducials(points, fiducials, lead)
+    if np.abs(seen.u[0]).max() > _AT_REST:
+        raise RecordingError(
+            f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
+            "at t = 0 s: the registration needs the body at rest first"
+        )
+    seeds = streams(origin.seed, ("markers", "missing", *readings, "odd"))
+    clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}
+    return Recording(
+        origin.name,
+        Source(origin.name, "", 0, "made in memory"),
+        START_NS,
+        markers={"markers": camera.looks(seen, seeds)},
+        signals={
+            k: signal(seen.t, _led(r.y, lead, seen.t, k), r.unit, r.sd, "scene", seeds[k])
+            for k, r in readings.items()
+        },
+        metadata={
+            "marker_layout": {k: _text(v) for k, v in zip(seen.names, seen.rest, strict=True)},
+            "camera": {
+                "up": _text(camera.rotation @ np.array([0.0, 0.0, 1.0])),
+                "sd_m": repr(camera.sd),
+                "still": str(camera.still),
+                "missing": repr(camera.missing),
+            },
+            "provenance": {
+                "kind": "twin",
+                "same_model": str(origin.same_model).lower(),
+                "seed": str(origin.seed),
+                **origin.declared,
+            },
+            **clock,
+        },
+    )
+
+
+def _with_fiducials(points: Points, fiducials: Mapping[str, Floats], lead: int) -> Points:
+    """The points at rest at t = 0, and the fiducials that never move."""
+    nt, k, f = len(points.t), len(points.names), len(fiducials)
+    u = np.zeros((nt + lead, k + f, 3))
+    u[lead:, :k] = points.u
+    fixed = np.array(list(fiducials.values())).reshape(f, 3)
+    t = np.concatenate([np.zeros(lead), points.t])
+    return Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
+
+
+def _led(y: Floats, lead: int, t: Floats, name: str) -> Floats:
+    y = checked(y, f"reading '{name}'", (len(t) - lead,), error=RecordingError)
+    return np.concatenate([np.zeros(lead), y])
+
+
+def _text(vector: Floats) -> str:
+    return " ".join(repr(float(c)) for c in vector)
