@@ -1,4 +1,5 @@
-"""The simulated body to be drawn: deformed state, plates, the plane that opens it, the camera."""
+"""The simulated body to be drawn, with what was measured on it: deformed state, plates, the plane
+that opens it, the camera, markers and outline."""
 
 from dataclasses import dataclass
 
@@ -6,7 +7,16 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
-from validate.report.sections.observations import Held, holds, outline, shown_method
+from validate.register.clocks import interpolated
+from validate.register.outlines.plane import from_image
+from validate.report.sections.observations import (
+    Held,
+    holds,
+    markers_seen,
+    outline,
+    outline_seen,
+    shown_method,
+)
 from validate.report.views.numbers import significant, spaced, with_unit
 from validate.scene.contact import Shape
 from validate.scene.mesh import Mesh
@@ -49,13 +59,27 @@ class ShownIndenter:
 
 
 @dataclass(frozen=True)
+class ShownMarkers:
+    """Markers at the shown load, where they were measured and where the simulation has them: (k, 3)
+    mm each, of those that were seen."""
+
+    measured: Floats
+    simulated: Floats
+
+    @property
+    def largest(self) -> float:
+        """The largest distance between both, mm."""
+        return float(np.linalg.norm(self.measured - self.simulated, axis=1).max())
+
+
+@dataclass(frozen=True)
 class ShownBody:
     """A mesh at rest with displacements u (n, 3) mm at `load`, opened by a plane or whole.
 
     The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole; `cut`
     says where. `part` says when symmetry leaves out the rest of it. `up` (3,) is the camera's,
     `toward` (3,) where it is driven to; pressure Pa is None without a cavity, `pressures` its range
-    Pa.
+    Pa. `markers` and the closed line `outline` (k, 3) mm were measured at that load.
     """
 
     label: str
@@ -73,6 +97,8 @@ class ShownBody:
     cut: str
     up: Floats
     toward: Floats
+    markers: ShownMarkers | None = None
+    outline: Floats | None = None
 
 
 def shown_body(result: Result) -> ShownBody | None:
@@ -86,7 +112,7 @@ def shown_body(result: Result) -> ShownBody | None:
     scene, run = method.scene, method.run
     cavity = scene.cavities[0] if scene.cavities else None
     trace = run.traces.get(f"{cavity.name}.pressure") if cavity else None
-    frame, load = _frame(method)
+    frame, load, t = _frame(method)
     nodes = _MM * scene.mesh.nodes
     wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
     toward = _toward(scene)
@@ -107,18 +133,39 @@ def shown_body(result: Result) -> ShownBody | None:
         cut=f"{cavity.name} in {cut}" if cavity else "",
         up=normal if normal is not None else -toward,
         toward=toward,
+        markers=_markers(method, frame, t),
+        outline=_outline(method, t),
     )
 
 
-def _frame(method: MethodResult) -> tuple[int, str]:
-    """The last load; of a run over time the frame with the largest displacement."""
+def _markers(method: MethodResult, frame: int, t: float) -> ShownMarkers | None:
+    """The markers at t s, between two samples on the line between these; None without one there."""
+    seen = markers_seen(method)
+    if seen is None or seen.x.shape[2] != 3:
+        return None
+    flat, _ = interpolated(seen.t, seen.x.reshape(len(seen.t), -1), np.array([t]))
+    measured = _MM * flat.reshape(-1, 3)
+    simulated = _MM * seen.simulated(method.run.u[frame])
+    there = np.isfinite(measured).all(axis=1) & np.isfinite(simulated).all(axis=1)
+    return ShownMarkers(measured[there], simulated[there]) if there.any() else None
+
+
+def _outline(method: MethodResult, t: float) -> Floats | None:
+    """The measured outline nearest to t s in the scene's frame."""
+    seen = outline_seen(method)
+    return None if seen is None else _MM * from_image(seen.pose, seen.measured(t))
+
+
+def _frame(method: MethodResult) -> tuple[int, str, float]:
+    """The last load; of a run over time the frame with the largest displacement. With its time."""
     run = method.run
     loads = holds(method.registered[0]) if method.registered else ()
     if loads:
         frame = min(len(loads), len(run.u)) - 1
-        return frame, _load(loads[frame])
+        return frame, _load(loads[frame]), loads[frame].t
     largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
-    return largest, f"t = {significant(float(run.t[run.at[largest]]))} s"
+    t = float(run.t[run.at[largest]])
+    return largest, f"t = {significant(t)} s", t
 
 
 def _load(hold: Held) -> str:

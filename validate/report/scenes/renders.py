@@ -4,7 +4,7 @@ Import only after `gl.available()`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,11 @@ import pyvista as pv
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import NodeMap, Picture, Pixels
+from validate.report.charts.style import MEASURED, PALETTE
 from validate.report.scenes.body import ShownBody, ShownIndenter
 from validate.report.scenes.maps import TOWARD_EYE, Range, bar_title, colours, values, words
+from validate.report.scenes.residual_arrows import rounded_down
+from validate.report.views.numbers import significant
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere
 from validate.scene.mesh import boundary_facets
 from validate.scene.shape_functions import EDGES, LATTICE
@@ -22,6 +25,7 @@ _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
 )
 _SIZE, _MAP_SIZE = (880, 640), (880, 620)
+_LONGEST, _MARKER = 0.12, 0.009  # of the body's size: the longest arrow, the radius of a marker
 _MAP_EDGES = 6000  # facets of a map above which their edges would hide the colours
 # VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA (local order as ours), _TRIQUADRATIC_HEXAHEDRON.
 _CELL = {4: 10, 8: 12, 10: 24, 27: 29}
@@ -47,12 +51,14 @@ class _View:
     scale: float = 1.0
     oblique: bool = True
     edges: bool = False
+    measured: bool = False  # whether markers and outline stand in the same scene
 
 
 def renders(body: ShownBody) -> tuple[Picture, ...]:
-    """The body opened and deformed, against the cut at rest and deformed, with element edges.
+    """The body deformed with what was measured on it, opened where it has a cavity; against the cut
+    at rest and deformed; with element edges.
 
-    Two of them for a whole body without plates.
+    Two of them for a whole body without plates. Markers of an opened body stand on the whole one.
     """
     wall = "" if body.pressure is None else (
         f" The cavity wall is coloured by the pressure, {body.pressure:.4g} Pa."
@@ -65,7 +71,7 @@ def renders(body: ShownBody) -> tuple[Picture, ...]:
     flat = "from the side" if whole else "against the cut"
     deformed = (
         "render_deformed", f"{body.label} at {body.load}, {opened}, true to scale: displacement "
-        f"magnitude in mm{plates}.{wall}{body.part}", _View(),
+        f"magnitude in mm{plates}.{_outline_words(body)}{wall}{body.part}", _View(measured=True),
     )  # fmt: skip
     rest = (
         "render_rest", f"The same body at rest, seen {flat}, before any load (no displacement).",
@@ -81,10 +87,68 @@ def renders(body: ShownBody) -> tuple[Picture, ...]:
     )  # fmt: skip
     # Else nothing shows how far it moved from rest.
     alone = whole and not (body.plates or body.indenters)
-    return tuple(
-        _picture(name, words, body, view)
-        for name, words, view in ((deformed, mesh) if alone else (deformed, rest, across, mesh))
+    shown = (deformed, mesh) if alone else (deformed, rest, across, mesh)
+    pictures = tuple(_picture(name, words, body, view) for name, words, view in shown)
+    if body.markers is None:
+        return pictures
+    words = (
+        f"{body.label} at {body.load}, whole, true to scale: displacement magnitude in mm{plates}."
+        f"{_marker_words(body)}{body.part}"
     )
+    compared = replace(body, normal=None, cavity=None, outline=None, up=-body.toward)
+    first = _picture("render_markers", words, compared, _View(measured=True))
+    return first, *(pictures[1:] if whole else pictures)
+
+
+def _marker_words(body: ShownBody) -> str:
+    """The measured markers of the render in words, with the scale of their arrows."""
+    assert body.markers is not None
+    by, largest = _magnified(body), significant(body.markers.largest)
+    scale = f"; arrows {by:g} times as long" if by > 1 else ""
+    return (
+        " Black: measured markers. Orange arrows point to them from their simulated place "
+        f"(largest distance {largest} mm{scale})."
+    )
+
+
+def _outline_words(body: ShownBody) -> str:
+    return " Black line: measured outline." if body.outline is not None else ""
+
+
+def _magnified(body: ShownBody) -> float:
+    """How much longer than to scale the arrows are: 1, 2, 5, 10, ..."""
+    assert body.markers is not None
+    size = float(np.linalg.norm(np.ptp(1e3 * body.mesh.nodes, axis=0)))
+    longest = body.markers.largest
+    return max(rounded_down(_LONGEST * size / longest), 1.0) if longest > 1e-9 * size else 1.0
+
+
+def _add_measured(plotter: Any, body: ShownBody) -> None:
+    """Markers with arrows, and the outline, in front of the body: what lies in it is seen too."""
+    size = float(np.linalg.norm(np.ptp(1e3 * body.mesh.nodes, axis=0)))
+    if body.outline is not None:
+        line = pv.lines_from_points(body.outline, close=True)
+        plotter.add_mesh(line.tube(radius=0.005 * size), color=MEASURED, ambient=0.5)
+    if body.markers is None or body.normal is not None:
+        return  # those on the part that was taken away would hang in the air
+    found, by = body.markers, _magnified(body)
+    radius = _MARKER * size * min(1.0, float(np.sqrt(60 / len(found.measured))))
+    ball = pv.Sphere(radius=radius, theta_resolution=16, phi_resolution=16)
+    points = pv.PolyData(found.measured)
+    plotter.add_mesh(
+        points.glyph(geom=ball, scale=False, orient=False), color=MEASURED, ambient=0.3
+    )
+    arrows = by * (found.measured - found.simulated)
+    lengths = np.linalg.norm(arrows, axis=1)
+    if (lengths > 2 * radius).any():
+        long = lengths > 2 * radius
+        tails = pv.PolyData(found.measured[long] - arrows[long])
+        tails.point_data["arrow"], tails.point_data["length"] = arrows[long], lengths[long]
+        slim = pv.Arrow(tip_radius=0.09, shaft_radius=0.035)
+        plotter.add_mesh(
+            tails.glyph(geom=slim, scale="length", orient="arrow", factor=1.0), color=PALETTE[1],
+            ambient=0.4,
+        )  # fmt: skip
 
 
 def _picture(name: str, words: str, body: ShownBody, view: _View) -> Picture:
@@ -121,6 +185,8 @@ def triangulated(nodes: Floats, triangles: Ints) -> Any:
 
 def _fill(plotter: Any, body: ShownBody, view: _View) -> None:
     _add_body(plotter, body, view.scale, view.edges)
+    if view.measured:
+        _add_measured(plotter, body)
     _add_wall(plotter, body, view.scale, view.edges)
     for plate in body.plates:
         x, y, z = plate.sizes
@@ -245,6 +311,8 @@ def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:
     nodes = 1e3 * body.mesh.nodes
     if body.normal is None and not body.plates:
         nodes = np.vstack([nodes, nodes + body.u])
+    if body.normal is None and body.markers is not None:
+        nodes = np.vstack([nodes, body.markers.measured])
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     up, along = body.up, -body.toward

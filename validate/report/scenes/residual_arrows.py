@@ -47,10 +47,10 @@ def magnified(found: Registration, plane: list[int]) -> float:
     size = float(np.ptp(found.markers, axis=0).max())
     if longest <= _EXACT * size:
         return 0.0
-    return _rounded_down(_LONGEST * size / longest)
+    return rounded_down(_LONGEST * size / longest)
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """1, 2 or 5 times a power of ten, at most `value`."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(step for step in (1, 2, 5) if step * power <= value) * power)
@@ -83,7 +83,7 @@ def arrow_axes(figure: Figure, found: Registration, plane: list[int]) -> None:
     if by:
         arrows = ax.quiver(*x.T, *(by * r.T), angles="xy", scale_units="xy", scale=1,
                            color=MEASURED, width=0.005)  # fmt: skip
-        key = _rounded_down(float(np.linalg.norm(r, axis=1).max()))
+        key = rounded_down(float(np.linalg.norm(r, axis=1).max()))
         ax.quiverkey(arrows, 0.72, 1.04, by * key, f"{key:g} mm", labelpos="E")
     ax.set_title(f"residuals, magnified {by:g} times" if by else
                  "no residual beyond rounding", loc="left", pad=13)  # fmt: skip
