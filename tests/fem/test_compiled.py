@@ -48,4 +48,4 @@ def _twice_of(file: Path) -> Any:
 def test_every_stored_loop_is_stored_apart(project_root: Path) -> None:
     files = (project_root / "validate").rglob("*.py")
     own = [file.name for file in files if "cache=True" in file.read_text()]
-    assert own == ["compiled.py"]
+    assert own == ["jit_cache.py"]

@@ -125,11 +125,11 @@ def test_a_library_that_crashes_costs_one_line(
 _RUNNER = """
 import sys; sys.path.insert(0, {!r})
 from pathlib import Path
-from validate.recording.formats import apart
-apart._HOME = ""
+from validate.recording.formats import subprocess_decoder
+subprocess_decoder._HOME = ""
 decoder, path, out, *limits = sys.argv[1:]
-apart.import_module = lambda name: __import__(name.lstrip("."))
-raise SystemExit(apart._decode(decoder, Path(path), Path(out), *limits))
+subprocess_decoder.import_module = lambda name: __import__(name.lstrip("."))
+raise SystemExit(subprocess_decoder._decode(decoder, Path(path), Path(out), *limits))
 """
 
 
