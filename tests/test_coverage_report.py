@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+# private: _SETTINGS: a limit or list of the code, which the test must meet exactly.
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import coverage_report as report

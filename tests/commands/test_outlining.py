@@ -21,6 +21,8 @@ from validate.recording.outlines.followed import EXPERTS
 from validate.recording.outlines.outline import extract_outline
 from validate.recording.types import Frames, Recording, Source
 
+# private: _read, _scale, _shape: called alone, case by case.
+
 SIDE = 0.2e-3  # m of a pixel
 SHAPE = (110, 150)
 CENTRE, RADIUS = np.array([58.0, 55.0]), 26.0  # px

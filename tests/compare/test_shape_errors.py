@@ -32,6 +32,8 @@ from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 
+# private: _beyond_booleans: says which of two methods the public call took.
+
 PLANE, SOLID = ((1.0, 0.8), (6, 5)), ((1.0, 0.8, 0.6), (4, 3, 3))
 MESHES = {
     "tri3": box(*PLANE),

@@ -13,6 +13,8 @@ from script_modules import module_of
 
 import validate
 
+# private: _call, _members: called alone, case by case.
+
 MOST = 300
 
 

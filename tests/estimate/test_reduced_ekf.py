@@ -18,6 +18,8 @@ from validate.estimate.reduced import reduced_ekf
 from validate.estimate.reduced.reduced_ekf import ReducedEKF, modes, pod, shapes_covariance
 from validate.fem.system import System
 
+# private: _directions: called alone, case by case.
+
 H = 2e-4  # s
 SD = 3e-5  # m
 PLAIN = 0.966  # mm: the error of the model 25 % too stiff on the small cube, stored

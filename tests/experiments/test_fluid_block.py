@@ -19,6 +19,11 @@ from validate.scene.geometries.hollow_block import Cavities, HollowBlock
 from validate.scene.scene import Cavity
 from validate.solve.fluid.pressure_curve import RATIOS
 
+# private: _MOST: replaced by a small number: a short test.
+# private: _SEPTA: a limit or list of the code, which the test must meet exactly.
+# private: _follower: called alone, case by case.
+# private: _wall: replaced, to bring a case about.
+
 NAME = "fluid_block"
 block, curves, updates = (beside(NAME, module) for module in ("block", "curves", "updates"))
 condensed_block, curve_exhibit, curve_of = (

@@ -26,6 +26,10 @@ from validate.scene.mesh import quadratic
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
 
+# private: _FEWEST: a limit or list of the code, which the test must meet exactly.
+# private: _axis: positions of points that no shipped recording has.
+# private: _require: called alone, case by case.
+
 
 def tree(**values: str) -> Tree:
     found: Tree = with_values(experiment("gel_indentation").parameters, values)

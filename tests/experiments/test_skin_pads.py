@@ -20,6 +20,8 @@ from validate.register.markers.markers import MarkerObservation
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
+# private: _LARGEST: replaced by a small number: a short test.
+
 EXPERIMENT = experiment("skin_pads")
 files_module, placed, skin = (
     beside("skin_pads", name) for name in ("files", "registration", "skin")

@@ -18,6 +18,8 @@ from validate.pipeline.run.road import compare as road
 from validate.register.markers.transform import Similarity
 from validate.register.tools.digitised import Digitised
 
+# private: _by_plus, _landmarks: called alone, case by case.
+
 phantom_module, plus = beside("stylus_phantom", "phantom"), beside("stylus_phantom", "plus")
 shown = beside("stylus_phantom", "exhibits")
 digitised, load, stated = phantom_module.digitised, phantom_module.load, phantom_module.stated

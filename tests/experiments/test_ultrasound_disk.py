@@ -16,6 +16,9 @@ from validate.errors import RecordingError, UsageError
 from validate.pipeline import load, run_in_memory
 from validate.pipeline.experiment.tree import Tree
 
+# private: _options: replaced, to bring a case about.
+# private: _read: called alone, case by case.
+
 disk_module = beside("ultrasound_disk", "disk")
 
 DISK = "ultrasound/disk/bmode_PWI_disk.mat"

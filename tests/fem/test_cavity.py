@@ -18,6 +18,8 @@ from validate.fem.cavity import (
 )
 from validate.scene.mesh import Kind, Mesh
 
+# private: _require_closed_line: called alone, case by case.
+
 HOLE = ((slice(1, 3), slice(1, 2), slice(1, 4)),)
 BOX = (2 / 4) * (1 / 3) * (3 / 5)  # of the unit cube
 CENTRE = np.array([0.5, 0.5, 0.5])

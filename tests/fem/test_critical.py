@@ -24,6 +24,8 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
 from validate.scene.scene import Scene, Support
 
+# private: _density, _require: called alone, case by case.
+
 GEL = Material(3e4, 0.49, rho=1000.0)
 HELD = (Support("z0", (0, 1, 2)),)
 

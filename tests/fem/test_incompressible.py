@@ -24,6 +24,8 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic
 
+# private: _PENALTY: another penalty for the same body.
+
 E = 3000.0  # Pa
 MU = E / 3
 KINDS = ("hex8", "hex27", "tet10")

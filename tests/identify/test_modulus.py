@@ -26,6 +26,8 @@ from validate.identify.modulus import (
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording, Signal, Source
 
+# private: _fit, _parabola_start: called alone, case by case.
+
 DISC = CylinderSize(0.05, 0.03)
 E = 60e3  # Pa
 SPEED = 10e-3 / 60  # m/s, sampled at 10 Hz as the real logs are

@@ -7,6 +7,8 @@ from validate.errors import ComparisonError
 from validate.identify import ringing as module
 from validate.identify.ringing import ringing, spectrum
 
+# private: _peak: replaced, to bring a case about.
+
 T = 0.01 * np.arange(140)
 
 

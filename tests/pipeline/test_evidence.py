@@ -29,6 +29,8 @@ from validate.recording.types import Recording
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
+# private: _content, _holds: called alone, case by case.
+
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 FEM = {"fem": TINY.methods["fem"]}
 

@@ -51,6 +51,10 @@ from validate.recording.types import Recording, Signal, Source
 from validate.solve.haptic.needle import NeedleStepper
 from validate.solve.types import State
 
+# private: _from_rest: the replay of a run that takes minutes.
+# private: _run: replaced, to bring a case about.
+# private: _socket: called alone, case by case.
+
 COARSE = {"body.plane": "10"}
 REST = (0.0031, 0.001)
 

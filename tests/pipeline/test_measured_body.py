@@ -53,6 +53,12 @@ from validate.scene.places import axis_of, facets_of, place_of, point_of
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
 from validate.scene.tracked import Prescribed
 
+# private: _FEWEST: a limit or list of the code, which the test must meet exactly.
+# private: _followed, _instants, _loading, _noted, _squeezable, _touched, _window:
+#   called alone, case by case.
+# private: _frame: the frame that is drawn.
+# private: _points_in, _untaken: replaced, to bring a case about.
+
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
 ROLLERS = (Support("xmin", (0,)), Support("ymin", (1,)), Support("zmin", (2,)))

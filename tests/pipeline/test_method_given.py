@@ -36,6 +36,9 @@ from validate.solve.fluid.cavities import NoFluid
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.tabulated import Tabulated
 
+# private: _executed, _instants, _number, _on_all, _size_of, _solved, _touched_levels:
+#   called alone, case by case.
+
 
 @pytest.mark.parametrize("stride", [1, 3])
 def test_a_long_step_is_so_many_of_the_recordings(stride: int) -> None:

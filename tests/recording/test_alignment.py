@@ -25,6 +25,9 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Signal
 
+# private: _on_grid: called alone, case by case.
+# private: _only_peak: correlations of a known shape.
+
 SEEDS = 60
 SEARCH = 1.5  # s
 

@@ -15,6 +15,10 @@ from validate.recording.formats import apart
 from validate.recording.motion_capture import c3d
 from validate.recording.motion_capture.c3d import _require_whole, read_c3d
 
+# private: _LOADING, _SHARED: replaced by a small number: a short test.
+# private: _require_whole: a file of its length, without content.
+# private: _streams: replaced, to bring a case about.
+
 GRAVITY = Path("markers/silicone-beam/beam_gravity_V2_b.c3d")
 
 

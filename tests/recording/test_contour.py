@@ -25,6 +25,9 @@ from validate.recording.types import Frames
 from validate.register.outlines.distances import normal_distances
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
+# private: _fitted: points of a known misfit.
+# private: _next, _require_sure: called alone, case by case.
+
 PX = (1e-4, 1e-4)
 SMALL = Scanner(width=200, height=200)
 

@@ -17,6 +17,10 @@ from validate.recording.images import dicom as dicom_files
 from validate.recording.images.dicom import read_dicom
 from validate.recording.readers import recognised
 
+# private: _MOST, _PACKED: replaced by a small number: a short test.
+# private: _box, _images, _moments, _require_few_bytes, _series: called alone, case by case.
+# private: _frames, _read: replaced, to bring a case about.
+
 data_store = pytest.importorskip("data_store", reason="pydicom-data is not installed")
 DATA = Path(data_store.__file__).parent / "data"
 BESIDE = Path(pydicom.data.__file__).parent / "test_files"

@@ -16,6 +16,9 @@ from validate.recording.tables.columns import Pick, Said
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
+# private: _LONGEST: a limit or list of the code, which the test must meet exactly.
+# private: _relative, _signed, _source: called alone, case by case.
+
 E = np.linspace(0.0, 0.4, 41)  # engineering strain of the path
 SIGMA = 100.0 * E + 30.0 * E**2  # kPa, engineering
 AREA, LENGTH = 314e-6, 20e-3

@@ -10,6 +10,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.tables.specimens import _group, column_groups
 from validate.recording.tables.table import Column, Table
 
+# private: _group: called alone, case by case.
+
 NAMES = "Time (s),Extension (mm),Load (N)\n"
 LINES = rows().splitlines(keepends=True)
 PAIRS = list(zip(T, D, F, strict=True))

@@ -22,6 +22,8 @@ from validate.recording.tables import sheets_arrays, xlsx_arrays
 from validate.recording.tables.every import every_specimen
 from validate.recording.tables.workbook import _chosen, _Sheet, _tests, read_sheets, read_xlsx
 
+# private: _Sheet, _chosen, _tests: sheets of a known kind.
+
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
 SAMPLES = [[float(t), float(d), float(f)] for t, d, f in zip(T, D, F, strict=True)]
 TEST = [["Durchmesser", 25.0, "mm"], ["Probenhöhe", "20 mm"], [], *TABLE, *SAMPLES]

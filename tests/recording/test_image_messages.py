@@ -13,6 +13,10 @@ from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import IMAGE, decode, image_message
 from validate.recording.mcap.seen import _TAIL, ChannelSeen, _looked, pictures
 
+# private: _TAIL: the last bytes of a message.
+# private: _looked: one message of a batch.
+# private: _shapes: called alone, case by case.
+
 GREY = [np.random.default_rng(i).integers(0, 255, (30, 40)).astype(np.uint8) for i in range(40)]
 
 

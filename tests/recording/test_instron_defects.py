@@ -13,6 +13,8 @@ from validate.recording.tables.columns import _same
 from validate.recording.tables.testing_machine import INSTRON, read_instron
 from validate.recording.types import Recording
 
+# private: _same: columns that move alike.
+
 T = np.arange(60) * 0.1
 D = 0.3 * T  # mm
 F = 7.0 * D + 2.5 * D**2  # N

@@ -13,6 +13,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats import matlab_arrays
 from validate.recording.formats.matlab import read_matlab
 
+# private: _unpacks: called alone, case by case.
+
 GEL = "field/gel-indentation/parCoordA.mat"
 DISK = "ultrasound/disk/bmode_PWI_disk.mat"
 

@@ -27,6 +27,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_file
 from validate.recording.types import Markers, Signal
 
+# private: _times, _unnamed: called alone, case by case.
+
 T = 0.01 * np.arange(5)
 LOAD = np.array([0.0, 1.5, -2.25, 3.0, 4.125])
 X = np.random.default_rng(3).normal(size=(5, 4, 3))  # times, points, coordinates

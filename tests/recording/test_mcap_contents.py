@@ -28,6 +28,9 @@ from validate.recording.mcap.metadata import by_name
 from validate.recording.mcap.records import HEAD, Channel, Message, Metadata, Schema, records_in
 from validate.recording.mcap.verified import Verified, messages_of, opened
 
+# private: _guarded, _packed, _points, _protobuf: called alone, case by case.
+# private: _ros2: replaced, to bring a case about.
+
 Told = tuple[str, dict[str, Any]]
 NO_FIELD = ("__msgtype__", "structure_needs_at_least_one_member")
 COMPARED = ("Schema", "Channel", "Message", "Attachment", "Metadata")

@@ -17,6 +17,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.recover import recover
 from validate.recording.preflight import inspect_recording
 
+# private: _copy: called alone, case by case.
+
 MS = 1_000_000
 CUTS = 50
 

@@ -18,6 +18,8 @@ from validate.recording.formats.rosbag import read_bag
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.readers import recognised
 
+# private: _opened: called alone, case by case.
+
 KIND = "geometry_msgs/WrenchStamped"
 SCALE = {"m_per_px": "0.1mm"}
 

@@ -12,6 +12,9 @@ from validate.recording.images import metaimage, nrrd, nrrd_arrays
 from validate.recording.images.metaimage import read_metaimage
 from validate.recording.images.nrrd import read_nrrd
 
+# private: _HEADER: replaced by a small number: a short test.
+# private: _images, _require_end, _times: called alone, case by case.
+
 STYLUS = "markers/stylus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
 FREEHAND = "ultrasound/tracked/NwirePhantomFreehand.igs.{}"
 

@@ -9,6 +9,8 @@ from validate.recording.formats import slicer
 from validate.recording.formats.slicer import read_markups
 from validate.recording.readers import recognised
 
+# private: _LARGEST: replaced by a small number: a short test.
+
 
 def test_a_list_of_slicer_3_is_in_ras(tmp_path: Path) -> None:
     path = tmp_path / "x.fcsv"

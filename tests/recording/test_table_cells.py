@@ -10,6 +10,8 @@ from validate.recording.tables import columns as stepped
 from validate.recording.tables.cells import is_data, is_row, is_unit_row
 from validate.recording.tables.columns import Said
 
+# private: _cells, _number, _step: called alone, case by case.
+
 
 @pytest.mark.parametrize(
     ("cells", "units"),

@@ -9,6 +9,9 @@ from validate.recording.clocks.alignment import Offset
 from validate.recording.merge import ClockDrift, drift_of, stretched, stretched_signal, with_drift
 from validate.recording.types import Recording, Signal
 
+# private: _TURNS: a limit or list of the code, which the test must meet exactly.
+# private: _left: replaced, to bring a case about.
+
 T = np.arange(0, 20, 0.01)
 NO_OFFSET = Offset(0.0, 0.001, "correlation", len(T), 1.0)
 

@@ -15,6 +15,9 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.images import video, video_arrays
 from validate.recording.images.video import VIDEO, read_video
 
+# private: _last_box, _times: called alone, case by case.
+# private: _require_few: replaced, to bring a case about.
+
 UNEVEN = (0, 40, 80, 200, 230, 330, 500)  # ms
 SCALE = {"m_per_px": "0.1mm"}
 

@@ -14,6 +14,8 @@ from validate.register.markers.measures import target_covariance
 from validate.register.markers.transform import Similarity, fit_rigid
 from validate.scene.geometries.box import box
 
+# private: _MOST: replaced by a small number: a short test.
+
 RNG = np.random.default_rng(5)
 Y = RNG.uniform(-0.03, 0.03, (12, 3))
 TRUE = Similarity(Rotation.from_rotvec([0.4, -0.9, 1.7]).as_matrix(), np.array([0.1, -0.2, 0.05]))

@@ -9,6 +9,8 @@ from validate.register.markers.transform import Similarity
 from validate.register.tools.digitised import match_landmarks
 from validate.register.tools.dwell import _joined, dwells, sd_of_mean, tip_path
 
+# private: _joined: spans of a known gap.
+
 A, B = np.array([0.0, 0.0, 0.0]), np.array([0.05, 0.0, 0.0])
 
 

@@ -18,6 +18,8 @@ from validate.recording.readers import recognised
 from validate.recording.types import Recording, Source
 from validate.register.tools.pivot import pivot
 
+# private: _standing: replaced, to bring a case about.
+
 TIP = np.array([0.1086, -0.0078, 0.0025])
 N = 300
 SEQUENCE = "markers/stylus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"

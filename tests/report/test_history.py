@@ -17,6 +17,8 @@ from validate.report.stored.since import history, since
 from validate.report.write import write_report
 from validate.seals import sealed
 
+# private: _fill: replaced, to bring a case about.
+
 DAYS = [f"2026-11-2{i}T04:00:00+00:00" for i in range(1, 6)]
 
 

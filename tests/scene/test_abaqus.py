@@ -16,6 +16,9 @@ from validate.scene.mesh_files.abaqus_text import KeywordBlock
 from validate.scene.mesh_files.foreign_mesh import read_foreign
 from validate.scene.mesh_files.mesh_file import read_mesh
 
+# private: _MOST: replaced by a small number: a short test.
+# private: _range: called alone, case by case.
+
 SHAPES = {"tet4": "C3D4T", "tet10": "c3d10mh", "hex8": "C3D8R"}
 LIVER = "mesh/liver/Liver_Iso_935n_4408t.inp"
 

@@ -21,6 +21,8 @@ from validate.scene.mesh_files import foreign_mesh, meshio_arrays, vtu_series
 from validate.scene.mesh_files.foreign_mesh import read_foreign
 from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
 
+# private: _body: called alone, case by case.
+
 SIZE = (0.01, 0.02, 0.03)
 
 

@@ -20,6 +20,8 @@ from validate.solve.explicit.central import CentralDifference, CentralStepper, D
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import State
 
+# private: _beta: called alone, case by case.
+
 LAWS = [
     "svk",
     "neo_hooke",

@@ -44,6 +44,8 @@ from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.touching import SLIP, STICK
 
+# private: _correction: called alone, case by case.
+
 BOX = (0.1, 0.1, 0.1)
 MESHES = {
     "tet4": box(BOX, (2, 2, 2)),

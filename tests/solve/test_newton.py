@@ -21,6 +21,9 @@ from validate.solve.static import newton
 from validate.solve.static.newton import NewtonStepper, StaticNewton
 from validate.solve.types import State
 
+# private: _corrected: replaced, to bring a case about.
+# private: _rest: called alone, case by case.
+
 ELEMENTS: list[tuple[int, Dilatation]] = [(1, "pointwise"), (1, "nodal_mean"), (2, "pointwise")]
 elements = pytest.mark.parametrize(("order", "dilatation"), ELEMENTS)
 

@@ -21,6 +21,8 @@ from validate.solve.regions.primary import PrimarySolver, UnsettledError
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import State
 
+# private: _corrected, _settled: called alone, case by case.
+
 E, H, KS, CELLS = 5e3, 1e-3, 1000.0, 6
 ONE = Prony((0.8,), (0.02,))
 NEAR = AsyncRegions(H, (2,), (100.0,))

@@ -29,6 +29,8 @@ from validate.solve.march import march
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
 
+# private: _increment_energy: called alone, case by case.
+
 SERIES = Prony((0.8, 0.4), (0.05, 1.0))
 SIDE = 0.1
 

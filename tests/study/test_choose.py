@@ -13,6 +13,8 @@ from validate.study.choose import study as choose
 from validate.study.choose.study import Wanted, left_out, meeting, misses, nearest, wanted
 from validate.study.tradeoff.study import TradeRow
 
+# private: _split: called alone, case by case.
+
 WANTED = Wanted(0.5e-3, 1000.0)
 ANY = Rival("any", "prefactored", Newmark)
 

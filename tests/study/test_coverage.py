@@ -36,6 +36,9 @@ from validate.study.coverage.plan import (
 from validate.study.coverage.study import Coverage, coverage
 from validate.study.coverage.worlds import Study, _alike
 
+# private: _Truth, _alike, _mistaken, _of_method, _sides, _terms: called alone, case by case.
+# private: _readings: replaced, to bring a case about.
+
 ROOT = Path(__file__).parents[2]
 HERE = Where(0)
 TINY = (ROOT / "tests" / "pipeline" / "tiny.py").read_text("utf-8")

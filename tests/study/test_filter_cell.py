@@ -28,6 +28,9 @@ from validate.study.filters.plan import FilterPlan, plan
 from validate.study.filters.score import FilterScores
 from validate.study.sweep import axes
 
+# private: _loaded, _most, _recordings, _registered, _systems, _truths: called alone, case by case.
+# private: _repeated: replaced, to bring a case about.
+
 
 @pytest.fixture(scope="module")
 def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:

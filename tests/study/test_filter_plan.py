@@ -27,6 +27,8 @@ from validate.study.filters.plan import FilterPlan, plan
 from validate.study.filters.study import run_line, study
 from validate.study.sweep import axes
 
+# private: _keyed, _methods, _seeds: called alone, case by case.
+
 
 @pytest.fixture(scope="module")
 def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:

@@ -12,6 +12,8 @@ from validate.study.filters.plan import FilterCell
 from validate.study.filters.ranking import Ranking, dominator, rankings
 from validate.study.filters.score import FilterScores
 
+# private: _require_score: called alone, case by case.
+
 
 def ranked(**cells: tuple[Sequence[float], float | None]) -> Ranking:
     made = [FilterCell(name, (), (), key=name) for name in cells]

@@ -51,6 +51,9 @@ from validate.study.stability.precision import drift
 from validate.study.stability.study import Stability, declared, points, stability
 from validate.study.study_page import write_study
 
+# private: _PAIR_NU: a limit or list of the code, which the test must meet exactly.
+# private: _stepped: called alone, case by case.
+
 W, ALPHA, BETA = 30.0, 0.7, 0.02
 ROOT = Path(__file__).parents[2]
 MAPPED = ("bending_rod", "ekf_cube", "kf_cube", "needle_block")

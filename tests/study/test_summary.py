@@ -20,6 +20,9 @@ from validate.study.stored_runs.predictions import predictions, stored_runs
 from validate.study.stored_runs.summary import Summary, summary
 from validate.study.stored_runs.summary_page import _ROWS, _against, _points, document
 
+# private: _ROWS: a limit or list of the code, which the test must meet exactly.
+# private: _against, _points: called alone, case by case.
+
 
 def check(simulated: float, measured: float = 10.0, **more: Any) -> dict[str, Any]:
     found = {

@@ -49,6 +49,10 @@ from validate.study.tradeoff.held import held_bytes
 from validate.study.tradeoff.page import cells_table, trade_document
 from validate.study.tradeoff.study import Trade, TradeRow, front, trade_cells, traded
 
+# private: _choice_passages, _locking, _measured, _predicted, _sharing, _solved, _trade_passages:
+#   called alone, case by case.
+# private: _march, _scheme: replaced, to bring a case about.
+
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
 AVERAGE = Rival("average", "prefactored", Newmark)
