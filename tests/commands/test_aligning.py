@@ -51,6 +51,7 @@ def files(folder: Path, drift: float = 0.0, noise: float = 0.01) -> tuple[str, s
 BY = ("--by", "force=-markers.tip.z")
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_an_offset_is_found_below_a_sample_and_kept(tmp_path: Path) -> None:
     out = tmp_path / "both.mcap"
     code, said, err = here("align", *files(tmp_path), *BY, "-o", str(out))

@@ -63,6 +63,7 @@ def radii(outline: Floats, centre: Floats) -> Floats:
     return np.asarray(np.linalg.norm(outline / SIDE - centre, axis=1))
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
     code, out, err = here("outline", str(moving))
     assert (code, err.count("confidence")) == (0, 0)

@@ -291,6 +291,7 @@ def leaves(content: Any) -> Iterator[Any]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("drawn_figures")
 def test_the_folder_has_no_number_that_is_not_finite(
     few: tuple[StabilityCell, ...], tmp_path: Path
 ) -> None:
