@@ -136,7 +136,7 @@ def test_the_mean_of_a_linear_function_s_size_is_exact(corners: int) -> None:
 def test_an_inside_out_mesh_is_refused() -> None:
     turned = MESHES["tet4"].cells[:, [0, 2, 1, 3]]
     mesh = Mesh(MESHES["tet4"].nodes, turned, "tet4")
-    with pytest.raises(ComparisonError, match="216 of 216 cells of reference are inverted"):
+    with pytest.raises(ComparisonError, match="216 of 216 cells"):
         still(mesh)
 
 
@@ -257,14 +257,14 @@ def test_bodies_on_different_meshes_keep_their_own_boundary() -> None:
 def test_a_curve_that_crosses_itself_encloses_no_plane_body() -> None:
     """Two lobes of 1.5 and 0.5 m2: the signed area is their difference, 1 m2."""
     points = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 3.0]])
-    with pytest.raises(ComparisonError, match=r"5 segments encloses no plane body \(Self-inters"):
+    with pytest.raises(ComparisonError, match=r"5 segments.*\(Self-inters"):
         polygon(outline_boundary(points))
 
 
 def test_a_boundary_that_touches_itself_is_no_outline() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
     pieces = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]])
-    with pytest.raises(ComparisonError, match="touches itself in 1 nodes, so it is not an outline"):
+    with pytest.raises(ComparisonError, match="touches itself in 1 nodes, so"):
         polygon(Boundary(points, pieces))
 
 

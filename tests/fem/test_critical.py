@@ -191,13 +191,11 @@ def test_a_missing_density_is_named() -> None:
 
 def test_what_has_no_critical_step_is_reported() -> None:
     assert module._density(Material(1.0, 0.3, rho=5.0)) == 5.0
-    with pytest.raises(SceneError, match="a critical step needs the density; set rho kg/m3 of eve"):
+    with pytest.raises(SceneError, match=r"a critical step needs.*kg/m3"):
         module._density(Material(1.0, 0.3))
     scene = SimpleNamespace(
         mesh=SimpleNamespace(kind="tet4"), material=Material(1.0, 0.3, "svk"), regions=(),
         membranes=(None,), dilatation="pointwise",
     )  # fmt: skip
-    with pytest.raises(
-        SceneError, match="membranes are linear only: remove them, or use the linear"
-    ):
+    with pytest.raises(SceneError, match="membranes are linear only: remove"):
         explicit._require(scene)  # type: ignore[arg-type]

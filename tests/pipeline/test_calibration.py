@@ -91,9 +91,7 @@ def test_a_value_is_taken_as_it_is_and_then_nothing_is_fitted() -> None:
 def test_a_figure_that_would_serve_twice_is_an_error() -> None:
     for quantities in (("force",), ("force@0.3mm",)):
         twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(quantities),)),))
-        with pytest.raises(
-            ComparisonError, match=r"calibrates 'fem': each value can be used only once"
-        ):
+        with pytest.raises(ComparisonError, match="calibrates 'fem': each value can"):
             compare(twice, Options({}))
 
 

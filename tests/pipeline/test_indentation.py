@@ -104,13 +104,11 @@ def test_contact_is_set_like_any_parameter(result: Result) -> None:
 
 
 def test_what_is_wrong_with_contact_is_one_line() -> None:
-    with pytest.raises(SceneError, match=r"contact 'ball' starts inside the body: 1 of 25 nodes"):
+    with pytest.raises(SceneError, match=r"'ball'.*1 of 25 nodes"):
         run_in_memory(EXPERIMENT, {"contacts.ball.shape.centre": "10mm,10mm,34.9mm"}, quick=True)
     with pytest.raises(SceneError, match="friction -1, expected 0 or more"):
         run_in_memory(EXPERIMENT, {"contacts.ball.friction": "-1"}, quick=True)
-    with pytest.raises(
-        UsageError, match=r"unknown parameter 'contacts.ball.frictoin'; nearest: contacts.ball."
-    ):
+    with pytest.raises(UsageError, match=r"'contacts.ball.frictoin'.*contacts.ball."):
         run_in_memory(EXPERIMENT, {"contacts.ball.frictoin": ".3"}, quick=True)
 
 

@@ -66,7 +66,7 @@ def test_it_agrees_with_the_csv_of_the_same_motion(shared_data: Path) -> None:
 
 def test_a_unit_that_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path / "x.c3d", unit="")
-    with pytest.raises(UsageError, match="has no unit of length; give --map unit=mm"):
+    with pytest.raises(UsageError, match="--map unit=mm"):
         read_c3d(path, {})
     x = read_c3d(path, {"unit": "cm"}).marker("markers").x
     assert x[0, 1].tolist() == pytest.approx([0.05, 0.15, 0.25])
@@ -333,5 +333,5 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     (tmp_path / "file").write_bytes(b"x" * 7)
     monkeypatch.setattr(apart, "_LOADING", 0)
     monkeypatch.setattr(apart, "_SHARED", 0)
-    with pytest.raises(RecordingError, match="file: its reader was stopped after 0 s for 7 bytes"):
+    with pytest.raises(RecordingError, match=r"file.*after 0 s for 7 bytes"):
         apart.decoded("validate.recording.motion_capture.c3d_arrays", tmp_path / "file")

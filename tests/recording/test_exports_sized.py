@@ -231,9 +231,7 @@ def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
             RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest and a"
         ):
             sized._relative(picked("stretch", *values), "", None)
-    with pytest.raises(
-        ValidateError, match="'strain' does not show whether the specimen is pressed"
-    ):
+    with pytest.raises(ValidateError, match="'strain' does not show whether"):
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
 
 
@@ -241,11 +239,9 @@ def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = {"strain": Said("e", "%", -1.0)}
-    with pytest.raises(
-        UsageError, match="--map strain: no sign is allowed; give --map test=compression or"
-    ):
+    with pytest.raises(UsageError, match=r"--map strain.*--map test=compression"):
         sized._source("strain", None, said)  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="--map repeated=both: expected first or last"):
+    with pytest.raises(UsageError, match="--map repeated=both"):
         repeats.without_repeats(None, Said("every", "1s", None), "both")  # type: ignore[arg-type]
     mcap = next(reader for reader in READERS if reader.name == "mcap")
     with pytest.raises(

@@ -115,5 +115,5 @@ def test_outlines_of_two_points_are_reported_with_their_message(
     outlines = [schemas.contour_message(i, "a", ring[:n], 0.0) for i, n in enumerate((3, 2, 1))]
     found.take([json.dumps(one).encode() for one in outlines])
     assert (found.error, found.count) == ("", 3)
-    with pytest.raises(RecordingError, match="'/o': contours: outline 1 has fewer than 3 points"):
+    with pytest.raises(RecordingError, match=r"'/o': contours: outline 1.*than 3 points"):
         found.stream(np.arange(3), {})

@@ -196,7 +196,7 @@ def test_types_without_a_definition_are_told(tmp_path: Path) -> None:
     changed(path, "DELETE FROM message_definitions WHERE encoding = 'unknown'")
     same(read_bag(path, {}), MADE[KIND][1])
     changed(path, "UPDATE topics SET type = 'lab_msgs/msg/Own'")
-    with pytest.raises(RecordingError, match="any of its 1 types: /x of type lab_msgs/msg/Own"):
+    with pytest.raises(RecordingError, match=r"1 types: /x.*lab_msgs/msg/Own"):
         read_bag(path, {})
 
 

@@ -114,7 +114,7 @@ def test_an_nrrd_with_three_axes_of_space_is_no_film(
     nrrd.write(str(path), images(3).transpose(2, 1, 0).copy(), header)
     if not why:
         assert len(read_nrrd(path, BY).frame("images").images) == 3
-        with pytest.raises(UsageError, match=r"give --map rate=HZ \(a volume is not read\)"):
+        with pytest.raises(UsageError, match=r"--map rate=HZ \(a.*read\)"):
             read_nrrd(path, {"m_per_px": "0.1mm"})
         return
     for options in ({}, BY):
@@ -149,7 +149,5 @@ def test_a_metaimage_of_three_axes_is_a_film_where_it_lists_images(
         assert len(read_metaimage(path, BY).frame("images").images) == 3
         return
     for options in ({}, BY):
-        with pytest.raises(
-            RecordingError, match=r"3 slices of a volume \(spacing 0.1 0.2 0.3\), not"
-        ):
+        with pytest.raises(RecordingError, match=r"3 slices.*\(spacing 0.1 0.2 0.3\)"):
             read_metaimage(path, options)

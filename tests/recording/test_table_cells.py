@@ -49,7 +49,7 @@ def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None
 
 
 def test_a_line_that_is_no_csv_is_reported_with_its_length() -> None:
-    with pytest.raises(RecordingError, match="not CSV text: a line of 140001 characters: field l"):
+    with pytest.raises(RecordingError, match="140001 characters"):
         cells._cells("1" * 140_000 + ",", ",")
 
 

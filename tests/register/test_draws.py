@@ -336,9 +336,7 @@ def test_markers_that_are_missing_at_rest_are_named() -> None:
     late, unseen, fewest = from_rest_module.rested(seen, 2.0)
     assert (late.names, unseen, fewest) == (("a", "b"), (), 1)
     only = replace(seen, names=("b",), x=seen.x[:, 1:])
-    with pytest.raises(
-        RegistrationError, match=r"none of 1 markers is visible in the first 0.5 s, at"
-    ):
+    with pytest.raises(RegistrationError, match=r"1 markers.*first 0.5 s"):
         from_rest_module.rested(only, 0.5)
 
 

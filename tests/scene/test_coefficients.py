@@ -34,7 +34,7 @@ def test_malformed_coefficients_are_refused() -> None:
     with pytest.raises(SceneError, match="nan among them"):
         Coefficients(C20=np.nan)
     for wrong in ((1.1, 2.0), (0.5,), (0.5, 0.9)):
-        with pytest.raises(SceneError, match="the first between 0 and 1, the second above 1"):
+        with pytest.raises(SceneError, match=r"between 0 and 1.*above 1"):
             Coefficients(stretches=wrong)
     with pytest.raises(SceneError, match="Ogden: 2 moduli for 1 powers"):
         ogden((1.0, 2.0), (2.0,), 0.4)

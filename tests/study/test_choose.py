@@ -89,7 +89,7 @@ def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> No
 
 
 def test_a_unit_of_something_else_is_refused() -> None:
-    with pytest.raises(UsageError, match="'s' is not a unit of displacement, force or pressure"):
+    with pytest.raises(UsageError, match="'s' is not a unit of displacement"):
         wanted("0.5s", "1000Hz")
 
 
@@ -108,7 +108,5 @@ def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
 
 
 def test_a_ladder_without_a_rung_is_refused() -> None:
-    with pytest.raises(
-        UsageError, match="no candidate method of the ladder has a cell for this scene; see 'st"
-    ):
+    with pytest.raises(UsageError, match="no candidate method of the ladder"):
         choose.choose(lambda *_: None, None, True, None)  # type: ignore[arg-type]

@@ -166,9 +166,7 @@ def test_a_twin_that_tells_no_truth_is_no_benchmark(
     made = planned(pulled)
     bench = Bench(pulled, made.job)
     monkeypatch.setattr(bench, "_repeated", lambda ready: Truth({}))
-    with pytest.raises(
-        ComparisonError, match="the truth of the twin has no probes, so nothing can be compared"
-    ):
+    with pytest.raises(ComparisonError, match="the truth of the twin has no probes"):
         run_cell(bench, made.cells[0])
 
 

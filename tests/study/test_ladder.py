@@ -157,7 +157,7 @@ def _at_one_instant(experiment: Experiment) -> Experiment:
 def test_one_instant_says_no_time_step(
     pulled: Experiment, ladder: Callable[[Experiment], object]
 ) -> None:
-    with pytest.raises(UsageError, match="driven at 1 instant, so there is no time step"):
+    with pytest.raises(UsageError, match="driven at 1 instant, so there"):
         ladder(_at_one_instant(pulled))
 
 

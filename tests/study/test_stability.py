@@ -438,7 +438,7 @@ def test_grids_span_what_was_asked_for() -> None:
 
 def test_bodies_too_large_are_refused() -> None:
     base = body("needle_block")
-    with pytest.raises(SceneError, match="unknowns at mesh 30: a stability map has at most 1000"):
+    with pytest.raises(SceneError, match=r"mesh 30.*most 1000"):
         base.build(replace(base.base, mesh=30))
 
 

@@ -270,11 +270,9 @@ def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: obj
 
 def test_held_out_names_are_markers_that_move_and_leave_one_to_the_filter(tmp_path: Path) -> None:
     bench, cell = two_markers(tmp_path)
-    with pytest.raises(
-        UsageError, match="--hold-out a: no moving marker has that name; moving markers are"
-    ):
+    with pytest.raises(UsageError, match="--hold-out a: no"):
         run_cell(bench, replace(cell, hold_out=("a",)))
-    with pytest.raises(UsageError, match="--hold-out top, side leaves nothing of top, side to"):
+    with pytest.raises(UsageError, match="--hold-out top, side leaves"):
         run_cell(bench, replace(cell, hold_out=("top", "side")))
 
 
