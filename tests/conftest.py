@@ -35,7 +35,7 @@ from validate.pipeline.run.road import compare
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 # Groups that take minutes begin first: a short one ends each process.
-FIRST = (*LONG_RUNS, "test_help.py", "test_notebooks.py", "tree")
+FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_notebooks.py", "tree")
 BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
 _DRAW = Figure.draw
 

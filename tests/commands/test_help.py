@@ -50,7 +50,14 @@ def test_a_help_page_has_few_words_and_an_example(name: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(n, marks=[pytest.mark.slow] if n.startswith(SLOW) or not n else [])
+        pytest.param(
+            n,
+            marks=[
+                *([pytest.mark.slow] if n.startswith(SLOW) or not n else []),
+                # Half of the time: studies share cells, and no other example reads them.
+                *([pytest.mark.xdist_group("examples of studies")] if "study" in n else []),
+            ],
+        )
         for n in PAGES
     ],
 )
