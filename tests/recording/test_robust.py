@@ -98,7 +98,7 @@ def test_what_is_no_file_is_one_line(reader: Reader, what: str, tmp_path: Path) 
 def test_a_wrong_extension_and_an_odd_name_change_nothing(reader: Reader, tmp_path: Path) -> None:
     path, options = sample(reader, tmp_path)
     plain = reader.read(path, options)
-    for name in ("sample.docx", "Gewebe 力 é.mcap", "a\nb.c3d", "-o"):
+    for name in ("Gewebe 力 é.mcap", "-o\nb.c3d"):  # the second is wrong for MCAP, too
         other = path.rename(tmp_path / name)
         assert recognised(other) is reader
         got = reader.read(other, options)
