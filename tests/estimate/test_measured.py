@@ -42,9 +42,7 @@ def test_rows_without_a_value_and_rest_are_left_out() -> None:
 
 def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> None:
     seen = case().measured(1, every=5)
-    with pytest.raises(
-        ComparisonError, match=r"0\.33 steps of 0\.003 s off .* take dt = 0\.0025 s"
-    ):
+    with pytest.raises(ComparisonError, match=r"0\.33 steps of 0\.003 s.*dt = 0\.0025 s"):
         timetable(seen, 0.003)
     assert len(timetable(seen, 0.0025).z) == 12
     irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))

@@ -78,5 +78,5 @@ def test_windows_are_named_by_the_strains_they_end_at(logs: Path) -> None:
 
 
 def test_missing_logs_name_the_folder_and_the_setting(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"no logs '\*.csv' in .*; pass --set logs=PATTERN"):
+    with pytest.raises(RecordingError, match=r"no logs '\*.csv'.*--set logs=PATTERN"):
         load(tree(tmp_path, "*.csv"), tmp_path)

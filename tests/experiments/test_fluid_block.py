@@ -271,9 +271,7 @@ def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_re
 ) -> None:
     monkeypatch.setattr(curves, "pressure_load", lambda surface, x: x)
     x = np.array([[1.0], [2.0]])
-    with pytest.raises(
-        SceneError, match=r"the wall does not settle at 1 Pa: it still moves by .* m"
-    ):
+    with pytest.raises(SceneError, match=r"the wall does not settle at 1 Pa.* m"):
         curves._wall(None, x, 2.0 * np.eye(2), np.zeros_like(x), 1.0)
     settled = curves._wall(None, x, 0.5 * np.eye(2), np.zeros_like(x), 1.0)
     assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2

@@ -93,9 +93,7 @@ def test_archives_say_their_unit_and_hold_no_programs(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"'points'.*\['faces'\]"):
         read_points(tmp_path / "other_mm.npz")
     np.savez(tmp_path / "whole_mm.npz", points=np.ones((2, 5, 3), dtype="int32"))
-    with pytest.raises(
-        RecordingError, match=r"points \(2, 5, 3\) int32: a list of indices .* as float"
-    ):
+    with pytest.raises(RecordingError, match=r"points \(2, 5, 3\) int32.* as float"):
         read_points(tmp_path / "whole_mm.npz")
     np.savez(tmp_path / "object_mm.npz", points=np.array([{}, None], dtype=object))
     with pytest.raises(RecordingError, match="not an archive of arrays"):

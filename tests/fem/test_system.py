@@ -232,7 +232,7 @@ def test_a_body_whose_nodes_are_all_held_is_refused_with_the_elements_it_takes()
     held = (Support("z0", (0, 1, 2)), Support("z1", (0, 1)))
     stage = Drive("stage", "z1", (0.0, 0.0, -1.0))
     pressed = Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), held, drives=(stage,))
-    with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes are held .*at least 2 elem"):
+    with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes.*least 2 elem"):
         build(pressed)
 
 

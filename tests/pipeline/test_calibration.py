@@ -117,9 +117,7 @@ def test_what_is_not_identifiable_blocks_the_prediction_unless_anyway() -> None:
         parameters=known(nu=None),
         calibrations=(Calibration("fem", (E, NU), (Calibrates(("force@0.1mm", "force@0.2mm")),)),),
     )
-    with pytest.raises(
-        ComparisonError, match=r"material.nu is not identifiable .*the sides' motion would"
-    ):
+    with pytest.raises(ComparisonError, match=r"material.nu.*the sides' motion would"):
         compare(both, Options({}))
     result = compare(both, Options({}, anyway=True))
     assert any("material.nu is not identifiable" in note for note in result.notes)

@@ -105,9 +105,7 @@ def unsaid(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 def test_a_twins_setting_is_refused_where_nothing_says_what_made_the_recording(files: int) -> None:
     silent = other_model(load=lambda tree, folder: files * unsaid(tree, folder))
     assert [c.verdict for c in judged(silent).checks] == ["good enough"]
-    with pytest.raises(
-        UsageError, match=r"--set sd=0\.0001 would have no effect: .*validate record"
-    ):
+    with pytest.raises(UsageError, match=r"--set sd=0\.0001 would.*validate record"):
         judged(silent, sd="1e-4")
 
 

@@ -72,7 +72,7 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
     assert scenes["slip"].material.coefficients == Coefficients()
     assert made.identify is not None
     assert made.identify((), card, methods).parameters == card
-    with pytest.raises(UsageError, match=r"material.C01 = 500.0: no method .* only linear; set"):
+    with pytest.raises(UsageError, match=r"material.C01 = 500.0.* only linear; set"):
         made.identify((), card, {"slip": methods["slip"]})
 
 
@@ -195,9 +195,7 @@ def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
 def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> None:
     recording = Recording("r", Source("r", "", 0, ""), 0)
     remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
-    with pytest.raises(
-        UsageError, match=r"r: --set dt=.* would have no effect: the recording does not"
-    ):
+    with pytest.raises(UsageError, match=r"r: --set dt=.*would have no effect: the recording"):
         remade.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
 
 

@@ -144,14 +144,14 @@ def test_outlines_named_after_the_declaration_are_refused(body: Mesh) -> None:
 
 def test_outlines_show_all_of_the_body() -> None:
     card = pressed_cylinder(D, H, settings=Compression(outline=PLACE))
-    with pytest.raises(UsageError, match=r"body\.part: .* not a quarter; declare part='whole'"):
+    with pytest.raises(UsageError, match=r"body\.part: .*part='whole'"):
         experiment(card)
 
 
 def test_a_scene_that_no_plate_presses_is_refused() -> None:
     card = pressed_cylinder(D, H)
     for drives in ((), (Drive("stage", "upper_plate", (1.0, 0.0, 0.0)),)):
-        with pytest.raises(UsageError, match=r'drives: .* declare Drive\("stage", "upper_plate"'):
+        with pytest.raises(UsageError, match=r'drives: .*"upper_plate"'):
             experiment(card.with_scene(drives=drives))
 
 

@@ -264,7 +264,7 @@ def test_outlines_of_frames_are_contours_and_none_is_left_out() -> None:
     moved = got.outlines[1].mean(axis=0) - got.outlines[0].mean(axis=0)
     assert moved == pytest.approx([0, 5e-4], abs=0.1e-3)
     empty = Frames(np.array([0.0, 1.0, 2.5]), (*frames, image(None)), PX, pose, "phantom")
-    with pytest.raises(RecordingError, match=r"1 of 3 images .* first image 2 \(t = 2.500 s\)"):
+    with pytest.raises(RecordingError, match=r"1 of 3 images .*image 2 \(t = 2.500 s\)"):
         outlines_of(empty)
 
 
@@ -292,9 +292,9 @@ def flat(count: int) -> Frames:
 
 
 def test_even_images_are_counted_and_the_first_is_named() -> None:
-    with pytest.raises(RecordingError, match=r"2 of 2 images .*, first image 0 \(t = 0.000 s\): "):
+    with pytest.raises(RecordingError, match=r"2 of 2 images .*image 0 \(t = 0.000 s\)"):
         outlines_of(flat(2))
-    with pytest.raises(RecordingError, match=r"3 of 3 images .*, first image 0 \(t = 0.000 s\): "):
+    with pytest.raises(RecordingError, match=r"3 of 3 images .*image 0 \(t = 0.000 s\)"):
         followed.followed(flat(3), followed.Hint(None, None), "images")
 
 
@@ -314,9 +314,7 @@ def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.Mo
         followed._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
     monkeypatch.setattr(followed.RivalRegion, "words", "a region of 3 mm")
     rival = followed.RivalRegion.__new__(followed.RivalRegion)
-    with pytest.raises(
-        RecordingError, match=r"confidence 0.52, but 0.6 is needed.*3 mm; .*--confidence 0.51\)"
-    ):
+    with pytest.raises(RecordingError, match=r"confidence 0.52.*0.6.*3 mm; .*--confidence 0.51\)"):
         followed._require_sure((rival,), 0.519, 0.6)
     followed._require_sure((rival,), 0.6, 0.6)
     followed._require_sure((), 0.1, 0.6)

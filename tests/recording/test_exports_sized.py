@@ -93,7 +93,7 @@ def test_a_stretch_says_itself_which_way_it_goes(tmp_path: Path) -> None:
     recording = read(tmp_path, pressed, area="314mm2", length="20mm")
     assert recording.record("specimen")["test"] == "compression"
     assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
-    with pytest.raises(RecordingError, match=r"tension test .* goes below 1; give --map test=comp"):
+    with pytest.raises(RecordingError, match=r"tension test .*below 1; give --map test=comp"):
         read(tmp_path, pressed, area="314mm2", length="20mm", test="tension")
 
 
@@ -227,9 +227,7 @@ def picked(role: str, *values: float) -> Pick:
 def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
     assert sized._relative(picked("stretch", 1.0, 1.5), "", None).tolist() == [0.0, 0.5]
     for values in ((1.0, 0.0), (1.0, sized._LONGEST + 1)):
-        with pytest.raises(
-            RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest and a"
-        ):
+        with pytest.raises(RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest"):
             sized._relative(picked("stretch", *values), "", None)
     with pytest.raises(ValidateError, match="'strain' does not show whether"):
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))

@@ -89,7 +89,7 @@ def test_which_axis_is_which_is_told_by_times_or_asked_for(file: Path) -> None:
     # 5 times: (5, 4, 3) can be only times, points, coordinates
     told = read_matlab(file, {"time": "data.t:s", "m": "data.X:mm"})
     assert told.marker("m").x.shape == (5, 4, 3)
-    with pytest.raises(UsageError, match=r"m: an array of \(5, 4, 3\) and no times .*axes.m=tpx"):
+    with pytest.raises(UsageError, match=r"m.*\(5, 4, 3\).*axes.m=tpx"):
         read_matlab(file, {"m": "data.X:mm", "rate": "9"})
     other = read_matlab(file, {"m": "data.X:mm", "rate": "9", "axes.m": "ptx"})
     assert other.marker("m").x.shape == (4, 5, 3)
@@ -392,12 +392,8 @@ def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
 
 def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> None:
     word = {"note": np.array("text")}
-    with pytest.raises(
-        RecordingError, match=r"neither points \(n, 2 or 3\) nor uint8 images .*; it"
-    ):
+    with pytest.raises(RecordingError, match=r"\(n, 2 or 3\) nor uint8 images.*; it"):
         matlab._unnamed(Path("x.mat"), word, {})
     curve = {"F": np.zeros(50), "d": np.zeros(9)}
-    with pytest.raises(
-        UsageError, match=r"no array's role is clear; .* as --map force=PATH:N --map ra"
-    ):
+    with pytest.raises(UsageError, match=r"no array's role is clear.*--map force=PATH:N --map"):
         matlab._unnamed(Path("x.mat"), curve, {})

@@ -308,7 +308,7 @@ def test_a_number_of_any_message_comes_in_by_its_path(encoding: str, tmp_path: P
         read_all(path, {})
     with pytest.raises(RecordingError, match=r"no field 'nothing' of 'cell.nothing'"):
         read_all(path, {"/cell.cell.nothing": "N"})
-    with pytest.raises(UsageError, match=r"--map /other.x=...: no such key; .*topics /cell"):
+    with pytest.raises(UsageError, match=r"--map /other.x=....*topics /cell"):
         read_all(path, {"/other.x": "N"})
 
 

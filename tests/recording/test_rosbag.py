@@ -118,7 +118,7 @@ def test_own_types_are_numbers_by_their_path(tmp_path: Path) -> None:
 def test_what_is_left_in_a_log_or_cut_off_is_told(tmp_path: Path) -> None:
     path = humbles(tmp_path / "x.db3")
     (tmp_path / "x.db3-wal").write_bytes(b"some")
-    with pytest.raises(RecordingError, match=r"4 bytes are still in x.db3-wal.*sqlite3 x.db3"):
+    with pytest.raises(RecordingError, match=r"4 bytes.*x.db3-wal.*sqlite3 x.db3"):
         read_bag(path, {})
     (tmp_path / "x.db3-wal").unlink()
     whole = path.read_bytes()
@@ -204,7 +204,7 @@ def test_a_database_of_another_kind_is_called_so(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "x.db") as db:
         db.execute("CREATE TABLE runs(force REAL)")
     db.close()
-    with pytest.raises(UsageError, match=r"an SQLite database \(not a ROS bag\).*> x.csv"):
+    with pytest.raises(UsageError, match=r"\(not.*bag\).*> x.csv"):
         recognised(tmp_path / "x.db")
 
 

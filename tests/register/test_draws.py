@@ -345,6 +345,6 @@ def test_markers_off_the_body_ask_how_far_they_stand(monkeypatch: pytest.MonkeyP
     whole = SimpleNamespace(x=rest[None], names=("stalk",))
     with pytest.raises(
         RegistrationError,
-        match=r"stalk.*; for markers on stalks give their length: --set seen.stands=15mm",
+        match=r"stalk.*--set seen.stands=15mm",
     ):
         from_rest_module.since_rest(whole, MESH, 1e-4, 1, 1e-3)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from validate.scene.scene import Scene
 
 
 def test_coefficients_that_the_law_would_not_use_are_refused() -> None:
-    with pytest.raises(SceneError, match=r"law 'neo_hooke' does not know C01 = 5.0: .* mooney_riv"):
+    with pytest.raises(SceneError, match=r"'neo_hooke'.*know C01 = 5.0.* mooney_riv"):
         Material(1e4, 0.4, "neo_hooke", coefficients=Coefficients(C01=5.0))
     with pytest.raises(SceneError, match="'svk' does not know volumetric = coupled"):
         Material(1e4, 0.4, "svk", coefficients=Coefficients(volumetric="coupled"))

@@ -324,7 +324,7 @@ def test_a_body_that_nothing_holds_is_named_before_any_solve() -> None:
 
 def test_schemes_without_contact_refuse_it() -> None:
     with pytest.raises(
-        SceneError, match=r"does not support contact with rigid bodies, .* 1; use ContactNewton"
+        SceneError, match=r"does not support contact with rigid.* 1; use ContactNewton"
     ):
         Newmark().prepare(build(pressed(MESHES["tet4"])))
 
