@@ -7,6 +7,8 @@ from numba.core.caching import IndexDataCacheFile
 
 from validate.fem.kernels.jit_cache import compiled, name_apart
 
+# private: _load_index, _save_data: numba's cache, between whose steps another process comes.
+
 
 def _seen_by_one_process(folder: Path) -> IndexDataCacheFile:
     stored = IndexDataCacheFile(str(folder), "loop", source_stamp=1)
