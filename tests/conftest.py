@@ -1,7 +1,9 @@
 """Shared fixtures: where real recordings lie, this clone's own files, long runs made once.
 
 Tests run in one process a core. Those that share a long run are given to one of them, first of
-all; the others go file by file, so that what a module prepares is prepared once.
+all; the others go file by file, so that what a module prepares is prepared once. Drawing is most
+of what a command does on a small body: only tests of reports look at figures, all others have
+blank ones.
 """
 
 import gc
@@ -13,7 +15,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 os.environ.setdefault("VALIDATE_WORKERS", "1")  # of `run`: the tests themselves run side by side
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -22,6 +24,7 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
     os.environ.setdefault("VALIDATE_SHARED_DATA", str(_data))
 
 import pytest
+from matplotlib.figure import Figure
 
 from validate.compare.result import Result
 from validate.pipeline.experiment.experiment import Experiment
@@ -31,6 +34,14 @@ from validate.pipeline.run.pipeline import compare
 
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
+# Groups that take minutes begin first: a short one ends each process.
+FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_notebooks.py", "tree")
+BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
+_DRAW = Figure.draw
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.option.loadscopereorder = False  # xdist would begin with groups of many short tests
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
@@ -41,7 +52,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.slow)
         if item.get_closest_marker("xdist_group") is None:
             item.add_marker(pytest.mark.xdist_group(shared or item.path.name))
-    items.sort(key=lambda item: not set(LONG_RUNS) & set(item.fixturenames))
+    rank = {name: k for k, name in enumerate(FIRST)}
+    items.sort(key=lambda item: rank.get(_group(item), len(rank)))
+
+
+def _group(item: pytest.Item) -> str:
+    marker = item.get_closest_marker("xdist_group")
+    return str(marker.args[0]) if marker else ""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -53,6 +70,23 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Figures are composed, but not drawn, in folders where no test reads one."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name in BLANK:
+            patch.setattr(Figure, "draw", lambda figure, renderer: None)
+            patch.setenv("VALIDATE_NO_GL", "1")
+        yield
+
+
+@pytest.fixture
+def drawn_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures as a user has them, for a test that reads one in such a folder."""
+    monkeypatch.setattr(Figure, "draw", _DRAW)
+    monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
 
 
 @pytest.fixture(scope="session")

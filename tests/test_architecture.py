@@ -16,7 +16,7 @@ from tree import ONE_PROCESS, nodes
 pytestmark = ONE_PROCESS
 
 # Grows while one file is read and never leaves its reader.
-ACCUMULATORS = {"streams.py:Collected", "foreign.py:Gathered", "threads.py:Team"}
+ACCUMULATORS = {"streams.py:Collected", "third_party_channels.py:Gathered", "threads.py:Team"}
 
 
 def modules(root: Path) -> list[Path]:
@@ -149,6 +149,43 @@ def test_files_of_others_are_opened_in_one_guarded_way(project_root: Path) -> No
         for folder in ("validate/recording", "validate/scene", "validate/register", "experiments")
         for path in sorted((project_root / folder).rglob("*.py"))
         for line in path.read_text("utf-8").splitlines()
-        if reads.search(line) and path.name != "apart.py"
+        if reads.search(line) and path.name != "subprocess_decoder.py"
     ]
     assert found == []
+
+
+# What a named tuple and a notebook offer all the same.
+OFFERED = {"_replace", "_asdict", "_make", "_fields", "_repr_html_", "_repr_png_"}
+
+
+def _private_names(path: Path) -> set[str]:
+    """Names with an underscore that a test takes from elsewhere: imports, attributes, patches."""
+    own = {n.name for n in nodes(path) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    names: set[str] = set()
+    for node in nodes(path):
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith(("validate", "exper")):
+            names |= {name.name for name in node.names}
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) not in ("self", "cls"):
+            names |= {node.attr} - own
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("setattr"):
+            texts = [a.value for a in node.args[:2] if isinstance(a, ast.Constant)]
+            names |= {text.rsplit(".", 1)[-1] for text in texts if isinstance(text, str)}
+    return {n for n in names if n.startswith("_") and not n.startswith("__")} - OFFERED
+
+
+def _reasons(path: Path) -> set[str]:
+    """Names in comments `# private: _name, _other: reason`, of as many lines as it needs."""
+    found = re.findall(
+        r"^# private: ((?:.|\n#   )*?):(?: |\n#   )", path.read_text("utf-8"), re.MULTILINE
+    )
+    return {name for names in found for name in re.findall(r"\b_\w+", names)}
+
+
+def test_a_private_name_in_a_test_has_its_reason(project_root: Path) -> None:
+    """A test goes through the public way; a file says why where it does not."""
+    files = sorted((project_root / "tests").rglob("*.py"))
+    left = {f.name: sorted(n) for f in files if (n := _private_names(f) - _reasons(f))}
+    # The interface to external simulators is renamed as a whole.
+    assert {n: v for n, v in left.items() if v != ["_arrays", "_density", "_exit"]} == {}
+    stale = {f.name: sorted(n) for f in files if (n := _reasons(f) - _private_names(f))}
+    assert stale == {}

@@ -12,6 +12,8 @@ from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 
+# private: _PACKAGE: the package's folder, replaced by one of the test.
+
 
 def test_a_card_says_what_the_experiment_itself_says(project_root: Path) -> None:
     files = experiment_files(project_root)

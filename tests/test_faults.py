@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+# private: _batches: called alone, case by case.
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import faults_drawn as drawing

@@ -39,7 +39,7 @@ def test_only_regular_files_are_opened(odd: dict[str, Path]) -> None:
         with pytest.raises(RecordingError):
             open_file(path)
         assert first_bytes(path, 4) == b""
-    with pytest.raises(RecordingError, match="pipe: a folder, pipe or device; expected a regular"):
+    with pytest.raises(RecordingError, match="pipe: a folder, pipe or device"):
         read_bytes(odd["pipe"])
 
 
@@ -106,7 +106,7 @@ def test_arrays_are_read_whole_or_not(tmp_path: Path) -> None:
         npz_arrays(file, 80_000)
     whole = file.read_bytes()
     file.write_bytes(whole[:-30])
-    with pytest.raises(RecordingError, match=r"a\.npz: not an archive of arrays, or damaged"):
+    with pytest.raises(RecordingError, match=r"a\.npz: not an archive of arrays"):
         npz_arrays(file, 100_000)
     np.savez(file, o=np.array([{}], dtype=object))
     with pytest.raises(RecordingError, match="allow_pickle"):

@@ -32,6 +32,8 @@ from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
 
+# private: _ROOT: the root of files, replaced by a folder of the test.
+
 
 def written(root: Path, **files: str) -> None:
     for name, text in files.items():

@@ -16,6 +16,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Markers, Recording, Signal, Source
 
+# private: _drift: called alone, case by case.
+
 OFFSET = 0.7318  # s by which the markers' clock is behind
 _GRID = np.arange(-5.0, 65.0, 0.01)
 _WALK = gaussian_filter1d(np.random.default_rng(0).normal(size=len(_GRID)), 40)
@@ -49,6 +51,7 @@ def files(folder: Path, drift: float = 0.0, noise: float = 0.01) -> tuple[str, s
 BY = ("--by", "force=-markers.tip.z")
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_an_offset_is_found_below_a_sample_and_kept(tmp_path: Path) -> None:
     out = tmp_path / "both.mcap"
     code, said, err = here("align", *files(tmp_path), *BY, "-o", str(out))

@@ -53,6 +53,11 @@ from validate.library import studies
 from validate.scene.geometries.box import box
 from validate.scene.mesh_files.third_party_meshes import ForeignBody
 
+# private: _MAX_TABLE: replaced by a small number: a short test.
+# private: _along, _content, _declared, _drawn, _holds, _metres, _part, _pictured, _place,
+#   _running, _same, _seen, _table: called alone, case by case.
+# private: _judged: replaced, to bring a case about.
+
 COARSE = [
     "--set", "body.cells=6,7,10",
 ]  # fmt: skip

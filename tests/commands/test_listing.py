@@ -6,6 +6,8 @@ import pytest
 
 from validate.commands import list as listing
 
+# private: _details, _summary: replaced, to bring a case about.
+
 
 def test_a_number_that_is_none_is_never_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(listing, "find", lambda *_: SimpleNamespace())

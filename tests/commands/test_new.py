@@ -281,7 +281,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     (slip,) = [m for m in result.methods if m.name == "slip"]
     tops = slip.scene.mesh.facet_nodes("upper_plate")
     assert slip.runs[0].u[-1][tops, 2].mean() > 0
-    with pytest.raises(RecordingError, match=r"one in compression: its drive is along '\+z'"):
+    with pytest.raises(RecordingError, match="one in compression: its drive is along"):
         run_in_memory(mine, {"drives.stage.direction": "0,0,-1"})
 
 

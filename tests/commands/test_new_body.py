@@ -131,7 +131,7 @@ def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
     assert run_name(mine, Options(coarse)) != run_name(mine, Options({}))
     found = run_in_memory(mine, coarse, quick=True)
     assert [(c.path, c.value) for c in found.changed] == [("methods.linear.body.cells", [2, 2, 2])]
-    with pytest.raises(UsageError, match=r"methods\.X\.material\.law: no method 'X'; "):
+    with pytest.raises(UsageError, match=r"methods\.X\.material\.law.*'X'"):
         run_in_memory(mine, {"methods.X.material.law": "svk"})
     text = file.read_text("utf-8")
     for old, new, why in (
@@ -352,9 +352,7 @@ def test_markers_that_the_layout_calls_otherwise_are_named(here: Path) -> None:
     laid("abcde")
     called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
     experiment = load_file(here / "experiments" / "mine.py")
-    with pytest.raises(
-        RegistrationError, match="has 'a', 'b', 'c', 'd', 'e'; the recording has 'A', "
-    ):
+    with pytest.raises(RegistrationError, match=r"'a', 'b', 'c', 'd', 'e'.*'A'"):
         run_in_memory(experiment)
     laid("ABCDX")
     assert "markers not in the layout are left out: 'E'" in run_in_memory(experiment).notes

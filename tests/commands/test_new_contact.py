@@ -18,6 +18,8 @@ from validate.pipeline.experiment.find import load_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 
+# private: _first_touch: the questions ask it of a recording only.
+
 GAP, DEPTH, RADIUS, K = 2e-4, 1e-3, 5e-3, 4e3
 T = np.linspace(0.0, 8.0, 241)
 

@@ -13,6 +13,8 @@ from validate.commands.questions import plates as new_plates
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 
+# private: _of_the_sizes: replaced, to bring a case about.
+
 ANSWERS = 'experiment = "plates"\ntest = "compression"\naccept.force = "0.1N"\n'
 
 

@@ -21,6 +21,8 @@ from validate.recording.types import Recording, Signal, Source
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh_files.mesh_file import write_mesh
 
+# private: _FIRST: replaced by a small number: a short test.
+
 SIDES, E = (0.06, 0.045, 0.07), 20e3
 ANSWERS = {"test": "compression", "accept.force": "0.1N", "why.force": "felt"}
 SIZES = {

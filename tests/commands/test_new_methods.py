@@ -11,6 +11,8 @@ from validate.pipeline.bodies.body_dynamics import METHODS, MovingName, fits_mot
 from validate.scene.material import LawName
 from validate.solve.schemes import SCHEMES
 
+# private: _ORDER, _USUAL: must name every method that a user may choose.
+
 KINDS = ("moves", "follows", "pulls", "weighs", "releases")
 
 

@@ -31,6 +31,8 @@ from validate.recording.types import Markers, Recording, Signal, Source
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh_files.mesh_file import write_mesh
 
+# private: _asked: every question at once, without a terminal.
+
 G = 9.80665
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 PRESSURES = {"": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6}

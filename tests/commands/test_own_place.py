@@ -11,6 +11,8 @@ from study_samples import experiment_file
 from validate.report import write
 from validate.report.stored.folder import MARK
 
+# private: _fill: replaced, to bring a case about.
+
 
 @pytest.fixture(autouse=True)
 def _draws_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -97,6 +97,7 @@ def test_the_tour_of_the_readme_runs_word_by_word(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_log_with_images_runs_as_printed(own_files: Path, project_root: Path) -> None:
     pressed_in_images(own_files, project_root)
     outputs = {}

@@ -33,6 +33,8 @@ from validate.recording.types import Recording, Source
 from validate.report.stored.store import check_members
 from validate.report.views.bars import bar
 
+# private: _besides, _passages: called alone, case by case.
+
 PAGE = Path("report.html")
 
 

@@ -20,6 +20,8 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
 from validate.report.stored.store import schema
 
+# private: _places: called alone, case by case.
+
 SWEEPS = ("--sweep", "methods.kf.Q=1e-13,1e-11,-1", "--sweep", "twin.noise=1e-11,1e-10")
 CELLS = 6 + 4  # of the sweep, and two baselines for each of two noises
 

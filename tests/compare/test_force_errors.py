@@ -83,11 +83,11 @@ def test_what_cannot_be_compared_is_refused() -> None:
     y = pulse(T)
     with pytest.raises(ComparisonError, match="in N against 1 in mN"):
         force_pair("F", signal(y), signal(y, unit="mN"), 0.5, "reference")
-    with pytest.raises(ComparisonError, match="0 of 600 reference samples lie within the run"):
+    with pytest.raises(ComparisonError, match="0 of 600 reference"):
         force_pair("F", signal(y, T + 100), signal(y), 0.5, "reference")
     with pytest.raises(ComparisonError, match="F: no phase error: "):
         scores(signal(np.sin(10 * np.pi * (T - 0.05))), signal(np.sin(10 * np.pi * T)))
-    with pytest.raises(ComparisonError, match=r"F: no phase error: the streams correlate by 0\."):
+    with pytest.raises(ComparisonError, match=r"F: no phase error.*0\."):
         scores(signal(np.random.default_rng(1).normal(size=len(T))), signal(y))
     with pytest.raises(ComparisonError, match="the reference force is always 0"):
         scores(signal(y), signal(0 * y))

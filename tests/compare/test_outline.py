@@ -110,7 +110,7 @@ def test_outline_with_a_pocket_is_refused() -> None:
 def test_outline_that_crosses_itself_is_refused(measure) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ComparisonError, match=r"outline of 4 points .*Self-intersection"):
         measure(SQUARE[[0, 1, 3, 2]])
-    with pytest.raises(ComparisonError, match="outline of 3 points is not a simple curve"):
+    with pytest.raises(ComparisonError, match="outline of 3 points is not a simple"):
         measure(np.array([[0.0, 0], [1, 0], [2, 0]]))
 
 

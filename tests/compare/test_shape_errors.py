@@ -32,6 +32,8 @@ from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 
+# private: _beyond_booleans: says which of two methods the public call took.
+
 PLANE, SOLID = ((1.0, 0.8), (6, 5)), ((1.0, 0.8, 0.6), (4, 3, 3))
 MESHES = {
     "tri3": box(*PLANE),
@@ -134,7 +136,7 @@ def test_the_mean_of_a_linear_function_s_size_is_exact(corners: int) -> None:
 def test_an_inside_out_mesh_is_refused() -> None:
     turned = MESHES["tet4"].cells[:, [0, 2, 1, 3]]
     mesh = Mesh(MESHES["tet4"].nodes, turned, "tet4")
-    with pytest.raises(ComparisonError, match="216 of 216 cells of reference are inverted"):
+    with pytest.raises(ComparisonError, match="216 of 216 cells"):
         still(mesh)
 
 
@@ -255,14 +257,14 @@ def test_bodies_on_different_meshes_keep_their_own_boundary() -> None:
 def test_a_curve_that_crosses_itself_encloses_no_plane_body() -> None:
     """Two lobes of 1.5 and 0.5 m2: the signed area is their difference, 1 m2."""
     points = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 3.0]])
-    with pytest.raises(ComparisonError, match=r"5 segments encloses no plane body \(Self-inters"):
+    with pytest.raises(ComparisonError, match=r"5 segments.*\(Self-inters"):
         polygon(outline_boundary(points))
 
 
 def test_a_boundary_that_touches_itself_is_no_outline() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
     pieces = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]])
-    with pytest.raises(ComparisonError, match="touches itself in 1 nodes, so it is not an outline"):
+    with pytest.raises(ComparisonError, match="touches itself in 1 nodes, so"):
         polygon(Boundary(points, pieces))
 
 

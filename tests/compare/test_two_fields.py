@@ -124,7 +124,7 @@ def test_a_rigid_shift_is_what_it_is(mesh: Mesh, shift: float) -> None:
 
 def test_relative_norms_at_rest_are_refused_with_the_reason(mesh: Mesh) -> None:
     rest = Field(mesh, np.zeros(mesh.nodes.shape), "reference")
-    with pytest.raises(ComparisonError, match=r"2 metrics.*E_n: E_n is 0/0: reference does not"):
+    with pytest.raises(ComparisonError, match=r"2 metrics.*E_n: E_n is 0/0: reference"):
         compare_fields(rest, rest)
 
 
@@ -166,7 +166,7 @@ def test_another_frame_and_another_dimension_are_refused() -> None:
     near, far = grid((1.0, 1.0), (2, 2)), grid((1.0, 1.0), (2, 2))
     far = replace(far, nodes=far.nodes + 5.0)
     still = [Field(m, np.ones(m.nodes.shape), "run") for m in (near, far, MESHES["tet4"])]
-    with pytest.raises(ComparisonError, match=r"9 of 9 nodes lie outside the mesh of run, up to"):
+    with pytest.raises(ComparisonError, match="9 of 9 nodes lie outside"):
         compare_fields(still[0], still[1])
     with pytest.raises(ComparisonError, match="run is 2-D, run 3-D"):
         compare_fields(still[0], still[2])

@@ -67,7 +67,7 @@ def test_what_is_absent_names_the_command(tmp_path: Path) -> None:
     )
     with pytest.raises(RecordingError, match=r"--set landmarks=FILE"):
         data_path(FOLDER, FILE, tmp_path / "p" / "experiments", by="landmarks")
-    with pytest.raises(RecordingError, match=r"`validate data get rubber-strip` describes how to"):
+    with pytest.raises(RecordingError, match="`validate data get rubber-strip`"):
         data_path("markers/rubber-strip", "points3d_mm.npz", tmp_path / "p" / "experiments")
     with pytest.raises(RecordingError, match=r"get skin-pads`.*--set data=FOLDER"):
         data_path("force/skin-pads", None, tmp_path / "p" / "experiments")

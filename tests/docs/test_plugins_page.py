@@ -25,6 +25,8 @@ from validate.testing import (
     scheme_contract,
 )
 
+# private: _added: plug-ins of the test are taken out again.
+
 ROOT = Path(__file__).parents[2]
 BLOCKS = re.findall(
     r"```python\n(.*?)```", (ROOT / "docs" / "plugins.md").read_text("utf-8"), re.DOTALL

@@ -18,6 +18,8 @@ from validate.engine.identity import digest
 from validate.engine.queue import Queue
 from validate.errors import UsageError
 
+# private: _dask, _size: replaced, to bring a case about.
+
 HERE = {"validate": "a" * 64}
 CELLS = (Waiting("a"), Waiting("b"))
 

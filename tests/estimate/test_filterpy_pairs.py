@@ -30,6 +30,8 @@ from validate.estimate.reduced.sampled_kalman import (
 )
 from validate.testing.pulled_cube import case
 
+# private: _apart: replaced, to bring a case about.
+
 
 @pytest.mark.parametrize("row", oracle_table(), ids=lambda r: r.pair)
 def test_our_filters_are_filterpys_to_rounding(row: OracleRow) -> None:

@@ -42,6 +42,8 @@ from validate.testing.pulled_cube import (
     cube,
 )
 
+# private: _doubled: compared with scipy, and where it diverges.
+
 
 @pytest.fixture(scope="module")
 def pulled() -> PulledCase:

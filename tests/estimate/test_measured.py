@@ -42,9 +42,7 @@ def test_rows_without_a_value_and_rest_are_left_out() -> None:
 
 def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> None:
     seen = case().measured(1, every=5)
-    with pytest.raises(
-        ComparisonError, match=r"0\.33 steps of 0\.003 s off .* take dt = 0\.0025 s"
-    ):
+    with pytest.raises(ComparisonError, match=r"0\.33 steps of 0\.003 s.*dt = 0\.0025 s"):
         timetable(seen, 0.003)
     assert len(timetable(seen, 0.0025).z) == 12
     irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))
@@ -56,7 +54,7 @@ def test_two_measurements_in_a_step_are_refused() -> None:
     seen = case().measured(1)
     with pytest.raises(
         ComparisonError,
-        match=r"60 measurements lie on 1 steps of 0.01 s; choose a step of at most 1e-06 s",
+        match=r"60 measurements.*1 steps of 0.01 s.*1e-06",
     ):
         timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
 
@@ -184,7 +182,7 @@ def test_measurements_that_teach_a_filter_nothing_are_refused(call: Any, says: s
 def test_a_shape_of_a_load_that_moves_nothing_measured_cannot_be_estimated() -> None:
     system = cube()
     H = np.zeros((1, len(system.free)))
-    with pytest.raises(SceneError, match="a load moves no measured component, so its shape cannot"):
+    with pytest.raises(SceneError, match="a load moves no measured component, so"):
         load_shapes(system, H)
     H[0, -1] = 2.0
     assert (H @ load_shapes(system, H)).tolist() == [[pytest.approx(1.0)]]
@@ -193,5 +191,5 @@ def test_a_shape_of_a_load_that_moves_nothing_measured_cannot_be_estimated() -> 
 def test_one_shape_is_for_one_load() -> None:
     scene = cube().scene
     two = build(replace(scene, loads=(*scene.loads, replace(scene.loads[0], name="side"))))
-    with pytest.raises(SceneError, match="2 loads: one shape needs exactly one load"):
+    with pytest.raises(SceneError, match="2 loads: one shape needs exactly one"):
         LoadScale().prepare(two, case().measured(1, every=5))

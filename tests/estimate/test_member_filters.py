@@ -35,6 +35,9 @@ from validate.solve.march import march
 from validate.solve.types import Outcome, Run
 from validate.testing.pulled_cube import DT, PAPER, SMALL, TOP, PulledCase, case, cube
 
+# private: _basis, _moved: called alone, case by case.
+# private: _corrected: replaced, to bring a case about.
+
 # --- sigma points ---------------------------------------------------------------------------------
 
 

@@ -8,6 +8,10 @@ from beside import beside
 
 from experiments.bending_rod import exhibits as rod_exhibits
 
+# private: _MESHES: replaced by a small number: a short test.
+# private: _dips, _motion: called alone, case by case.
+# private: _tips: replaced, to bring a case about.
+
 
 def test_a_tip_that_hangs_is_a_positive_sag(monkeypatch: pytest.MonkeyPatch) -> None:
     def tips(system: object, t: np.ndarray) -> tuple[np.ndarray, float]:

@@ -19,6 +19,11 @@ from validate.scene.geometries.hollow_block import Cavities, HollowBlock
 from validate.scene.scene import Cavity
 from validate.solve.fluid.pressure_curve import RATIOS
 
+# private: _MOST: replaced by a small number: a short test.
+# private: _SEPTA: a limit or list of the code, which the test must meet exactly.
+# private: _follower: called alone, case by case.
+# private: _wall: replaced, to bring a case about.
+
 NAME = "fluid_block"
 block, curves, updates = (beside(NAME, module) for module in ("block", "curves", "updates"))
 condensed_block, curve_exhibit, curve_of = (
@@ -82,7 +87,7 @@ def test_cavities_stand_in_a_row(count: int) -> None:
 def test_every_cavity_has_a_fluid_of_its_own_and_none_is_refused() -> None:
     scene = block.slab(with_given(DECLARED, {"body.cavities.count": 3}), None)
     assert [(c.name, c.facets) for c in scene.cavities] == [(f"cavity{k}",) * 2 for k in range(3)]
-    with pytest.raises(SceneError, match="no facet set begins with 'hole'; the body has bottom, "):
+    with pytest.raises(SceneError, match="no facet set begins with 'hole'"):
         block.slab(with_given(DECLARED, {"cavities": (Cavity("a", "hole*"),)}), None)
 
 
@@ -238,9 +243,7 @@ def test_a_volume_that_no_pressure_gives_is_refused(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(curves, "_wall", lambda surface, x, A, u, P: u)
     monkeypatch.setattr(curves, "volume_of", lambda surface, x: 1.0)
     still = np.zeros((2, 2))
-    with pytest.raises(
-        SceneError, match="no pressure with following normals gives the volume 3: o"
-    ):
+    with pytest.raises(SceneError, match=r"no pressure.*volume 3"):
         curves._follower(None, still, None, still, 3.0, 0.0)
 
 
@@ -268,9 +271,7 @@ def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_re
 ) -> None:
     monkeypatch.setattr(curves, "pressure_load", lambda surface, x: x)
     x = np.array([[1.0], [2.0]])
-    with pytest.raises(
-        SceneError, match=r"the wall does not settle at 1 Pa: it still moves by .* m"
-    ):
+    with pytest.raises(SceneError, match=r"the wall does not settle at 1 Pa.* m"):
         curves._wall(None, x, 2.0 * np.eye(2), np.zeros_like(x), 1.0)
     settled = curves._wall(None, x, 0.5 * np.eye(2), np.zeros_like(x), 1.0)
     assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2
@@ -278,7 +279,5 @@ def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_re
     for name in ("driving", "validating"):
         monkeypatch.setattr(block, name, lambda *_, **__: None)
     scene = SimpleNamespace(cavities=(SimpleNamespace(name="cavity0"),))
-    with pytest.raises(
-        ComparisonError, match=r"r: no signal 'pressure0' for cavity 0 of 1; it has"
-    ):
+    with pytest.raises(ComparisonError, match=r"r.*signal 'pressure0' for cavity 0 of 1"):
         block.place(recording, DECLARED, scene)

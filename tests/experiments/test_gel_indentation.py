@@ -26,6 +26,10 @@ from validate.scene.mesh import quadratic
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
 
+# private: _FEWEST: a limit or list of the code, which the test must meet exactly.
+# private: _axis: positions of points that no shipped recording has.
+# private: _require: called alone, case by case.
+
 
 def tree(**values: str) -> Tree:
     found: Tree = with_values(experiment("gel_indentation").parameters, values)
@@ -107,7 +111,7 @@ def test_which_files_are_a_pair_is_asked_for(tmp_path: Path) -> None:
 
 def test_a_box_without_volume_is_refused() -> None:
     box = GelBoxes(x=0.0, y=0.0, side=1e-4, bottom=2e-5, middle=1e-5, top=5e-5)
-    with pytest.raises(UsageError, match=r"the lower box has no volume: side 100\.0 um"):
+    with pytest.raises(UsageError, match=r"side 100\.0 um"):
         replace(box, which="lower").ends()
     assert box.ends()[1].tolist() == pytest.approx([5e-5, 5e-5, 5e-5])
 
@@ -165,9 +169,7 @@ def test_a_ratio_that_is_open_and_clouds_that_are_none_are_refused(
 ) -> None:
     sizes = {"x": "0", "y": "0", "side": "1mm", "bottom": "0", "middle": "1mm", "top": "2mm"}
     p = tree(**{f"body.{name}": text for name, text in sizes.items()})
-    with pytest.raises(
-        UsageError, match=r"material.nu is not set; give it with --set material.nu="
-    ):
+    with pytest.raises(UsageError, match=r"material.nu.*--set material.nu="):
         box_module.build(None, p, None)  # type: ignore[arg-type]
     points = SimpleNamespace(x=np.zeros((1, 4, 2)))
     for markers, says in (
@@ -186,13 +188,11 @@ def test_a_folder_of_one_file_and_pixels_of_no_size_are_refused(
 ) -> None:
     monkeypatch.setattr(pair_module, "data_path", lambda *_: tmp_path)
     (tmp_path / "a.mat").write_bytes(b"1")
-    with pytest.raises(
-        RecordingError, match="1 MATLAB files; a pair is needed: choose it, --set be"
-    ):
+    with pytest.raises(RecordingError, match=r"1 MATLAB.*--set"):
         pair_module.files(None, (None, None), tmp_path)
     (tmp_path / "b.mat").write_bytes(b"2")
     both = (tmp_path / "a.mat", tmp_path / "b.mat")
     assert pair_module.files(None, (None, None), tmp_path) == both
     assert pair_module.side_of(4e-7, both[0]) == 4e-7
-    with pytest.raises(UsageError, match=r"a.mat is in pixels of unknown size; measure it"):
+    with pytest.raises(UsageError, match=r"a.mat is in pixels of unknown size"):
         pair_module.side_of(None, both[0])

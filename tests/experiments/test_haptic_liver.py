@@ -27,6 +27,9 @@ from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.solve.haptic.loop import HapticStepper
 
+# private: _LIVE_SECONDS: replaced by a small number: a short test.
+# private: _first_too: asks the system for a priority: not in a test.
+
 TWIN = beside("haptic_liver", "twin")
 STOPS, ToolPath = TWIN.STOPS, TWIN.ToolPath
 follows, place, touched_place, way = TWIN.follows, TWIN.place, TWIN.touched_place, TWIN.way

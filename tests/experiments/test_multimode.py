@@ -173,9 +173,7 @@ def test_natural_rubber_of_1944(shared_data: Path) -> None:
 def test_two_curves_of_one_mode_and_planes_that_are_none_are_refused(tmp_path: Path) -> None:
     two = "stretch_1,stretch_2,stress_1_[MPa],stress_2_[MPa]\n1,1,0,0\n1.5,1,.2,.1\n2,1,.3,.2\n"
     (tmp_path / "rubber_uniaxial.csv").write_text(two + "2.5,1,.4,.3\n")
-    with pytest.raises(
-        RecordingError, match="two stretches in mode uniaxial; only a plane has two"
-    ):
+    with pytest.raises(RecordingError, match="two stretches in mode uniaxial"):
         load(Multimode(data=str(tmp_path)), tmp_path)
     one = "stretch,stress_[MPa]\n1,0\n1.5,.2\n2,.3\n2.5,.4\n"
     (tmp_path / "rubber_uniaxial.csv").write_text(one)

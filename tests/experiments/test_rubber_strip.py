@@ -77,10 +77,10 @@ def test_the_deviation_of_a_mean_stretch_is_that_of_many_trackings() -> None:
 
 def test_too_few_points_are_said() -> None:
     x = strip(AXIAL, AXIAL**-0.4)
-    with pytest.raises(RecordingError, match="120 points seen at rest, 180 needed for 30 patches"):
+    with pytest.raises(RecordingError, match=r"120 points.*180 needed for 30 patches"):
         stretches(x, 30)
     x[5, 30:56] = np.nan
-    with pytest.raises(RecordingError, match="state 5: 4 of 30 points of a patch are seen"):
+    with pytest.raises(RecordingError, match="state 5: 4 of 30 points"):
         stretches(x, 4)
 
 
@@ -90,12 +90,10 @@ def test_archives_say_their_unit_and_hold_no_programs(tmp_path: Path) -> None:
         read_points(path)
     assert read_points(path, "mm").marker("points").x.shape == (13, 120, 3)
     np.savez(tmp_path / "other_mm.npz", faces=np.zeros((2, 3)))
-    with pytest.raises(RecordingError, match="no numbers 'points'; it holds \\['faces'\\]"):
+    with pytest.raises(RecordingError, match=r"'points'.*\['faces'\]"):
         read_points(tmp_path / "other_mm.npz")
     np.savez(tmp_path / "whole_mm.npz", points=np.ones((2, 5, 3), dtype="int32"))
-    with pytest.raises(
-        RecordingError, match=r"points \(2, 5, 3\) int32: a list of indices .* as float"
-    ):
+    with pytest.raises(RecordingError, match=r"points \(2, 5, 3\) int32.* as float"):
         read_points(tmp_path / "whole_mm.npz")
     np.savez(tmp_path / "object_mm.npz", points=np.array([{}, None], dtype=object))
     with pytest.raises(RecordingError, match="not an archive of arrays"):
@@ -109,7 +107,7 @@ def test_archives_say_their_unit_and_hold_no_programs(tmp_path: Path) -> None:
 
 def test_a_strip_that_does_not_reach_beyond_its_first_steps_is_said(tmp_path: Path) -> None:
     path = written(tmp_path)
-    with pytest.raises(RecordingError, match=r"12 states up to first = 40 % axial strain"):
+    with pytest.raises(RecordingError, match=r"12 states.*first = 40 %"):
         load(with_given(TREE, {"recording": str(path), "first": 0.4}), tmp_path)
 
 

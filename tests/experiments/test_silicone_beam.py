@@ -303,7 +303,7 @@ def test_printed_positions_are_those_of_the_load() -> None:
 
 
 def test_coefficients_that_no_law_knows_are_refused(beam: Experiment, shared_data: Path) -> None:
-    with pytest.raises(SceneError, match=r"law 'neo_hooke' does not know C01 = 8000\.0"):
+    with pytest.raises(SceneError, match=r"'neo_hooke'.*know C01 = 8000\.0"):
         errors(beam, shared_data / BEAM.format("gravity_V2_b"), "material.C01=8000")
 
 
@@ -339,5 +339,5 @@ def test_the_loaded_swing_is_predicted_from_the_one_under_gravity(
 
 
 def test_a_recording_without_markers_is_no_beam() -> None:
-    with pytest.raises(RecordingError, match="r: no markers; record those of a motion capture"):
+    with pytest.raises(RecordingError, match="r: no markers; record those"):
         named(Recording("r", Source("r", "", 0, ""), 0))

@@ -34,6 +34,8 @@ from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
 from validate.scene.scene import Dilatation, Scene
 from validate.scene.shape_functions import EDGES
 
+# private: _renumbered, _require_node_major: scikit-fem does not bring the error about.
+
 KINDS = [("linear", 1, "pointwise"), ("nodal_mean", 1, "nodal_mean"), ("quadratic", 2, "pointwise")]
 each_kind = pytest.mark.parametrize(
     ("order", "dilatation"), [k[1:] for k in KINDS], ids=[k[0] for k in KINDS]
@@ -210,7 +212,7 @@ def test_what_cannot_be_assembled_is_refused() -> None:
     cells = kuhn_cells((3, 3, 3))
     cells[5, [0, 1]] = cells[5, [1, 0]]
     inverted = Mesh(grid_mesh((3, 3, 3)).nodes, cells, "tet4")
-    with pytest.raises(SceneError, match="1 of 48 elements inverted or flat, worst element 5 "):
+    with pytest.raises(SceneError, match=r"1 of 48 elements.*element 5"):
         stiffness(Scene(inverted, Material(1.0, 0.3)))
 
 
@@ -219,8 +221,8 @@ def test_a_library_that_numbers_otherwise_is_an_error_of_ours() -> None:
     nodes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]])
     places = np.repeat(nodes, 2, axis=0).T
     _require_node_major(places, nodes, 2)
-    with pytest.raises(AssertionError, match="numbers its unknowns differently from the mesh"):
+    with pytest.raises(AssertionError, match="numbers its unknowns differently from"):
         _require_node_major(places[:, ::-1], nodes, 2)
     assert _renumbered(nodes[[2, 0, 1]], nodes).tolist() == [1, 2, 0]
-    with pytest.raises(AssertionError, match="has unknowns at other places than the nodes"):
+    with pytest.raises(AssertionError, match="has unknowns at other places than"):
         _renumbered(nodes + 1e-6, nodes)

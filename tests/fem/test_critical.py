@@ -24,6 +24,8 @@ from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh, boundary_facets, quadratic
 from validate.scene.scene import Scene, Support
 
+# private: _density, _require: called alone, case by case.
+
 GEL = Material(3e4, 0.49, rho=1000.0)
 HELD = (Support("z0", (0, 1, 2)),)
 
@@ -189,13 +191,11 @@ def test_a_missing_density_is_named() -> None:
 
 def test_what_has_no_critical_step_is_reported() -> None:
     assert module._density(Material(1.0, 0.3, rho=5.0)) == 5.0
-    with pytest.raises(SceneError, match="a critical step needs the density; set rho kg/m3 of eve"):
+    with pytest.raises(SceneError, match=r"a critical step needs.*kg/m3"):
         module._density(Material(1.0, 0.3))
     scene = SimpleNamespace(
         mesh=SimpleNamespace(kind="tet4"), material=Material(1.0, 0.3, "svk"), regions=(),
         membranes=(None,), dilatation="pointwise",
     )  # fmt: skip
-    with pytest.raises(
-        SceneError, match="membranes are linear only: remove them, or use the linear"
-    ):
+    with pytest.raises(SceneError, match="membranes are linear only: remove"):
         explicit._require(scene)  # type: ignore[arg-type]

@@ -112,11 +112,9 @@ def test_a_step_beyond_the_limit_is_refused_with_the_limit() -> None:
 
 def test_what_has_no_explicit_form_is_refused() -> None:
     scene = body()
-    with pytest.raises(
-        SceneError, match="explicit hexahedra must be mixed, because pointwise ones lock"
-    ):
+    with pytest.raises(SceneError, match="explicit hexahedra must be mixed"):
         ExplicitBody(replace(scene, dilatation="pointwise", regions=()))
-    with pytest.raises(SceneError, match=r"support the laws neo_hooke, .*not 'svk' \(split\)"):
+    with pytest.raises(SceneError, match=r"support the laws neo_hooke.*'svk' \(split\)"):
         ExplicitBody(replace(scene, material=sample("svk"), regions=()))
     with pytest.raises(SceneError, match="hex27 have no explicit form"):
         ExplicitBody(replace(scene, body=quadratic(grid((1.0,) * 3, (3, 2, 2))), regions=()))

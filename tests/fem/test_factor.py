@@ -71,7 +71,7 @@ def test_indefinite_matrix_is_refused(shift: float) -> None:
 
 def test_one_negative_pivot_is_enough() -> None:
     A = sparse.csr_array(np.diag([1.0, 2.0, -1e-3, 4.0]))
-    with pytest.raises(SceneError, match=r"smallest pivot -2.5e-04 of the largest, 1 not positive"):
+    with pytest.raises(SceneError, match=r"pivot -2.5e-04.*1"):
         factorise(A, np.arange(4), np.eye(4, 3))
 
 
@@ -97,7 +97,7 @@ def test_an_empty_column_is_refused_before_blas_complains(
 def test_entries_that_are_not_finite_are_refused() -> None:
     A, places = grid_laplacian(4)
     A.data[3] = np.inf
-    with pytest.raises(SceneError, match="1 entries of the stiffness matrix are not finite"):
+    with pytest.raises(SceneError, match="1 entries of the stiffness matrix"):
         factorise(A, np.arange(len(places)), places)
 
 

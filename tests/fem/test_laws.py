@@ -143,8 +143,8 @@ def test_volume_work_of_both_forms() -> None:
 
 
 def test_what_has_no_form_at_large_strain_or_no_isochoric_part_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"law 'linear' has no large-strain form; choose one of"):
+    with pytest.raises(SceneError, match="law 'linear' has no large-strain form"):
         law_of(Material(1.0, 0.3))
     coupled = Material(1.0, 0.3, "neo_hooke", coefficients=Coefficients(volumetric="coupled"))
-    with pytest.raises(SceneError, match="law 'neo_hooke' in its coupled form has no isochoric pa"):
+    with pytest.raises(SceneError, match=r"'neo_hooke'.*coupled"):
         law_of(coupled, isochoric=True)

@@ -18,6 +18,8 @@ from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Load, Mass, Membrane, Pin, Scene, Support
 
+# private: _require_plain: called alone, case by case.
+
 
 def compliance(scene: Scene) -> float:
     """f u J of the scene's own elements under one unit of its first load."""

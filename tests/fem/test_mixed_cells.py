@@ -265,7 +265,7 @@ def test_two_regions_are_two_bodies_side_by_side() -> None:
 
 
 def test_what_cannot_be_mixed_is_refused() -> None:
-    with pytest.raises(SceneError, match="not tet4 in plane strain; use 'nodal_mean'"):
+    with pytest.raises(SceneError, match=r"tet4.*'nodal_mean'"):
         Scene(box((1.0,) * 3, (1, 1, 1)), SOFT, dilatation="mixed")
     with pytest.raises(SceneError, match="not quad4 in plane stress"):
         Scene(grid((1.0, 1.0), (1, 1)), SOFT, plane="stress", dilatation="mixed")

@@ -83,13 +83,13 @@ def test_the_volume_follows_the_stretches() -> None:
 def test_states_that_a_law_does_not_have_are_refused() -> None:
     with pytest.raises(SceneError, match="law 'linear' has no large-strain form"):
         response(point("uniaxial", "linear"), STRETCHES)
-    with pytest.raises(SceneError, match=r"stretch 0.5: the law 'svk' is valid above 0.5774"):
+    with pytest.raises(SceneError, match=r"stretch 0.5.*'svk'.*above 0.5774"):
         response(point("uniaxial", "svk"), np.array([0.5]))
-    with pytest.raises(SceneError, match="stretch 0: the law 'neo_hooke' is valid above 0"):
+    with pytest.raises(SceneError, match=r"stretch 0.*'neo_hooke'.*above 0"):
         response(point("uniaxial", "neo_hooke"), np.array([0.0]))
-    with pytest.raises(SceneError, match=r"stretch 6: the law 'yeoh' is valid above 0.2 up to 5"):
+    with pytest.raises(SceneError, match=r"stretch 6.*'yeoh'.*above 0.2 up to 5"):
         response(point("uniaxial", "yeoh"), np.array([0.3, 6.0]))
-    with pytest.raises(SceneError, match="at stretch 2 no lateral stretch gives zero stress"):
+    with pytest.raises(SceneError, match="at stretch 2 no lateral stretch gives"):
         response(point("uniaxial", "svk"), np.array([1.1, 2.0]))
     with pytest.raises(SceneError, match="stretches: 1 of 1 values not finite"):
         response(point("uniaxial", "svk"), np.array([np.nan]))

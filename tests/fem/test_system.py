@@ -232,7 +232,7 @@ def test_a_body_whose_nodes_are_all_held_is_refused_with_the_elements_it_takes()
     held = (Support("z0", (0, 1, 2)), Support("z1", (0, 1)))
     stage = Drive("stage", "z1", (0.0, 0.0, -1.0))
     pressed = Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), held, drives=(stage,))
-    with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes are held .*at least 2 elem"):
+    with pytest.raises(SceneError, match=r"all 24 unknowns of 8 nodes.*least 2 elem"):
         build(pressed)
 
 
@@ -241,10 +241,8 @@ def test_columns_know_no_loads_and_no_large_strain() -> None:
         box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), (Support("z0", (0, 1, 2)),),
         loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
     )  # fmt: skip
-    with pytest.raises(
-        SceneError, match="response columns support drives and cavities only; for loads"
-    ):
+    with pytest.raises(SceneError, match="response columns support drives"):
         responses(build(scene))
     large = replace(scene, material=Material(1.0, 0.3, "svk"))
-    with pytest.raises(SceneError, match="a linear scheme cannot solve the law 'svk'; use Static"):
+    with pytest.raises(SceneError, match="a linear scheme cannot solve the law"):
         responses(build(large))

@@ -7,6 +7,10 @@ import pytest
 from validate.fem.kernels import threads
 from validate.fem.kernels.threads import Team, ThreadChoice, candidates, chosen, idle_of, pilot
 
+# private: _BETWEEN_S: replaced by a small number: a short test.
+# private: _LOADAVG: a file of the system, replaced by one of the test.
+# private: _running: called alone, case by case.
+
 US = 1e-6
 
 

@@ -145,12 +145,10 @@ def test_a_stiffened_material_has_all_of_its_isochoric_part_stiffer(name: str) -
 
 
 def test_what_cannot_relax_is_refused() -> None:
-    with pytest.raises(SceneError, match="2 moduli and 1 times: expected one of each"):
+    with pytest.raises(SceneError, match="2 moduli and 1 times"):
         Prony((1.0, 2.0), (0.1,))
     for wrong in ((-0.1,), (np.nan,)):
-        with pytest.raises(
-            SceneError, match="expected positive numbers, otherwise a branch creates energy"
-        ):
+        with pytest.raises(SceneError, match="expected positive numbers, otherwise"):
             Prony(wrong, (0.1,))
     for law in ("linear", "svk"):
         with pytest.raises(SceneError, match=f"law '{law}' .* has no isochoric part"):

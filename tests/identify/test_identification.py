@@ -175,7 +175,7 @@ def test_none_that_converges_is_one_line_with_numbers() -> None:
     def noise(x: Floats) -> Floats:
         return 100 * rough.normal(size=5)
 
-    with pytest.raises(ComparisonError, match=r"a, b: none of 2 starts converged \(lowest chi-sq"):
+    with pytest.raises(ComparisonError, match=r"b.*2 starts.*\(lowest"):
         identify(TWO, InTurn(noise), starts=2)
 
 
@@ -296,7 +296,7 @@ def test_a_simulation_that_breaks_first_later_or_compares_nothing() -> None:
     assert (once.failure, once.calls) == ("cells turned over", 2)
     with pytest.raises(ComparisonError, match=r"cells turned\s+over"):
         CalledOnce(residual)(np.array([0.9]))
-    with pytest.raises(ComparisonError, match="0 matched samples, so nothing can be identified"):
+    with pytest.raises(ComparisonError, match="0 matched samples, so nothing can"):
         CalledOnce(lambda x: np.zeros(0))(np.array([0.1]))
 
 

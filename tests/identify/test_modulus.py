@@ -26,6 +26,8 @@ from validate.identify.modulus import (
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording, Signal, Source
 
+# private: _fit, _parabola_start: called alone, case by case.
+
 DISC = CylinderSize(0.05, 0.03)
 E = 60e3  # Pa
 SPEED = 10e-3 / 60  # m/s, sampled at 10 Hz as the real logs are
@@ -238,7 +240,7 @@ def test_gents_correction_is_the_data_sets() -> None:
 
 def test_refusals_hold_the_numbers() -> None:
     d, force = linear()
-    with pytest.raises(RecordingError, match=r"strain from 0.0000 to 0.0272 with 41 samples"):
+    with pytest.raises(RecordingError, match=r"from 0.0000 to 0.0272 with 41 samples"):
         fit_modulus(log(d[:50], force[:50]))
     with pytest.raises(RecordingError, match="with 9 samples in the window"):
         fit_modulus(log(d, force), window=(0.005, 0.0099))
@@ -310,7 +312,7 @@ def test_a_signal_of_two_columns_and_one_strain_are_refused() -> None:
     wide = Signal(two.signals["force"].t, np.column_stack([force, force]), "N", 0.0, "machine")
     with pytest.raises(RecordingError, match="'force' has 2 columns, expected 1"):
         fit_modulus(replace(two, signals={**two.signals, "force": wide}))
-    with pytest.raises(RecordingError, match=r"synthetic: 12 samples at one strain 0\.031250"):
+    with pytest.raises(RecordingError, match=r"synthetic: 12 samples.*strain 0\.031250"):
         modulus._fit("synthetic", np.full(12, 0.03125), np.arange(12.0), 1.0, 0.0, 0.0, (0.0, 0.1))
 
 

@@ -173,19 +173,17 @@ def test_tension_keeps_its_sign_and_unloading_is_left_out_and_said(tmp_path: Pat
 
 def test_what_are_no_repeats_is_refused(tmp_path: Path) -> None:
     a, b = logs(tmp_path, 1.0, 1.1)
-    with pytest.raises(
-        UsageError, match=r"2 logs, log0, log1: their specimens are not declared.*--specimens one"
-    ):
+    with pytest.raises(UsageError, match=r"2 logs, log0, log1: their.*--specimens"):
         labels_of(None, [a, b])
-    with pytest.raises(UsageError, match="3 labels for 2 logs, in the order log0, log1"):
+    with pytest.raises(UsageError, match=r"3 labels for 2 logs.*order log0, log1"):
         labels_of("A,A,B", [a, b])
     with pytest.raises(RecordingError, match="1 logs; a mean needs at least 2"):
         averaged([a], ("1",), "mean")
     wide = log(tmp_path, "wide", 1.0, "Height: 20 mm\n")
-    with pytest.raises(RecordingError, match=r"one size, but height_m of 1 of 2 logs is 0\.02"):
+    with pytest.raises(RecordingError, match=r"height_m of 1 of 2 logs is 0\.02"):
         averaged([a, wide], ("1", "2"), "mean")
     pulled = read_instron(tmp_path / "log1.csv", {"test": "tension"})
-    with pytest.raises(RecordingError, match="of one test, these are of compression, tension"):
+    with pytest.raises(RecordingError, match="of one test, these are of compression"):
         averaged([a, pulled], ("1", "2"), "mean")
 
 
@@ -208,7 +206,7 @@ def test_a_damaged_share_is_refused(tmp_path: Path) -> None:
 def test_what_no_machine_wrote_and_loadings_without_overlap_are_refused(tmp_path: Path) -> None:
     a, b = logs(tmp_path, 1.0, 1.1)
     bare = replace(b, metadata={})
-    with pytest.raises(UsageError, match="log1 is not a log of a testing machine; only such logs"):
+    with pytest.raises(UsageError, match="log1 is not a log of a testing"):
         labels_of("one", [a, bare])
     far = [log(tmp_path, f"far{i}", 1.0, d=np.where(D > 0, D + 5.0 * i, 0.0)) for i in range(2)]
     with pytest.raises(RecordingError, match=r"share the displacements .* mm with \d samples"):

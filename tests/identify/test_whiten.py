@@ -39,5 +39,5 @@ def test_unstated_noise_is_as_large_as_what_is_shared() -> None:
 
 
 def test_a_sensor_without_any_uncertainty_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="force@1: 3 values with a standard deviation"):
+    with pytest.raises(ComparisonError, match="force@1: 3 values"):
         whitened(np.ones((3, 1)), 0.0, 0.0, name="force@1")

@@ -21,6 +21,8 @@ from validate.pipeline.run.job import job_on
 from validate.plugins import Registry
 from validate.solve.dynamic.newmark import Newmark
 
+# private: _REGISTRIES: registries of the test alone.
+
 pytestmark = pytest.mark.xdist_group("library")
 
 # A filter of `__main__`, with a constant of a plain module that no worker can import.

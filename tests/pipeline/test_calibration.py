@@ -91,9 +91,7 @@ def test_a_value_is_taken_as_it_is_and_then_nothing_is_fitted() -> None:
 def test_a_figure_that_would_serve_twice_is_an_error() -> None:
     for quantities in (("force",), ("force@0.3mm",)):
         twice = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(quantities),)),))
-        with pytest.raises(
-            ComparisonError, match=r"calibrates 'fem': each value can be used only once"
-        ):
+        with pytest.raises(ComparisonError, match="calibrates 'fem': each value can"):
             compare(twice, Options({}))
 
 
@@ -119,9 +117,7 @@ def test_what_is_not_identifiable_blocks_the_prediction_unless_anyway() -> None:
         parameters=known(nu=None),
         calibrations=(Calibration("fem", (E, NU), (Calibrates(("force@0.1mm", "force@0.2mm")),)),),
     )
-    with pytest.raises(
-        ComparisonError, match=r"material.nu is not identifiable .*the sides' motion would"
-    ):
+    with pytest.raises(ComparisonError, match=r"material.nu.*the sides' motion would"):
         compare(both, Options({}))
     result = compare(both, Options({}, anyway=True))
     assert any("material.nu is not identifiable" in note for note in result.notes)

@@ -145,5 +145,5 @@ def test_a_file_of_the_older_form_is_refused_with_the_command_that_writes_it_ane
         "EXPERIMENT = declared(name='other', title='', source='', **{'parameters': 1})\n"
     )
     (tmp_path / "other.py").write_text(computed, "utf-8")
-    with pytest.raises(UsageError, match=r"parameters of type int; declare a scene: Experiment"):
+    with pytest.raises(UsageError, match="parameters of type int; declare"):
         load_file(tmp_path / "other.py")

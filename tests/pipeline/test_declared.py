@@ -197,7 +197,7 @@ def test_an_error_of_a_declaration_names_its_path_and_line(
 def test_a_method_takes_a_value_of_another_parameter() -> None:
     """As where every method has a modulus of its own; an open one names the path to set."""
     tree, own = bar().parameters, {"material.E": "as material.rho"}
-    with pytest.raises(UsageError, match=r"material\.rho is not set; give it with --set"):
+    with pytest.raises(UsageError, match=r"material\.rho is not set; give"):
         changed_by(tree, own)
     assert changed_by(with_given(tree, {"material.rho": 2e3}), own).scene.material.E == 2e3
     unknown = Method("m", QuasiStatic(), {"material.E": "as moduli.slip"})

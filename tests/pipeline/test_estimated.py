@@ -89,7 +89,5 @@ def test_on_the_road_parameters_are_chosen_by_name_and_the_report_has_them(
     assert all("correlation 1.000" in str(row[-1]) for row in found.tables[0].rows)
     scores = {s.name for m in result.methods if m.name == "roukf" for s in m.scores}
     assert {"nis.per_dof", "node_B.nees.per_dof"} <= scores
-    with pytest.raises(
-        UsageError, match=r"'stiffness.core': not in this scene, which has stiffness, load.pull"
-    ):
+    with pytest.raises(UsageError, match=r"'stiffness.core'.*load.pull"):
         run_in_memory(short, {"methods.roukf.parameters": "stiffness.core"})

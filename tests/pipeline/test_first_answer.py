@@ -21,6 +21,8 @@ from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import write_mesh
 
+# private: _refined: the options of a run that takes minutes.
+
 T = np.linspace(0, 1, 40)
 ANSWERS = """
 experiment = "body"

@@ -72,7 +72,7 @@ def test_its_json_is_all_of_it(tmp_path: Path) -> None:
     assert found.parameters == opened
     assert dict(found.methods) == dict(mine.methods)
     assert to_json(found) == text
-    with pytest.raises(UsageError, match=r"body\.x is not set; give it with --set body\.x=VALUE"):
+    with pytest.raises(UsageError, match=r"--set body\.x=VALUE"):
         opened.scene.body.block.sizes.prod()
 
 

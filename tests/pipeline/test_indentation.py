@@ -104,19 +104,15 @@ def test_contact_is_set_like_any_parameter(result: Result) -> None:
 
 
 def test_what_is_wrong_with_contact_is_one_line() -> None:
-    with pytest.raises(SceneError, match=r"contact 'ball' starts inside the body: 1 of 25 nodes"):
+    with pytest.raises(SceneError, match=r"'ball'.*1 of 25 nodes"):
         run_in_memory(EXPERIMENT, {"contacts.ball.shape.centre": "10mm,10mm,34.9mm"}, quick=True)
     with pytest.raises(SceneError, match="friction -1, expected 0 or more"):
         run_in_memory(EXPERIMENT, {"contacts.ball.friction": "-1"}, quick=True)
-    with pytest.raises(
-        UsageError, match=r"unknown parameter 'contacts.ball.frictoin'; nearest: contacts.ball."
-    ):
+    with pytest.raises(UsageError, match=r"'contacts.ball.frictoin'.*contacts.ball."):
         run_in_memory(EXPERIMENT, {"contacts.ball.frictoin": ".3"}, quick=True)
 
 
 @pytest.mark.parametrize("ladder", [lambda e: trial_of(e, quick=True), body_of])
 def test_a_study_says_that_it_does_not_know_contact(ladder: Callable[[Experiment], object]) -> None:
-    with pytest.raises(
-        SceneError, match=r"touches 1 rigid bodies, .*; run the experiment, or declare"
-    ):
+    with pytest.raises(SceneError, match=r"touches 1 rigid.*; run the experiment, or declare"):
         ladder(EXPERIMENT)

@@ -38,7 +38,7 @@ def test_newton_where_no_other_method_solves_the_law() -> None:
 def test_a_scheme_of_one_law_lists_and_takes_no_other(phantom: Experiment) -> None:
     loop = replace(pressed("loop"), settings=PressureLoop())
     assert laws_of(loop) == ("linear",)
-    with pytest.raises(UsageError, match=r"methods\.loop\.material\.law=svk: PressureLoop solves"):
+    with pytest.raises(UsageError, match=r"methods\.loop\.material\.law=svk"):
         with_law("loop", loop, "svk", {"loop": loop})
     refusal = r"methods\.p1_loop\.material\.law=svk: PressureLoop solves linear; "
     with pytest.raises(UsageError, match=refusal):

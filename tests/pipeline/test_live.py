@@ -51,6 +51,10 @@ from validate.recording.types import Recording, Signal, Source
 from validate.solve.haptic.needle import NeedleStepper
 from validate.solve.types import State
 
+# private: _from_rest: the replay of a run that takes minutes.
+# private: _run: replaced, to bring a case about.
+# private: _socket: called alone, case by case.
+
 COARSE = {"body.plane": "10"}
 REST = (0.0031, 0.001)
 
@@ -473,11 +477,9 @@ def test_a_tip_recorded_at_different_times_is_refused() -> None:
     recording = Recording(
         "r", Source("r", "", 0, ""), 0, signals={"tip.x": signal(t), "tip.y": signal(t + 1)}
     )
-    with pytest.raises(
-        RecordingError, match=r"r: tip.x .. tip.y have \[3, 3\] samples at different times"
-    ):
+    with pytest.raises(RecordingError, match=r"r: tip.x.*tip.y have \[3, 3\] samples"):
         recorded_tip(recording, 2)
-    with pytest.raises(RecordingError, match=r"no signals tip.x, tip.y and no markers 'tip'"):
+    with pytest.raises(RecordingError, match=r"tip.x, tip.y.*'tip'"):
         recorded_tip(replace(recording, signals={"a": signal(t)}), 2)
 
 

@@ -53,6 +53,12 @@ from validate.scene.places import axis_of, facets_of, place_of, point_of
 from validate.scene.prescribed_motion import Prescribed
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
 
+# private: _FEWEST: a limit or list of the code, which the test must meet exactly.
+# private: _followed, _instants, _loading, _noted, _squeezable, _touched, _window:
+#   called alone, case by case.
+# private: _frame: the frame that is drawn.
+# private: _points_in, _untaken: replaced, to bring a case about.
+
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
 T = np.linspace(0.0, 4.0, 161)
 ROLLERS = (Support("xmin", (0,)), Support("ymin", (1,)), Support("zmin", (2,)))
@@ -385,7 +391,7 @@ def test_markers_that_rise_against_gravity_are_refused(tmp_path: Path) -> None:
     """A frame whose z points down, or another axis up: 1 mm of rise instead of sag."""
     p = FREE.with_scene(loads=(GRAVITY,)).with_settings(seen=SeenOf(markers="m", still=0.4))
     seen = recording(markers={"m": tracked(lambda x: np.array([0.0, 0.0, 0.02]) * x)})
-    with pytest.raises(RegistrationError, match=r"against \(0, 0, -1\), although 'gravity' acts"):
+    with pytest.raises(RegistrationError, match=r"against \(0, 0, -1\), although 'gravity'"):
         run_in_memory(experiment(tmp_path, p, seen, "marker"))
 
 
@@ -421,7 +427,7 @@ def test_settings_of_a_body_that_cannot_be(change: dict[str, str], says: str) ->
 
 def test_a_plane_mesh_is_no_body(tmp_path: Path) -> None:
     write_mesh(box((1.0, 1.0), (2, 2)), tmp_path / "sheet.npz")
-    with pytest.raises(SceneError, match=r"cells of tri3; a measured body needs 3-D cells"):
+    with pytest.raises(SceneError, match=r"tri3.*needs 3-D cells"):
         mesh_of(FREE.with_scene(body=MeshFile("sheet.npz"), supports=()), tmp_path)
 
 
@@ -429,18 +435,16 @@ def test_layouts_and_markers_that_are_not_given_are_requested(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(measured_markers, "_points_in", lambda path: {})
-    with pytest.raises(RecordingError, match=r"a.fcsv: no points; a layout is a file of landmarks"):
+    with pytest.raises(RecordingError, match=r"a.fcsv: no points; a layout is a file"):
         measured_markers.layout_of(None, "a.fcsv", tmp_path)  # type: ignore[arg-type]
     monkeypatch.undo()
     (tmp_path / "a.csv").write_text("name,x,y,z\na,1,2,3\nb,4,5,6\n")
-    with pytest.raises(
-        UsageError, match=r"seen.layout: .*; a layout must be complete: the columns of a table are"
-    ):
+    with pytest.raises(UsageError, match=r"seen.layout: .*; a layout must be complete"):
         measured_markers._points_in(tmp_path / "a.csv")
     none = BASE.with_settings(seen=SeenOf())
     for names in ((), ("left", "right")):
         recording = SimpleNamespace(markers=dict.fromkeys(names))
-        with pytest.raises(UsageError, match=r"seen.markers is not set; expected one of "):
+        with pytest.raises(UsageError, match=r"seen.markers.*not set"):
             measured_markers.markers_topic(recording, none)  # type: ignore[arg-type]
     one = SimpleNamespace(markers={"left": None})
     assert measured_markers.markers_topic(one, none) == "left"  # type: ignore[arg-type]
@@ -529,9 +533,7 @@ def test_a_place_that_markers_move_needs_three_that_are_tracked(
             placed(recording, *names)
     at_rest = SimpleNamespace(names=("a", "b"), x=np.zeros((1, 2, 3)))
     monkeypatch.setattr(measured_drive, "registered", lambda *_: at_rest)
-    with pytest.raises(
-        RegistrationError, match=r"markers \['c'\] on the moved place are not visible at"
-    ):
+    with pytest.raises(RegistrationError, match=r"markers \['c'\] on the moved place"):
         placed(recording, "a", "b", "c")
 
 
@@ -548,9 +550,7 @@ def test_amounts_that_were_noted_differ_and_markers_that_drive_have_no_gaps(
     x[1] = np.nan
     seen = SimpleNamespace(t=t, names=("a",), x=x)
     monkeypatch.setattr(measured_drive, "registered", lambda *_: seen)
-    with pytest.raises(
-        RegistrationError, match=r"not all visible at t = 1.000 s: fill the gap, or leave"
-    ):
+    with pytest.raises(RegistrationError, match=r"visible at t = 1.000 s"):
         measured_drive._followed(None, moved_by("a"), t, None)  # type: ignore[arg-type]
 
 
@@ -562,14 +562,10 @@ def test_a_layout_without_the_recorded_names_and_markers_that_all_drive(
     rest = SimpleNamespace(names=names)
     monkeypatch.setattr(measured_markers, "rested", lambda *_: (rest, (), 3))
     monkeypatch.setattr(measured_markers, "layout_of", lambda *_: {"Left": None})
-    with pytest.raises(
-        RegistrationError, match=r"a.fcsv has 'Left'; the recording has 'left', 'right'"
-    ):
+    with pytest.raises(RegistrationError, match=r"a.fcsv has 'Left'.*'left', 'right'"):
         measured_markers.registered(recording, moved_by(), (None, Path()))  # type: ignore[arg-type]
     monkeypatch.setattr(measured_markers, "registered", lambda *_: rest)
-    with pytest.raises(
-        ComparisonError, match="every marker moves the body: no marker is left to compare"
-    ):
+    with pytest.raises(ComparisonError, match="every marker moves the body: no marker"):
         measured_markers.compared_markers(recording, moved_by(*names), None)  # type: ignore[arg-type]
 
 
@@ -578,7 +574,5 @@ def test_outlines_need_triangles_and_an_open_modulus_a_force(
 ) -> None:
     recording = SimpleNamespace(contour=lambda topic: None)
     bricks = SimpleNamespace(bricks=True, kind="hex8")
-    with pytest.raises(
-        RegistrationError, match="outlines need triangular facets, but the body has hex8"
-    ):
+    with pytest.raises(RegistrationError, match=r"outlines need.*hex8"):
         measured_outline.observed_outline(recording, moved_by(), bricks, 0.0)  # type: ignore[arg-type]

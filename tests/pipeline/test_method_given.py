@@ -36,6 +36,9 @@ from validate.solve.fluid.cavities import NoFluid
 from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 
+# private: _executed, _instants, _number, _on_all, _size_of, _solved, _touched_levels:
+#   called alone, case by case.
+
 
 @pytest.mark.parametrize("stride", [1, 3])
 def test_a_long_step_is_so_many_of_the_recordings(stride: int) -> None:
@@ -69,7 +72,7 @@ def test_coefficients_reach_the_methods_whose_law_knows_them() -> None:
     assert scenes["slip"].material.coefficients == Coefficients()
     assert made.identify is not None
     assert made.identify((), card, methods).parameters == card
-    with pytest.raises(UsageError, match=r"material.C01 = 500.0: no method .* only linear; set"):
+    with pytest.raises(UsageError, match=r"material.C01 = 500.0.* only linear; set"):
         made.identify((), card, {"slip": methods["slip"]})
 
 
@@ -90,7 +93,7 @@ def test_a_setting_that_the_experiment_gives_is_not_the_methods_to_change() -> N
     plain = Method("m", Newmark())
     with pytest.raises(
         UsageError,
-        match=r"dt = 0.5 of 'm': the experiment sets 0.01; change the experiment's parameter",
+        match=r"dt = 0.5 of 'm': the experiment sets",
     ):
         Method("m", Newmark(dt=0.5)).given({"dt": 0.01})
     assert plain.given({"dt": 0.01, "colour": 3}).dt == 0.01
@@ -101,7 +104,7 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
     declared = Method("m", Newmark(dt=1 / 30))
     assert declared.given({"dt": 0.02}, declared).dt == 0.02
     own = Method("m", Newmark(dt=0.5))
-    with pytest.raises(UsageError, match=r"dt = 0.5 of 'm': the experiment sets 0.02"):
+    with pytest.raises(UsageError, match=r"dt = 0.5 of 'm'.*sets 0.02"):
         own.given({"dt": 0.02}, declared)
 
 
@@ -174,29 +177,25 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
 
 
 def test_an_inclusion_without_loads_compares_nothing() -> None:
-    with pytest.raises(ComparisonError, match="no loads: nothing can be compared; set stage po"):
+    with pytest.raises(ComparisonError, match="no loads: nothing can be compared; set"):
         inclusion.placed(None, None, None, (), ())  # type: ignore[arg-type]
 
 
 def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from a file"):
+    with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from"):
         folder_of(bare(path=None))  # type: ignore[arg-type]
-    with pytest.raises(
-        ComparisonError, match="experiment 'x' has no twin, which replaying a loop needs"
-    ):
+    with pytest.raises(ComparisonError, match="experiment 'x' has no twin"):
         as_given(bare(twin=None), None)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
         prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="--parameters mass: not a number that can be varied"):
+    with pytest.raises(UsageError, match="--parameters mass"):
         free_parameters._number(Newmark(), "mass", "lumped")
 
 
 def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> None:
     recording = Recording("r", Source("r", "", 0, ""), 0)
     twin_record.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",), ("dt",))
-    with pytest.raises(
-        UsageError, match=r"r: --set dt=.* would have no effect: the recording does not"
-    ):
+    with pytest.raises(UsageError, match=r"r: --set dt=.*would have no effect: the recording"):
         twin_record.require_known(recording, Newmark(dt=0.5), Newmark(), ("dt",))
 
 
@@ -205,9 +204,7 @@ def test_a_ladder_that_cannot_be_refined_is_refused() -> None:
     own = SimpleNamespace(
         experiment=bare(), scene=SimpleNamespace(mesh=mesh), levels=lambda wanted: (1,)
     )
-    with pytest.raises(
-        UsageError, match="'x' has 12 unknowns and cannot be meshed twice with at mos"
-    ):
+    with pytest.raises(UsageError, match="'x' has 12 unknowns"):
         ladder_default._touched_levels(own, 100)  # type: ignore[arg-type]
 
 
@@ -223,7 +220,7 @@ def test_meshes_differ_in_size(sizes: tuple[float, ...], refused: bool) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numerical_uncertainty, "variants", lambda *_: found)
         if refused:
-            with pytest.raises(ComparisonError, match="fine, mesh: sizes 1, 1, 1; u_num needs two"):
+            with pytest.raises(ComparisonError, match="mesh: sizes 1, 1, 1; u_num"):
                 numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
         else:
             sizes_found = numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
@@ -235,7 +232,7 @@ def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
     contours = SimpleNamespace(t=t)
     stage = SimpleNamespace(t=t, y=np.zeros((5, 1)), name="stage")
     card = PressedOutline(holds=2)
-    with pytest.raises(ComparisonError, match="the body does not move between its outlines"):
+    with pytest.raises(ComparisonError, match="the body does not move between"):
         pressed_outline._instants(contours, stage, card)  # type: ignore[arg-type]
     rising = SimpleNamespace(t=t, y=t[:, None], name="stage")
     times, moved = pressed_outline._instants(contours, rising, card)  # type: ignore[arg-type]
@@ -245,5 +242,5 @@ def test_a_body_that_does_not_move_between_its_outlines_is_refused() -> None:
 def test_an_experiment_is_named_as_its_file(tmp_path: Path) -> None:
     head = "from validate.pipeline.experiment.experiment import Experiment\n"
     (tmp_path / "other.py").write_text(f"{head}EXPERIMENT = Experiment('bar', 'A bar', 'made')\n")
-    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'bar', not the file's name"):
+    with pytest.raises(UsageError, match=r"EXPERIMENT.name is 'bar'"):
         load_file(tmp_path / "other.py")

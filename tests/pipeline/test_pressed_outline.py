@@ -107,7 +107,7 @@ def test_a_uniformly_pressed_cylinder_has_the_outline_it_should(body: Mesh) -> N
 
 
 def test_what_places_the_images_is_asked_for(body: Mesh) -> None:
-    with pytest.raises(UsageError, match=r"images 'seen' is not recorded: give outline\.origin"):
+    with pytest.raises(UsageError, match="images 'seen' is not recorded: give"):
         registered(body, replace(PLACE, origin=()))
     with pytest.raises(UsageError, match=r"outline\.sd \(standard uncertainty"):
         registered(body, replace(PLACE, sd=None))
@@ -125,7 +125,7 @@ def test_outlines_of_what_the_model_does_not_have_are_refused(body: Mesh) -> Non
         registered(body, outline=small)
     with pytest.raises(SceneError, match="no facets 'cyst'; it has"):
         registered(body, replace(PLACE, surface="cyst"))
-    with pytest.raises(ComparisonError, match=r"0 of 9 outlines lie within the 0\.000\.\.10\.000"):
+    with pytest.raises(ComparisonError, match=r"0 of 9 outlines.*0\.000\.\.10\.000"):
         registered(body, start=30.0)
 
 
@@ -144,14 +144,14 @@ def test_outlines_named_after_the_declaration_are_refused(body: Mesh) -> None:
 
 def test_outlines_show_all_of_the_body() -> None:
     card = pressed_cylinder(D, H, settings=Compression(outline=PLACE))
-    with pytest.raises(UsageError, match=r"body\.part: .* not a quarter; declare part='whole'"):
+    with pytest.raises(UsageError, match=r"body\.part: .*part='whole'"):
         experiment(card)
 
 
 def test_a_scene_that_no_plate_presses_is_refused() -> None:
     card = pressed_cylinder(D, H)
     for drives in ((), (Drive("stage", "upper_plate", (1.0, 0.0, 0.0)),)):
-        with pytest.raises(UsageError, match=r'drives: .* declare Drive\("stage", "upper_plate"'):
+        with pytest.raises(UsageError, match=r'drives: .*"upper_plate"'):
             experiment(card.with_scene(drives=drives))
 
 
@@ -163,7 +163,7 @@ def test_fluid_in_a_body_wants_its_modulus_and_the_linear_law() -> None:
     with pytest.raises(SceneError, match="ExactPressure cannot solve the law 'svk'"):
         one.methods["slip"].settings.prepare(build_system(one.build(recorded(), svk, None)))
     assert one.identify is not None
-    with pytest.raises(UsageError, match=r"material\.E is not set: a body with fluid inside"):
+    with pytest.raises(UsageError, match=r"material\.E is not set: a body"):
         one.identify((recorded(),), card, one.methods)
 
 

@@ -27,6 +27,9 @@ from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.run.runs import Road
 from validate.report.export.table_file import stored_table
 
+# private: _PATIENCE, _WORTH: replaced by a small number: a short test.
+# private: _collect: replaced, to bring a case about.
+
 NAMES = sorted(experiment_files(shipped().parent))
 STORED = re.compile(r"(\d+) of (\d+) computations were stored")
 

@@ -9,6 +9,8 @@ from validate.pipeline.ladder import default as ladder_default
 from validate.pipeline.run import case_solution
 from validate.scene.geometries.box import box, centroids
 
+# private: _Runs, _points, _stepper: called alone, case by case.
+
 
 def test_set_up_is_the_scene_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case_solution, "perf_counter", count(100.0).__next__)

@@ -30,7 +30,7 @@ def test_every_range_has_a_source_or_says_assumed(name: str) -> None:
 
 
 def test_a_range_without_a_source_is_refused() -> None:
-    with pytest.raises(ComparisonError, match="'modulus' has no source; cite what its range"):
+    with pytest.raises(ComparisonError, match="'modulus' has no source; cite what"):
         Input("modulus", rubbed, "E", " ")
 
 

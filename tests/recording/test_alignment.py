@@ -25,6 +25,9 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Signal
 
+# private: _on_grid: called alone, case by case.
+# private: _only_peak: correlations of a known shape.
+
 SEEDS = 60
 SEARCH = 1.5  # s
 
@@ -185,7 +188,7 @@ def test_a_shift_is_kept_shown_and_not_made_twice(tmp_path: Path) -> None:
     assert "seconds -0.0025" in line
     with pytest.raises(RecordingError, match=r"shifted by -0\.0025 s before"):
         shift(moved, "/force", offset)
-    with pytest.raises(RecordingError, match="no stream 'force' to shift; the recording has"):
+    with pytest.raises(RecordingError, match="no stream 'force' to shift"):
         shift(recording, "force", offset)
 
 
@@ -258,23 +261,21 @@ def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
             RecordingError, match=r"stream: (2 columns, exp|7 samples; at least 10)"
         ):
             offset_by_correlation(one, stream, 1.0)
-    with pytest.raises(RecordingError, match="an event needs 1 column, the signal has 2"):
+    with pytest.raises(RecordingError, match=r"needs 1 column.*2"):
         event_time(wide, "onset")
     with pytest.raises(RecordingError, match=r"between 3 and 3.02 s; "):
         event_time(one, "onset", (3.0, 3.02))
-    with pytest.raises(RecordingError, match="samples lie within the reference; 10 are needed"):
+    with pytest.raises(RecordingError, match="samples lie within the reference; 10"):
         refined_lag(one, one, 9.95)
 
 
 def test_a_grid_of_too_many_samples_is_refused() -> None:
     long = Signal(np.array([0.0, 1.0, 2e4]), np.zeros((3, 1)), "N", 0.0, "machine")
-    with pytest.raises(RecordingError, match=r"20000001 samples of 0.001 s, the limit is 2097152"):
+    with pytest.raises(RecordingError, match=r"20000001 samples of 0.001 s.*2097152"):
         lag._on_grid(long, 1e-3)
 
 
 def test_streams_that_do_not_follow_each_other_have_no_best_offset() -> None:
     """The opposite of a motion: the slope of its correlation has the wrong sign."""
-    with pytest.raises(
-        RecordingError, match=r"no best offset near .0 s: the streams do not follow"
-    ):
+    with pytest.raises(RecordingError, match=r"no best offset near .0 s: the streams"):
         refined_lag(signal(T, motion(T)), signal(T, -motion(T)), 0.0)

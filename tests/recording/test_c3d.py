@@ -15,6 +15,10 @@ from validate.recording.formats import subprocess_decoder
 from validate.recording.motion_capture import c3d
 from validate.recording.motion_capture.c3d import _require_whole, read_c3d
 
+# private: _LOADING, _SHARED: replaced by a small number: a short test.
+# private: _require_whole: a file of its length, without content.
+# private: _streams: replaced, to bring a case about.
+
 GRAVITY = Path("markers/silicone-beam/beam_gravity_V2_b.c3d")
 
 
@@ -62,7 +66,7 @@ def test_it_agrees_with_the_csv_of_the_same_motion(shared_data: Path) -> None:
 
 def test_a_unit_that_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path / "x.c3d", unit="")
-    with pytest.raises(UsageError, match="has no unit of length; give --map unit=mm"):
+    with pytest.raises(UsageError, match="--map unit=mm"):
         read_c3d(path, {})
     x = read_c3d(path, {"unit": "cm"}).marker("markers").x
     assert x[0, 1].tolist() == pytest.approx([0.05, 0.15, 0.25])
@@ -125,11 +129,11 @@ def test_a_library_that_crashes_costs_one_line(
 _RUNNER = """
 import sys; sys.path.insert(0, {!r})
 from pathlib import Path
-from validate.recording.formats import apart
-apart._HOME = ""
+from validate.recording.formats import subprocess_decoder
+subprocess_decoder._HOME = ""
 decoder, path, out, *limits = sys.argv[1:]
-apart.import_module = lambda name: __import__(name.lstrip("."))
-raise SystemExit(apart._decode(decoder, Path(path), Path(out), *limits))
+subprocess_decoder.import_module = lambda name: __import__(name.lstrip("."))
+raise SystemExit(subprocess_decoder._decode(decoder, Path(path), Path(out), *limits))
 """
 
 
@@ -331,7 +335,7 @@ def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     (tmp_path / "file").write_bytes(b"x" * 7)
     monkeypatch.setattr(subprocess_decoder, "_LOADING", 0)
     monkeypatch.setattr(subprocess_decoder, "_SHARED", 0)
-    with pytest.raises(RecordingError, match="file: its reader was stopped after 0 s for 7 bytes"):
+    with pytest.raises(RecordingError, match=r"file.*after 0 s for 7 bytes"):
         subprocess_decoder.decoded(
             "validate.recording.motion_capture.c3d_arrays", tmp_path / "file"
         )

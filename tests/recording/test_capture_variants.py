@@ -302,5 +302,5 @@ def test_a_body_that_was_never_tracked_is_reported_with_its_count(tmp_path: Path
     with pytest.raises(RecordingError, match=r"no body is visible: {'A': '2 of 2'}"):
         read_qualisys(tmp_path / "x.tsv", {})
     (tmp_path / "x.tsv").write_text(text.replace("Y\t100", "Y\tfast"), "utf-8")
-    with pytest.raises(RecordingError, match="FREQUENCY 'fast' is not a rate above 0 Hz"):
+    with pytest.raises(RecordingError, match=r"'fast'.*above 0 Hz"):
         read_qualisys(tmp_path / "x.tsv", {})

@@ -25,6 +25,9 @@ from validate.recording.types import Frames
 from validate.register.outlines.distances import normal_distances
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
+# private: _fitted: points of a known misfit.
+# private: _next, _require_sure: called alone, case by case.
+
 PX = (1e-4, 1e-4)
 SMALL = Scanner(width=200, height=200)
 
@@ -261,7 +264,7 @@ def test_outlines_of_frames_are_contours_and_none_is_left_out() -> None:
     moved = got.outlines[1].mean(axis=0) - got.outlines[0].mean(axis=0)
     assert moved == pytest.approx([0, 5e-4], abs=0.1e-3)
     empty = Frames(np.array([0.0, 1.0, 2.5]), (*frames, image(None)), PX, pose, "phantom")
-    with pytest.raises(RecordingError, match=r"1 of 3 images .* first image 2 \(t = 2.500 s\)"):
+    with pytest.raises(RecordingError, match=r"1 of 3 images .*image 2 \(t = 2.500 s\)"):
         outlines_of(empty)
 
 
@@ -289,9 +292,9 @@ def flat(count: int) -> Frames:
 
 
 def test_even_images_are_counted_and_the_first_is_named() -> None:
-    with pytest.raises(RecordingError, match=r"2 of 2 images .*, first image 0 \(t = 0.000 s\): "):
+    with pytest.raises(RecordingError, match=r"2 of 2 images .*image 0 \(t = 0.000 s\)"):
         outlines_of(flat(2))
-    with pytest.raises(RecordingError, match=r"3 of 3 images .*, first image 0 \(t = 0.000 s\): "):
+    with pytest.raises(RecordingError, match=r"3 of 3 images .*image 0 \(t = 0.000 s\)"):
         outline_tracking.followed(flat(3), outline_tracking.Hint(None, None), "images")
 
 
@@ -307,15 +310,11 @@ def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.Mo
         def find(self, image: object, m_per_px: object) -> Outline:
             return far
 
-    with pytest.raises(
-        RecordingError, match=r"lies 4.1 mm from the last outline, whose radius is 4"
-    ):
+    with pytest.raises(RecordingError, match=r"4.1 mm from.*radius is 4"):
         outline_tracking._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
     monkeypatch.setattr(outline_tracking.RivalRegion, "words", "a region of 3 mm")
     rival = outline_tracking.RivalRegion.__new__(outline_tracking.RivalRegion)
-    with pytest.raises(
-        RecordingError, match=r"confidence 0.52, but 0.6 is needed.*3 mm; .*--confidence 0.51\)"
-    ):
+    with pytest.raises(RecordingError, match=r"confidence 0.52.*0.6.*3 mm; .*--confidence 0.51\)"):
         outline_tracking._require_sure((rival,), 0.519, 0.6)
     outline_tracking._require_sure((rival,), 0.6, 0.6)
     outline_tracking._require_sure((), 0.1, 0.6)

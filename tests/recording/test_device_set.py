@@ -23,7 +23,7 @@ def test_lengths_are_metres(tmp_path: Path) -> None:
     assert tip.matrix[:3, 3].tolist() == pytest.approx([0.21, -1.5e-6, 0])
     assert (tip.error, got.transform("A", "B").error) == (pytest.approx(5e-4), None)
     assert got.landmarks["#1"].tolist() == pytest.approx([0.1043, 0.005, -0.02])
-    with pytest.raises(RecordingError, match="no transform from A to C; it has StylusTip to"):
+    with pytest.raises(RecordingError, match="no transform from A to C"):
         got.transform("A", "C")
 
 

@@ -17,6 +17,10 @@ from validate.recording.images import dicom as dicom_files
 from validate.recording.images.dicom import read_dicom
 from validate.recording.readers import recognised
 
+# private: _MOST, _PACKED: replaced by a small number: a short test.
+# private: _box, _images, _moments, _require_few_bytes, _series: called alone, case by case.
+# private: _frames, _read: replaced, to bring a case about.
+
 data_store = pytest.importorskip("data_store", reason="pydicom-data is not installed")
 DATA = Path(data_store.__file__).parent / "data"
 BESIDE = Path(pydicom.data.__file__).parent / "test_files"
@@ -63,9 +67,7 @@ def test_two_views_beside_each_other_are_two_streams_from_the_left() -> None:
 @pytest.mark.slow
 def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
     path = BESIDE / "examples_ybr_color.dcm"
-    with pytest.raises(
-        UsageError, match=r"ends at pixel 595, 414 of an image of 320 x 240: it was"
-    ):
+    with pytest.raises(UsageError, match=r"pixel 595, 414.*320 x 240"):
         read_dicom(path, {})
     frames = read_dicom(path, {"m_per_px": "1.02mm"}).frame("images")
     assert frames.images[0].shape == (240, 320)
@@ -73,7 +75,7 @@ def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
 
 
 def test_what_is_not_stated_is_asked_for() -> None:
-    with pytest.raises(UsageError, match="2 images without times; give --map rate=HZ"):
+    with pytest.raises(UsageError, match=r"2 images.*--map rate=HZ"):
         read_dicom(DATA / "OBXXXX1A_2frame.dcm", {})
     with pytest.raises(UsageError, match=r"has no scale, .* give --map m_per_px=0.1mm"):
         read_dicom(DATA / "US1_UNCR.dcm", {})
@@ -187,7 +189,7 @@ def test_a_file_packed_as_a_whole_is_read_unless_it_is_a_bomb(tmp_path: Path) ->
     assert all((a == b).all() for a, b in zip(plain.images, also.images, strict=True))
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     body = b"".join(packer.compress(bytes(2**24)) for _ in range(17)) + packer.flush()
-    with pytest.raises(RecordingError, match=r"y\.dcm: it unpacks to over 268435456 bytes"):
+    with pytest.raises(RecordingError, match=r"y\.dcm.*over 268435456 bytes"):
         read_dicom(deflated(tmp_path / "y.dcm", body), {"rate": "20"})
 
 
@@ -278,7 +280,7 @@ def test_a_codec_that_is_not_here_is_named_with_the_tool_that_has_it(tmp_path: P
 def test_more_images_than_stated_are_not_cut_off(tmp_path: Path) -> None:
     ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(4 * 24))
     ds.save_as(tmp_path / "x.dcm", enforce_file_format=True)
-    with pytest.raises(RecordingError, match="more images than the 3 that its header declares"):
+    with pytest.raises(RecordingError, match="more images than the 3 that its header"):
         read_dicom(tmp_path / "x.dcm", {})
 
 
@@ -325,14 +327,14 @@ def test_images_that_are_too_many_of_several_sizes_or_missing(
 ) -> None:
     ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72))
     other = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72), Rows=3)
-    with pytest.raises(RecordingError, match=r"images of different sizes \[\(3, 6\), \(4, 6\)\]"):
+    with pytest.raises(RecordingError, match=r"sizes \[\(3, 6\), \(4, 6\)\]"):
         dicom_arrays._images([ds, other])
     image = np.zeros((4, 6), np.uint8)
     monkeypatch.setattr(dicom_arrays, "_frames", lambda ds: iter([image, image]))
-    with pytest.raises(RecordingError, match="2 of 3 images can be read: truncated or damaged"):
+    with pytest.raises(RecordingError, match="2 of 3 images"):
         dicom_arrays._images([ds])
     monkeypatch.setattr(dicom_arrays, "MAX_PIXELS", 71)
-    with pytest.raises(RecordingError, match=r"\(3, 4, 6\) pixels, the limit is 71; split"):
+    with pytest.raises(RecordingError, match=r"\(3, 4, 6\) pixels.*71; split"):
         dicom_arrays._images([ds])
 
 
@@ -343,14 +345,12 @@ def test_a_folder_of_too_many_files_is_refused(
         (tmp_path / f"{i}.dcm").write_bytes(bytes(128) + b"DICM")
     assert len(dicom_files.files_of(tmp_path)) == 3
     monkeypatch.setattr(dicom_files, "_MOST", 2)
-    with pytest.raises(RecordingError, match="3 files, the limit is 2; split the folder"):
+    with pytest.raises(RecordingError, match=r"3 files.*2; split"):
         dicom_files.files_of(tmp_path)
 
 
 def test_a_region_that_reaches_beyond_its_image_was_resized() -> None:
-    with pytest.raises(
-        UsageError, match="region ends at pixel 9, 5 of an image of 8 x 6: it was r"
-    ):
+    with pytest.raises(UsageError, match=r"pixel 9, 5.*8 x 6"):
         dicom._box(Path("x.dcm"), np.array([0.0, 0.0, 9.0, 5.0]), 8, 6)
 
 
@@ -385,7 +385,5 @@ def test_what_unpacks_to_too_much_is_refused_before(
     path = deflated(tmp_path / "x.dcm", None)
     dicom_arrays._require_few_bytes(path)
     monkeypatch.setattr(dicom_arrays, "_PACKED", 1000)
-    with pytest.raises(
-        RecordingError, match="it unpacks to over 1000 bytes; save it without deflat"
-    ):
+    with pytest.raises(RecordingError, match="over 1000 bytes"):
         dicom_arrays._require_few_bytes(path)

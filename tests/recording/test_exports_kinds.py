@@ -164,14 +164,12 @@ def test_a_sign_that_is_said_makes_the_kind_immaterial(tmp_path: Path) -> None:
 def test_a_sign_that_is_said_is_believed_over_the_header(tmp_path: Path) -> None:
     text = "Tensile test\n" + BARE + rows()
     assert sense(read(tmp_path, text, force="Load:+")) == PRESSES
-    with pytest.raises(
-        UsageError, match=r"test=tension: the signs of the other --map options mean compression"
-    ):
+    with pytest.raises(UsageError, match=r"test=tension.*--map"):
         read(tmp_path, text, test="tension", force="Load:+")
 
 
 def test_a_kind_that_is_neither_is_refused() -> None:
-    with pytest.raises(UsageError, match="test=bending: expected tension or compression"):
+    with pytest.raises(UsageError, match="test=bending: expected"):
         kind_of_test("bending", {}, ())
 
 

@@ -16,6 +16,9 @@ from validate.recording.tables.columns import Pick, Said
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 
+# private: _LONGEST: a limit or list of the code, which the test must meet exactly.
+# private: _relative, _signed, _source: called alone, case by case.
+
 E = np.linspace(0.0, 0.4, 41)  # engineering strain of the path
 SIGMA = 100.0 * E + 30.0 * E**2  # kPa, engineering
 AREA, LENGTH = 314e-6, 20e-3
@@ -90,7 +93,7 @@ def test_a_stretch_says_itself_which_way_it_goes(tmp_path: Path) -> None:
     recording = read(tmp_path, pressed, area="314mm2", length="20mm")
     assert recording.record("specimen")["test"] == "compression"
     assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
-    with pytest.raises(RecordingError, match=r"tension test .* goes below 1; give --map test=comp"):
+    with pytest.raises(RecordingError, match=r"tension test .*below 1; give --map test=comp"):
         read(tmp_path, pressed, area="314mm2", length="20mm", test="tension")
 
 
@@ -224,13 +227,9 @@ def picked(role: str, *values: float) -> Pick:
 def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
     assert sized._relative(picked("stretch", 1.0, 1.5), "", None).tolist() == [0.0, 0.5]
     for values in ((1.0, 0.0), (1.0, sized._LONGEST + 1)):
-        with pytest.raises(
-            RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest and a"
-        ):
+        with pytest.raises(RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest"):
             sized._relative(picked("stretch", *values), "", None)
-    with pytest.raises(
-        ValidateError, match="'strain' does not show whether the specimen is pressed"
-    ):
+    with pytest.raises(ValidateError, match="'strain' does not show whether"):
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
 
 
@@ -238,11 +237,9 @@ def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = {"strain": Said("e", "%", -1.0)}
-    with pytest.raises(
-        UsageError, match="--map strain: no sign is allowed; give --map test=compression or"
-    ):
+    with pytest.raises(UsageError, match=r"--map strain.*--map test=compression"):
         sized._source("strain", None, said)  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="--map repeated=both: expected first or last"):
+    with pytest.raises(UsageError, match="--map repeated=both"):
         repeats.without_repeats(None, Said("every", "1s", None), "both")  # type: ignore[arg-type]
     mcap = next(reader for reader in READERS if reader.name == "mcap")
     with pytest.raises(

@@ -22,6 +22,8 @@ from validate.recording.tables import sheets_arrays, xlsx_arrays
 from validate.recording.tables.specimen_export import every_specimen
 from validate.recording.tables.workbook import _chosen, _Sheet, _tests, read_sheets, read_xlsx
 
+# private: _Sheet, _chosen, _tests: sheets of a known kind.
+
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
 SAMPLES = [[float(t), float(d), float(f)] for t, d, f in zip(T, D, F, strict=True)]
 TEST = [["Durchmesser", 25.0, "mm"], ["Probenhöhe", "20 mm"], [], *TABLE, *SAMPLES]
@@ -79,24 +81,24 @@ def test_specimens_on_sheets_of_their_own_are_all_taken(tmp_path: Path) -> None:
 def test_several_sheets_with_a_test_are_asked_for(tmp_path: Path) -> None:
     doubled = [[*r[:2], 2 * r[2]] for r in SAMPLES]
     path = written(tmp_path, A=[*TABLE, *SAMPLES], B=[*TABLE, *doubled], C=[["words"]])
-    with pytest.raises(RecordingError, match=r"2 sheets may hold the test: 'A', 'B'; .*sheet=A"):
+    with pytest.raises(RecordingError, match=r"2 sheets.*'A', 'B'.*sheet=A"):
         read_xlsx(path, {})
     assert_test(read_xlsx(path, {"sheet": "B"}), f=2 * F)
-    with pytest.raises(UsageError, match="sheet=X: unknown sheet; the workbook has 'A', 'B', 'C'"):
+    with pytest.raises(UsageError, match=r"sheet=X.*'A', 'B', 'C'"):
         read_xlsx(path, {"sheet": "X"})
-    with pytest.raises(RecordingError, match=r"log\.xlsx: sheet 'C': no table of numbers"):
+    with pytest.raises(RecordingError, match=r"log\.xlsx.*'C'"):
         read_xlsx(path, {"sheet": "C"})
 
 
 def test_lines_of_errors_are_rows_of_the_sheet(tmp_path: Path) -> None:
     bad = [list(row) for row in TEST]
     bad[19][2] = None
-    with pytest.raises(RecordingError, match=r"log\.xlsx: line 20, column 'Kraft': '' is not"):
+    with pytest.raises(RecordingError, match=r"log\.xlsx: line 20, column 'Kraft': ''"):
         read_xlsx(written(tmp_path, Data=bad), {})
 
 
 def test_a_workbook_without_a_table_says_so(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="no table in the sheets 'Data' of this workbook"):
+    with pytest.raises(RecordingError, match="no table in the sheets 'Data'"):
         read_xlsx(written(tmp_path, Data=[["words"]]), {})
 
 
@@ -177,7 +179,7 @@ def test_a_displacement_field_is_no_test(tmp_path: Path) -> None:
     cells += [[float(x), float(y), 0.1 * x, 0.01] for y in range(4) for x in range(5)]
     path = written(tmp_path, Data=cells)
     for said in ({}, {"time": "every:0.1s", "force": "none"}):
-        with pytest.raises(RecordingError, match="20 rows of X, Y, displacement, exx: a field of"):
+        with pytest.raises(RecordingError, match="20 rows of X, Y, displacement, exx"):
             read_xlsx(path, said)
     timed = [["Time [s]", *cells[0]], *([0.1 * i, *row] for i, row in enumerate(cells[1:]))]
     assert read_xlsx(written(tmp_path, Data=timed), {"force": "none"}).signals.keys() == {
@@ -187,9 +189,7 @@ def test_a_displacement_field_is_no_test(tmp_path: Path) -> None:
 
 def test_an_old_workbook_that_is_cut_within_a_sector_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.xls").write_bytes(bytes(1000))
-    with pytest.raises(
-        RecordingError, match="1000 bytes, not a multiple of its sector size 512: truncated"
-    ):
+    with pytest.raises(RecordingError, match=r"1000 bytes.*size 512: truncated"):
         sheets_arrays.arrays(tmp_path / "x.xls")
 
 
@@ -197,11 +197,9 @@ def test_a_sheet_that_is_named_and_has_no_table_is_reported() -> None:
     sheets = [_Sheet("notes", {}, "no line of names"), _Sheet("test", {})]
     with pytest.raises(RecordingError, match="sheet 'notes': no line of names"):
         _tests(sheets, "notes")
-    with pytest.raises(UsageError, match="sheet=log: unknown sheet; the workbook has 'notes', 'te"):
+    with pytest.raises(UsageError, match="sheet=log: unknown sheet; the workbook"):
         _tests(sheets, "log")
-    with pytest.raises(
-        RecordingError, match="in the sheets 'notes', 'test' of this workbook: no l"
-    ):
+    with pytest.raises(RecordingError, match="sheets 'notes', 'test'"):
         _tests(sheets, None)
     with pytest.raises(RecordingError, match="in the sheets  of this workbook: no sheet"):
         _tests([], None)
@@ -210,8 +208,6 @@ def test_a_sheet_that_is_named_and_has_no_table_is_reported() -> None:
 def test_two_sheets_that_may_contain_the_test_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     sheets = [_Sheet("first", {"": None}), _Sheet("second", {"": None})]  # type: ignore[dict-item]
     monkeypatch.setattr(_Sheet, "is_test", property(lambda self: True))
-    with pytest.raises(
-        RecordingError, match="2 sheets may hold the test: 'first', 'second'; choose"
-    ):
+    with pytest.raises(RecordingError, match=r"2 sheets.*'first', 'second'"):
         _chosen(sheets, None)
     assert _chosen(sheets, "second").name == "second"

@@ -13,6 +13,10 @@ from validate.recording.mcap.channel_state import _TAIL, ChannelSeen, _looked, p
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import IMAGE, decode, image_message
 
+# private: _TAIL: the last bytes of a message.
+# private: _looked: one message of a batch.
+# private: _shapes: called alone, case by case.
+
 GREY = [np.random.default_rng(i).integers(0, 255, (30, 40)).astype(np.uint8) for i in range(40)]
 
 
@@ -111,5 +115,5 @@ def test_outlines_of_two_points_are_reported_with_their_message(
     outlines = [schemas.contour_message(i, "a", ring[:n], 0.0) for i, n in enumerate((3, 2, 1))]
     found.take([json.dumps(one).encode() for one in outlines])
     assert (found.error, found.count) == ("", 3)
-    with pytest.raises(RecordingError, match="'/o': contours: outline 1 has fewer than 3 points"):
+    with pytest.raises(RecordingError, match=r"'/o': contours: outline 1.*than 3 points"):
         found.stream(np.arange(3), {})

@@ -20,6 +20,8 @@ from validate.recording.images.packed import RawImage, decode_picture
 from validate.recording.images.video import read_video
 from validate.recording.readers import recognised
 
+# private: _numbers: called alone, case by case.
+
 SAID = {"m_per_px": "0.1mm", "rate": "20"}
 
 

@@ -13,6 +13,8 @@ from validate.recording.tables.columns import _same
 from validate.recording.tables.testing_machine import INSTRON, read_instron
 from validate.recording.types import Recording
 
+# private: _same: columns that move alike.
+
 T = np.arange(60) * 0.1
 D = 0.3 * T  # mm
 F = 7.0 * D + 2.5 * D**2  # N
@@ -218,7 +220,7 @@ def test_wrong_mapping_names_the_nearest(
 
 def test_a_wrong_key_names_the_nearest(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("Time (s),Load (N)\n")
-    with pytest.raises(UsageError, match=r"--map forse=\.\.\.: no such key; did you mean 'force'"):
+    with pytest.raises(UsageError, match=r"--map forse=\.\.\..*'force'"):
         INSTRON.read(tmp_path / "log.csv", {"forse": "Load (N)"})
 
 
@@ -235,7 +237,7 @@ def test_a_column_name_used_twice_needs_its_number(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"absent\.csv: cannot be read \(No such file"):
+    with pytest.raises(RecordingError, match=r"absent\.csv.*\(No"):
         read_instron(tmp_path / "absent.csv")
     with pytest.raises(RecordingError, match="cannot be read"):
         read_instron(tmp_path)

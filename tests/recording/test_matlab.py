@@ -13,6 +13,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats import matlab_arrays
 from validate.recording.formats.matlab import read_matlab
 
+# private: _unpacks: called alone, case by case.
+
 GEL = "field/gel-indentation/parCoordA.mat"
 DISK = "ultrasound/disk/bmode_PWI_disk.mat"
 
@@ -124,14 +126,14 @@ def test_another_version_is_told(tmp_path: Path) -> None:
 
 def test_images_of_other_numbers_name_their_array(tmp_path: Path) -> None:
     path = written(tmp_path / "x.mat", images=np.zeros((4, 5, 3)))
-    with pytest.raises(RecordingError, match=r"images: \(4, 5, 3\) float64; images are uint8"):
+    with pytest.raises(RecordingError, match=r"images: \(4, 5, 3\) float64; images.*uint8"):
         read_matlab(path, {"view": "images:px", "m_per_px": "0.1mm", "rate": "10"})
 
 
 def test_what_is_no_variable_is_reported_with_its_place(tmp_path: Path) -> None:
     path = written(tmp_path / "x.mat", P=np.ones((4, 3)))
     path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 7, 16) + bytes(16))
-    with pytest.raises(RecordingError, match="no variable 24 bytes before byte 152; damaged"):
+    with pytest.raises(RecordingError, match=r"variable 24 bytes.*byte 152; damaged"):
         matlab_arrays.elements(path)
 
 

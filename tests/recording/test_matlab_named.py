@@ -27,6 +27,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_file
 from validate.recording.types import Markers, Signal
 
+# private: _times, _unnamed: called alone, case by case.
+
 T = 0.01 * np.arange(5)
 LOAD = np.array([0.0, 1.5, -2.25, 3.0, 4.125])
 X = np.random.default_rng(3).normal(size=(5, 4, 3))  # times, points, coordinates
@@ -87,7 +89,7 @@ def test_which_axis_is_which_is_told_by_times_or_asked_for(file: Path) -> None:
     # 5 times: (5, 4, 3) can be only times, points, coordinates
     told = read_matlab(file, {"time": "data.t:s", "m": "data.X:mm"})
     assert told.marker("m").x.shape == (5, 4, 3)
-    with pytest.raises(UsageError, match=r"m: an array of \(5, 4, 3\) and no times .*axes.m=tpx"):
+    with pytest.raises(UsageError, match=r"m.*\(5, 4, 3\).*axes.m=tpx"):
         read_matlab(file, {"m": "data.X:mm", "rate": "9"})
     other = read_matlab(file, {"m": "data.X:mm", "rate": "9", "axes.m": "ptx"})
     assert other.marker("m").x.shape == (4, 5, 3)
@@ -291,9 +293,7 @@ def test_a_list_of_indices_is_no_points(
 
 def test_whole_numbers_of_a_whole_type_are_no_points(tmp_path: Path) -> None:
     path = file_of(tmp_path, P=np.array([[101, 33], [57, 240]], dtype="int16"))
-    with pytest.raises(
-        RecordingError, match=r"numbers 33 to 240\), not points; if they are coordinates, save"
-    ):
+    with pytest.raises(RecordingError, match=r"numbers 33 to 240\)"):
         read_matlab(path, POINTS)
 
 
@@ -345,7 +345,7 @@ def test_a_volume_is_no_film(tmp_path: Path, arrays: dict[str, Any], why: str) -
 
 def test_a_stack_that_may_be_a_film_is_never_taken_for_one_unasked(tmp_path: Path) -> None:
     path = file_of(tmp_path, I=IMAGE, spacing=np.ones((1, 2)), volume=3.5)
-    with pytest.raises(UsageError, match=r"if its last axis is time \(a volume is not read"):
+    with pytest.raises(UsageError, match=r"if its last axis is time \(a volume"):
         read_matlab(path, {"m_per_px": "0.1mm"})
     assert len(read_matlab(path, {"m_per_px": "0.1mm", "rate": "10"}).frame("I").images) == 5
 
@@ -378,9 +378,9 @@ def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     t = np.arange(4.0)
-    with pytest.raises(UsageError, match="--map time=t:s:-: time has no sign to set"):
+    with pytest.raises(UsageError, match="--map time=t:s:-"):
         matlab_named.named_array("time", "t:s:-", {"t": t})
-    with pytest.raises(UsageError, match="force: 3 samples, the time of --map time= has 4"):
+    with pytest.raises(UsageError, match=r"force: 3 samples.*--map.*4"):
         matlab_named._times("force", 3, t, {})
     assert matlab_named._times("force", 4, t, {}) is t
     with h5py.File(tmp_path / "x.mat", "w") as out:
@@ -392,12 +392,8 @@ def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
 
 def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> None:
     word = {"note": np.array("text")}
-    with pytest.raises(
-        RecordingError, match=r"neither points \(n, 2 or 3\) nor uint8 images .*; it"
-    ):
+    with pytest.raises(RecordingError, match=r"\(n, 2 or 3\) nor uint8 images.*; it"):
         matlab._unnamed(Path("x.mat"), word, {})
     curve = {"F": np.zeros(50), "d": np.zeros(9)}
-    with pytest.raises(
-        UsageError, match=r"no array's role is clear; .* as --map force=PATH:N --map ra"
-    ):
+    with pytest.raises(UsageError, match=r"no array's role is clear.*--map force=PATH:N --map"):
         matlab._unnamed(Path("x.mat"), curve, {})

@@ -28,6 +28,9 @@ from validate.recording.mcap.metadata import by_name
 from validate.recording.mcap.records import HEAD, Channel, Message, Metadata, Schema, records_in
 from validate.recording.mcap.verified_file import Verified, messages_of, opened
 
+# private: _guarded, _packed, _points, _protobuf: called alone, case by case.
+# private: _ros2: replaced, to bring a case about.
+
 Told = tuple[str, dict[str, Any]]
 NO_FIELD = ("__msgtype__", "structure_needs_at_least_one_member")
 COMPARED = ("Schema", "Channel", "Message", "Attachment", "Metadata")
@@ -257,9 +260,9 @@ def test_records_longer_than_their_chunk_and_short_messages_are_refused() -> Non
     stray = HEAD.pack(5, 0) + b"xx"
     with pytest.raises(RecordingError, match="2 stray bytes at the end of a chunk"):
         list(records_in(stray))
-    with pytest.raises(RecordingError, match="a record of 9 bytes where its chunk has 4"):
+    with pytest.raises(RecordingError, match=r"a record of 9 bytes.*4"):
         list(records_in(HEAD.pack(5, 9) + bytes(4)))
-    with pytest.raises(RecordingError, match="a message record of 21 bytes, at least 22 needed"):
+    with pytest.raises(RecordingError, match=r"21 bytes.*least 22 needed"):
         Message.read(bytes(21), 0, 21)
 
 
@@ -293,5 +296,5 @@ def test_too_many_points_and_numbers_are_refused(monkeypatch: pytest.MonkeyPatch
     gathered = {1: SimpleNamespace(add=lambda message: 3)}
     messages = [Message(1, 0, 0, 0, b"")] * 2
     third_party_channels.fill(gathered, messages[:1])  # type: ignore[arg-type]
-    with pytest.raises(RecordingError, match="more than 5 numbers, the limit; split the file"):
+    with pytest.raises(RecordingError, match="than 5 numbers"):
         third_party_channels.fill(gathered, messages)  # type: ignore[arg-type]

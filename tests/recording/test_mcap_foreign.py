@@ -161,7 +161,7 @@ def test_an_image_is_its_luma_and_needs_a_scale(encoding: str, tmp_path: Path) -
     path = ros(
         tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE, [raw(encoding, stored)]
     )
-    with pytest.raises(RecordingError, match=r"images without a scale; give --map m_per_px=0.1mm"):
+    with pytest.raises(RecordingError, match=r"--map m_per_px=0.1mm"):
         read_all(path, {})
     frames = read_all(path, {"m_per_px": "0.2mm"}).frame("/x")
     assert (frames.images[0] == grey).all()
@@ -205,7 +205,7 @@ def test_a_mosaic_is_its_luma_and_pairs_are_their_brightness(tmp_path: Path) -> 
 def test_distances_are_no_image(tmp_path: Path) -> None:
     path = ros(tmp_path / "x.mcap", "sensor_msgs/msg/Image", HEADER + IMAGE,
                [raw("32FC1", np.zeros((4, 24), np.uint8)) | {"width": 6}])  # fmt: skip
-    with pytest.raises(RecordingError, match=r"encoding '32FC1'; expected grey, colour or bayer"):
+    with pytest.raises(RecordingError, match="encoding '32FC1'; expected"):
         read_all(path, {"m_per_px": "1mm"})
 
 
@@ -304,11 +304,11 @@ def test_a_number_of_any_message_comes_in_by_its_path(encoding: str, tmp_path: P
     got = read_all(path, {"/cell.cell.load.0": "N"}).signal("/cell.cell.load.0", "N")
     assert got.y.ravel().tolist() == [0, 0.5, 1]
     assert got.t.tolist() == [0, 1, 2]
-    with pytest.raises(RecordingError, match=r"import a number with --map /cell.FIELD=UNIT"):
+    with pytest.raises(RecordingError, match=r"--map /cell.FIELD=UNIT"):
         read_all(path, {})
     with pytest.raises(RecordingError, match=r"no field 'nothing' of 'cell.nothing'"):
         read_all(path, {"/cell.cell.nothing": "N"})
-    with pytest.raises(UsageError, match=r"--map /other.x=...: no such key; .*topics /cell"):
+    with pytest.raises(UsageError, match=r"--map /other.x=....*topics /cell"):
         read_all(path, {"/other.x": "N"})
 
 
@@ -336,14 +336,14 @@ def test_contents_of_recordings_by_rosbag2(shared_data: Path) -> None:
     assert first["message"]["int32_value"] == 123
     arrays = list(messages_in(shared_data / ROS2 / "cdr_test_0.mcap", "/array_topic", 4))
     assert len(arrays) == 4
-    with pytest.raises(RecordingError, match=r"/test_topic: no decoder for 'ros2msg/wrong_format'"):
+    with pytest.raises(RecordingError, match=r"/test_topic.*'ros2msg/wrong_format'"):
         list(messages_in(shared_data / ROS2 / "wrong_rmw_test_0.mcap", "/test_topic", 1))
 
 
 def test_unknown_schemas_are_listed_with_why(shared_data: Path, capfd: Any) -> None:
-    with pytest.raises(RecordingError, match=r"configuration_topic: no decoder for 'omgidl/cdr'"):
+    with pytest.raises(RecordingError, match=r"configuration_topic.*'omgidl/cdr'"):
         read_all(shared_data / "mcap/dds/configuration_type.mcap", {})
-    with pytest.raises(RecordingError, match="_service_event: its schema cannot be parsed"):
+    with pytest.raises(RecordingError, match="_service_event"):
         read_all(shared_data / ROS2 / "topics_and_services.mcap", {})
     assert capfd.readouterr().out == ""  # its library prints
 
@@ -357,7 +357,5 @@ def test_a_topic_that_is_not_there_is_reported_with_the_others(tmp_path: Path) -
 def test_errors_of_a_file_name_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = ros(tmp_path / "x.mcap", "x/X", "float64 a", [{"a": 1.0}, {"a": 2.0}])
     monkeypatch.setattr(third_party_channels, "MAX_NUMBERS", 1)
-    with pytest.raises(
-        RecordingError, match=r"x.mcap: more than 1 numbers, the limit; split the fi"
-    ):
+    with pytest.raises(RecordingError, match=r"x.mcap.*than 1 numbers"):
         read_all(path, {"/x.a": "N"})

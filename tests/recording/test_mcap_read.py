@@ -209,7 +209,7 @@ def test_a_topic_without_messages_is_refused(tmp_path: Path) -> None:
 
 def test_our_schema_in_another_encoding_is_refused(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "f.mcap", _markers(), encodings=("protobuf", "cbor"))
-    with pytest.raises(RecordingError, match="Markers in 'protobuf/cbor', expected 'jsonschema"):
+    with pytest.raises(RecordingError, match="Markers in 'protobuf/cbor', expected"):
         read_recording(path)
 
 
@@ -276,5 +276,5 @@ def test_statistics_that_claim_more_are_refused(
     path = tmp_path / "a.mcap"
     write_recording(sample_recording(), path)
     monkeypatch.setattr("validate.recording.mcap.integrity.statistics_messages", lambda _: 99)
-    with pytest.raises(RecordingError, match="claim 99 messages, it has 27; see `validate insp"):
+    with pytest.raises(RecordingError, match=r"claim 99 messages.*27; see"):
         read_recording(path)

@@ -17,6 +17,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.recover import recover
 from validate.recording.preflight import inspect_recording
 
+# private: _copy: called alone, case by case.
+
 MS = 1_000_000
 CUTS = 50
 
@@ -140,5 +142,5 @@ def test_the_command_saves_and_a_run_still_refuses(tmp_path: Path) -> None:
 
 def test_a_file_that_shrinks_while_it_is_copied_is_refused() -> None:
     cut = SimpleNamespace(data=100, crc=0)
-    with pytest.raises(RecordingError, match="became shorter while it was read, by 60 bytes"):
+    with pytest.raises(RecordingError, match=r"became shorter while.*60"):
         module._copy(io.BytesIO(bytes(40)), io.BytesIO(), cut, b"")

@@ -20,6 +20,8 @@ from validate.recording.reader import Reader
 from validate.report.scenes import gl
 from validate.solve.external.program import Limits, run_program, words
 
+# private: _opens: called alone, case by case.
+
 __all__ = ["folder"]  # a fixture
 
 

@@ -159,14 +159,14 @@ def test_a_rate_makes_no_motion_of_points_without_names(tmp_path: Path) -> None:
     """Two points at each instant, by a rate one that jumps between them."""
     lines = [f"{t:.1f},{i},{i},0" for t in (0, 0.1, 0.2) for i in (1, 9)]
     (tmp_path / "p.csv").write_text("\n".join(["time (s),x (mm),y (mm),z (mm)", *lines]) + "\n")
-    with pytest.raises(RecordingError, match=r"2 rows at each 'time \(s\)', and no column names"):
+    with pytest.raises(RecordingError, match=r"2 rows.*'time \(s\)'"):
         read(tmp_path / "p.csv", {"rate": "20"})
 
 
 def test_two_rows_of_one_point_at_one_instant_are_refused(tmp_path: Path) -> None:
     path = long_table(tmp_path / "p.csv")
     path.write_text(LONG + "0.4,8,tip,0,0,0\n")
-    with pytest.raises(RecordingError, match="line 11: 'tip' has another row at this instant"):
+    with pytest.raises(RecordingError, match="line 11: 'tip'"):
         read(path)
 
 
@@ -199,7 +199,7 @@ def test_deeplabcuts_tables_are_markers_in_pixels(tmp_path: Path) -> None:
     path = tmp_path / "dlc.csv"
     path.write_text(DEEPLABCUT)
     assert recognised(path).name == "points"
-    with pytest.raises(UsageError, match="in pixels; give the pixel size, as --map m_per_px="):
+    with pytest.raises(UsageError, match="--map m_per_px="):
         read(path)
     found = read(path, PLACED)
     assert found.names == ("tip", "base")
@@ -297,9 +297,7 @@ def test_one_point_with_displacements_over_time_is_read(tmp_path: Path) -> None:
 def test_rows_on_a_grid_are_no_motion_of_one_point(tmp_path: Path) -> None:
     """No name tells it; a point that moves along a line or a circle is on no grid."""
     path = field_table(tmp_path / "p.csv", "x (mm),y (mm)")
-    with pytest.raises(
-        RecordingError, match="20 rows on a grid of 5 x 4 places at one instant, not"
-    ):
+    with pytest.raises(RecordingError, match=r"20 rows.*5 x 4 places"):
         read(path, ADVICE)
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     for x, y in ((np.cos(angle), np.sin(angle)), (angle, angle), (angle, 0 * angle)):
@@ -330,7 +328,7 @@ def test_tracks_may_have_velocities_but_grid_points_have_strains(
     if is_read:
         assert read(path, {"z": "0mm", "rate": "10"}).names == ("0", "1", "2", "3")
         return
-    with pytest.raises(RecordingError, match="4 rows at each 'frame' of x, y, exx: a field"):
+    with pytest.raises(RecordingError, match=r"4 rows.*'frame'"):
         read(path, {"z": "0mm", "rate": "10"})
 
 
@@ -375,12 +373,10 @@ def test_many_short_tracks_are_refused(tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text(
         "\n".join(["time (s),marker,x (mm),y (mm),z (mm)", *rows]) + "\n"
     )
-    with pytest.raises(RecordingError, match="60 labels at 61 instants in only 120 rows; keep"):
+    with pytest.raises(RecordingError, match=r"60 labels at 61 instants.*120 rows"):
         read(tmp_path / "p.csv")
 
 
 def test_a_cell_longer_than_any_table_has_is_no_table() -> None:
-    with pytest.raises(
-        RecordingError, match=r"x.csv: not a table of cells .field larger than field"
-    ):
+    with pytest.raises(RecordingError, match=r"x.csv: not a table of cells .field"):
         rows_of("x.csv", b"time,x\n0," + b"1" * 140_000)

@@ -105,7 +105,7 @@ def test_a_log_over_midnight_goes_on(tmp_path: Path) -> None:
 
 def test_four_numbers_that_are_no_rotation_are_not_taken_for_one(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("time,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,2\n")
-    with pytest.raises(RecordingError, match="sample 1: a quaternion of length 2, expected 1"):
+    with pytest.raises(RecordingError, match=r"sample 1.*length 2, expected 1"):
         read_ndi(tmp_path / "x.csv", {})
 
 
@@ -250,7 +250,7 @@ def test_a_trc_without_unit_or_with_other_points_than_stated_is_refused(tmp_path
     body = "Frame#\tTime\ttip\t\t\n\t\tX1\tY1\tZ1\n1\t0.000\t1\t2\t3\n"
     path = tmp_path / "x.trc"
     path.write_text(head.format(1) + body)
-    with pytest.raises(UsageError, match="has no unit of length; give --map unit=mm"):
+    with pytest.raises(UsageError, match="--map unit=mm"):
         read_trc(path, {})
     assert read_trc(path, {"unit": "cm"}).marker("markers").x[0, 0, 2] == pytest.approx(0.03)
     path.write_text(head.format(2) + body)
@@ -328,5 +328,5 @@ def test_a_trc_file_without_a_name_is_none(tmp_path: Path) -> None:
         "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumFrames\n100\t1\nFrame#\tTime\n\tX1\n1\t0\n"
     )
     (tmp_path / "x.trc").write_text(text)
-    with pytest.raises(RecordingError, match="line 4 names no point; not a TRC file, or damaged"):
+    with pytest.raises(RecordingError, match="line 4 names no point"):
         read_trc(tmp_path / "x.trc", {})

@@ -18,6 +18,8 @@ from validate.recording.formats.rosbag import read_bag
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.readers import recognised
 
+# private: _opened: called alone, case by case.
+
 KIND = "geometry_msgs/WrenchStamped"
 SCALE = {"m_per_px": "0.1mm"}
 
@@ -116,7 +118,7 @@ def test_own_types_are_numbers_by_their_path(tmp_path: Path) -> None:
 def test_what_is_left_in_a_log_or_cut_off_is_told(tmp_path: Path) -> None:
     path = humbles(tmp_path / "x.db3")
     (tmp_path / "x.db3-wal").write_bytes(b"some")
-    with pytest.raises(RecordingError, match=r"4 bytes are still in x.db3-wal.*sqlite3 x.db3"):
+    with pytest.raises(RecordingError, match=r"4 bytes.*x.db3-wal.*sqlite3 x.db3"):
         read_bag(path, {})
     (tmp_path / "x.db3-wal").unlink()
     whole = path.read_bytes()
@@ -194,7 +196,7 @@ def test_types_without_a_definition_are_told(tmp_path: Path) -> None:
     changed(path, "DELETE FROM message_definitions WHERE encoding = 'unknown'")
     same(read_bag(path, {}), MADE[KIND][1])
     changed(path, "UPDATE topics SET type = 'lab_msgs/msg/Own'")
-    with pytest.raises(RecordingError, match="any of its 1 types: /x of type lab_msgs/msg/Own"):
+    with pytest.raises(RecordingError, match=r"1 types: /x.*lab_msgs/msg/Own"):
         read_bag(path, {})
 
 
@@ -202,7 +204,7 @@ def test_a_database_of_another_kind_is_called_so(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "x.db") as db:
         db.execute("CREATE TABLE runs(force REAL)")
     db.close()
-    with pytest.raises(UsageError, match=r"an SQLite database \(not a ROS bag\).*> x.csv"):
+    with pytest.raises(UsageError, match=r"\(not.*bag\).*> x.csv"):
         recognised(tmp_path / "x.db")
 
 

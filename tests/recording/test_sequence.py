@@ -12,6 +12,9 @@ from validate.recording.images import metaimage, nrrd, nrrd_arrays
 from validate.recording.images.metaimage import read_metaimage
 from validate.recording.images.nrrd import read_nrrd
 
+# private: _HEADER: replaced by a small number: a short test.
+# private: _images, _require_end, _times: called alone, case by case.
+
 STYLUS = "markers/stylus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
 FREEHAND = "ultrasound/tracked/NwirePhantomFreehand.igs.{}"
 
@@ -150,7 +153,7 @@ def test_an_nrrd_bomb_is_refused_before_it_is_unpacked(
 
 
 def test_a_sequence_without_a_frame_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="no frame, neither an image nor fields Seq_Frame0000"):
+    with pytest.raises(RecordingError, match="fields Seq_Frame0000"):
         read_metaimage(written(tmp_path, tracked(0, pixels=False)), {})
 
 
@@ -184,10 +187,8 @@ def test_an_nrrd_that_is_cut_in_its_packed_pixels_is_refused(tmp_path: Path) -> 
     path = tmp_path / "x.nrrd"
     path.write_bytes(b"NRRD0004\nencoding: gzip\n\n" + packed)
     nrrd_arrays._require_end(path, 1000)
-    with pytest.raises(RecordingError, match="over 999 bytes unpacked, more than its sizes hold"):
+    with pytest.raises(RecordingError, match="over 999 bytes"):
         nrrd_arrays._require_end(path, 999)
     path.write_bytes(path.read_bytes()[:-5])
-    with pytest.raises(
-        RecordingError, match="truncated: its pixels do not end with their checksum"
-    ):
+    with pytest.raises(RecordingError, match="truncated: its pixels do not end"):
         nrrd_arrays._require_end(path, 1000)

@@ -112,14 +112,15 @@ def test_an_nrrd_with_three_axes_of_space_is_no_film(
     """Its slices were images over time, by the rate that was asked for."""
     path = tmp_path / "x.nrrd"
     nrrd.write(str(path), images(3).transpose(2, 1, 0).copy(), header)
-    if not why:
-        assert len(read_nrrd(path, BY).frame("images").images) == 3
-        with pytest.raises(UsageError, match=r"give --map rate=HZ \(a volume is not read\)"):
-            read_nrrd(path, {"m_per_px": "0.1mm"})
+    if why:
+        for options in (BY, {}) if header == SPACE else (BY,):
+            with pytest.raises(RecordingError, match=rf"x\.nrrd: 3 slices of a volume \({why}\)"):
+                read_nrrd(path, options)
         return
-    for options in ({}, BY):
-        with pytest.raises(RecordingError, match=rf"x\.nrrd: 3 slices of a volume \({why}\), not"):
-            read_nrrd(path, options)
+    assert len(read_nrrd(path, BY).frame("images").images) == 3
+    if not header:
+        with pytest.raises(UsageError, match=r"--map rate=HZ \(a.*read\)"):
+            read_nrrd(path, {"m_per_px": "0.1mm"})
 
 
 def test_an_nrrd_of_four_axes_and_no_depth_is_a_film(tmp_path: Path) -> None:
@@ -149,7 +150,5 @@ def test_a_metaimage_of_three_axes_is_a_film_where_it_lists_images(
         assert len(read_metaimage(path, BY).frame("images").images) == 3
         return
     for options in ({}, BY):
-        with pytest.raises(
-            RecordingError, match=r"3 slices of a volume \(spacing 0.1 0.2 0.3\), not"
-        ):
+        with pytest.raises(RecordingError, match=r"3 slices.*\(spacing 0.1 0.2 0.3\)"):
             read_metaimage(path, options)

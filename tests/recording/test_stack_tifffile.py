@@ -53,7 +53,7 @@ def test_pages_that_are_small_packed_are_counted_before_they_are_decoded(
     tifffile.imwrite(path, pages, photometric="minisblack", compression="zlib")
     assert path.stat().st_size < 40_000
     monkeypatch.setattr(stack_arrays, "MOST", 2 * 300 * 300)
-    with pytest.raises(RecordingError, match="40 images of 300 x 300 px, more than 180000 bytes"):
+    with pytest.raises(RecordingError, match=r"40 images of 300 x 300 px.*than 180000"):
         stack_arrays.arrays(path)
 
 
@@ -61,7 +61,7 @@ def test_a_big_tiff_that_is_not_read_is_called_so(tmp_path: Path) -> None:
     """It is whole: Pillow reads that order of classic TIFF alone."""
     path = tmp_path / "x.tif"
     tifffile.imwrite(path, BYTES, photometric="minisblack", bigtiff=True, byteorder=">")
-    with pytest.raises(RecordingError, match=r"x\.tif: a BigTIFF whose numbers are big-endian"):
+    with pytest.raises(RecordingError, match=r"x\.tif: a BigTIFF whose numbers"):
         read_image_stack(path, SAID)
 
 

@@ -10,6 +10,8 @@ from validate.recording.tables import columns as stepped
 from validate.recording.tables.cells import is_data, is_row, is_unit_row
 from validate.recording.tables.columns import Said
 
+# private: _cells, _number, _step: called alone, case by case.
+
 
 @pytest.mark.parametrize(
     ("cells", "units"),
@@ -47,7 +49,7 @@ def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None
 
 
 def test_a_line_that_is_no_csv_is_reported_with_its_length() -> None:
-    with pytest.raises(RecordingError, match="not CSV text: a line of 140001 characters: field l"):
+    with pytest.raises(RecordingError, match="140001 characters"):
         cells._cells("1" * 140_000 + ",", ",")
 
 

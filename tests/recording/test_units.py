@@ -9,6 +9,8 @@ from validate import units
 from validate.errors import RecordingError
 from validate.units import USUAL, in_si, is_unit, pints, si_factor, split
 
+# private: _factor: called alone, case by case.
+
 EXACT = [
     ("N", "force", 1.0),
     ("kN", "force", 1e3),

@@ -14,6 +14,8 @@ from validate.register.markers.measures import target_covariance
 from validate.register.markers.transform import Similarity, fit_rigid
 from validate.scene.geometries.box import box
 
+# private: _MOST: replaced by a small number: a short test.
+
 RNG = np.random.default_rng(5)
 Y = RNG.uniform(-0.03, 0.03, (12, 3))
 TRUE = Similarity(Rotation.from_rotvec([0.4, -0.9, 1.7]).as_matrix(), np.array([0.1, -0.2, 0.05]))
@@ -79,7 +81,7 @@ def test_markers_seen_badly_in_depth_are_compared_with_their_own_noise() -> None
     fit = seen.registration.transform
     own = weighted_covariance(rest, rest, covariance_of(DEEP), fit)
     assert seen.tre == pytest.approx(np.sqrt(np.trace(own, axis1=1, axis2=2)))
-    with pytest.raises(RegistrationError, match="noise by direction with method 'similarity'"):
+    with pytest.raises(RegistrationError, match=r"by direction.*'similarity'"):
         observe_markers(markers, layout, mesh, how=MarkerFit("similarity", tuple(DEEP)))
     assert observe_markers(markers, layout, mesh, how=MarkerFit(sd=(2e-3,))).sd == 2e-3
 
@@ -96,5 +98,5 @@ def test_a_fit_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(anisotropic, "_MOST", 1)
     points = np.random.default_rng(3).normal(size=(5, 3))
     turn = Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix()
-    with pytest.raises(RegistrationError, match="did not converge in 1 steps: check the noise"):
+    with pytest.raises(RegistrationError, match="did not converge in 1 steps: check"):
         fit_weighted(points, points @ turn.T, np.eye(3), Similarity(np.eye(3), np.zeros(3)))

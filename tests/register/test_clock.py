@@ -123,7 +123,7 @@ def test_a_speed_that_cannot_be_told_is_an_error() -> None:
     once = SignalObservation(
         "f", "validates", T[:1], np.ones((1, 1)), "N", 0.1, "force", "f", sd_t=SD_T
     )
-    with pytest.raises(ComparisonError, match=r"uncertain by 0\.01 s, and too few samples"):
+    with pytest.raises(ComparisonError, match=r"uncertain by 0\.01 s, and too few"):
         once.deviations(STILL, Selection("0", np.array([0.0])))
 
 

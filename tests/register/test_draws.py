@@ -336,9 +336,7 @@ def test_markers_that_are_missing_at_rest_are_named() -> None:
     late, unseen, fewest = from_rest_module.rested(seen, 2.0)
     assert (late.names, unseen, fewest) == (("a", "b"), (), 1)
     only = replace(seen, names=("b",), x=seen.x[:, 1:])
-    with pytest.raises(
-        RegistrationError, match=r"none of 1 markers is visible in the first 0.5 s, at"
-    ):
+    with pytest.raises(RegistrationError, match=r"1 markers.*first 0.5 s"):
         from_rest_module.rested(only, 0.5)
 
 
@@ -347,6 +345,6 @@ def test_markers_off_the_body_ask_how_far_they_stand(monkeypatch: pytest.MonkeyP
     whole = SimpleNamespace(x=rest[None], names=("stalk",))
     with pytest.raises(
         RegistrationError,
-        match=r"stalk.*; for markers on stalks give their length: --set seen.stands=15mm",
+        match=r"stalk.*--set seen.stands=15mm",
     ):
         from_rest_module.since_rest(whole, MESH, 1e-4, 1, 1e-3)  # type: ignore[arg-type]

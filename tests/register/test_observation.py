@@ -32,6 +32,8 @@ from validate.register.signals import (
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
+# private: _of: the residual of one deviation, drawn 300 times.
+
 T = np.array([0.0, 1.0, 2.0])
 RUN_T = np.array([0.0, 0.5, 1.0, 1.5, 2.0])
 
@@ -88,7 +90,7 @@ def test_a_trace_is_read_at_the_nearest_step_of_a_hold_and_between_steps_of_all(
 def test_the_nearest_sample_is_the_earlier_of_two_and_within_a_second() -> None:
     assert nearest_samples(T, np.array([0.5, 0.51, 2.9]), "cell").tolist() == [0, 1, 2]
     assert nearest_samples(np.array([1.0]), np.array([0.5]), "cell").tolist() == [0]
-    with pytest.raises(ComparisonError, match=r"cell has no sample within 1 s of t = 3\.500 s"):
+    with pytest.raises(ComparisonError, match=r"within 1 s of t = 3\.500 s"):
         nearest_samples(T, np.array([0.0, 3.5]), "cell")
 
 
@@ -390,7 +392,7 @@ def test_inputs_are_the_driving_signals_side_by_side_in_order() -> None:
 
 def test_driving_signals_on_different_times_are_refused() -> None:
     late = stage(name="pull", unit="N", t=T + 0.01)
-    with pytest.raises(ComparisonError, match="2 driving signals on different times; resample"):
+    with pytest.raises(ComparisonError, match="2 driving signals on different times"):
         Registered((stage(), late))
     with pytest.raises(ComparisonError, match="2 driving signals on different times"):
         Registered((stage(), stage(t=T[:2], y=np.zeros((2, 1)))))
@@ -416,17 +418,17 @@ def test_frames_are_rest_and_holds_or_else_evenly_many() -> None:
 def test_holds_are_where_the_drive_stood_and_windows_where_it_was() -> None:
     rest, hold = holds_at(stage(), T, (2e-3,), 1e-4)
     assert (rest.label, instant(rest), hold.label, instant(hold)) == ("0mm", 0.0, "2mm", 2.0)
-    with pytest.raises(ComparisonError, match=r"no measurement at 1\.5 mm: 0 matched samples"):
+    with pytest.raises(ComparisonError, match=r"1\.5 mm: 0 matched"):
         holds_at(stage(), T, (1.5e-3,), 1e-4)
     (window,) = windows_of(stage(), {"late": (0.5e-3, 2e-3)})
     assert window.t == pytest.approx([1.0, 2.0])
-    with pytest.raises(ComparisonError, match=r"window beyond: 0 samples between 3 and 4 mm"):
+    with pytest.raises(ComparisonError, match="beyond: 0 samples between 3 and 4 mm"):
         windows_of(stage(), {"beyond": (3e-3, 4e-3)})
 
 
 def test_a_force_that_falls_as_the_drive_closes_has_the_wrong_sign() -> None:
     require_rising(stage(), signal())
-    with pytest.raises(RegistrationError, match="'force' falls by 4 N as 'stage' closes by 2 mm"):
+    with pytest.raises(RegistrationError, match=r"'force'.*4 N as 'stage'.*2 mm"):
         require_rising(stage(), signal(y=-signal().y))
 
 
@@ -442,9 +444,7 @@ def test_markers_beside_their_layout_are_refused_and_nearest_nodes_read() -> Non
     near = observe_markers(found, layout, MESH, sampling="nearest_node")
     assert near.positions.apply(MESH.nodes)[2] == pytest.approx([1.0, 0.0, 1.0])
     del layout["b"], layout["d"]
-    with pytest.raises(
-        RegistrationError, match=r"2 of 4 markers are not in the layout: \['b', 'd'\]"
-    ):
+    with pytest.raises(RegistrationError, match=r"2 of 4 markers.*\['b', 'd'\]"):
         observe_markers(found, layout, MESH)
 
 

@@ -18,6 +18,8 @@ from validate.recording.readers import recognised
 from validate.recording.types import Recording, Source
 from validate.register.tools.pivot import pivot
 
+# private: _standing: replaced, to bring a case about.
+
 TIP = np.array([0.1086, -0.0078, 0.0025])
 N = 300
 SEQUENCE = "markers/stylus/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
@@ -161,7 +163,7 @@ def test_a_tip_that_stands_in_few_poses_is_refused(monkeypatch: pytest.MonkeyPat
     R, T, point = turned(np.random.default_rng(0), WIDE)
     module = sys.modules[pivot.__module__]  # its package exports the function by the same name
     monkeypatch.setattr(module, "_standing", lambda *_: np.arange(149))
-    with pytest.raises(RegistrationError, match="in 149 of 300 poses, fewer than half: shorten"):
+    with pytest.raises(RegistrationError, match="149 of 300 poses"):
         pivot(R, T, point)
     monkeypatch.setattr(module, "_standing", lambda *_: np.arange(150))
     assert len(pivot(R, T, point).used) == 150

@@ -18,6 +18,9 @@ from validate.scene.geometries.inclusion import Block, block_with_inclusion
 from validate.scene.mesh import cell_volumes
 from validate.twin.ultrasound import Scanner
 
+# private: _beside, _clearest, _tracked: called alone, case by case.
+# private: _end: sections of an exact sphere.
+
 # Image x is the block's z, image y its x, the sweep goes along its y.
 POSE = np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0.015], [0, 0, 0, 1]])
 ROUND = LeaningCapsule((20e-3, 30e-3, 22.5e-3), (8.5e-3, 8.5e-3), 28e-3, (0.1, -0.05))

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+# private: _left_title: matplotlib has no other way to it.
+
 _DECADES = 1e10  # from the lowest to the highest place on a logarithmic axis
 _OVER = 1.0  # pixels that boxes may share
 

@@ -15,6 +15,9 @@ from validate.report.scenes import gl
 from validate.report.scenes.bodies import _without_gl
 from validate.report.scenes.body import ShownBody, shown_body
 
+# private: _KNOWN: a cache, emptied.
+# private: _without_gl: called alone, case by case.
+
 
 def cube_body() -> ShownBody:
     found = shown_body(small_result())

@@ -10,6 +10,8 @@ from validate.report.scenes.body import ShownBody
 from validate.report.scenes.skin import skins
 from validate.scene.shape_functions import LATTICE
 
+# private: _polygons: called alone, case by case.
+
 ROD = bending_rod(3)
 
 

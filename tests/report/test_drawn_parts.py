@@ -17,6 +17,10 @@ from validate.report.sections.provenance import _assumed, _metadata, _points
 from validate.report.sections.registration import _residuals
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere, Shape
 
+# private: _View, _assumed, _axes, _circles, _fill, _metadata, _points, _residuals:
+#   called alone, case by case.
+# private: _polygons: replaced, to bring a case about.
+
 
 class Plotter:
     """What is added to a plotter, without a window."""

@@ -5,6 +5,8 @@ import numpy as np
 from validate.compare.exhibit import Heat
 from validate.report.charts.heat import _norm, picture
 
+# private: _norm: called alone, case by case.
+
 VALUES = np.array([[0.1, 1.0, 100.0], [np.nan, 2.0, 0.5]])
 HEAT = Heat("nis_kf", "NIS", "Q", "R", ("1", "2", "3"), ("a", "b"), VALUES, "NIS per dof / 1", 1.0)
 

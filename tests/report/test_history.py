@@ -17,6 +17,8 @@ from validate.report.stored.provenance import Commit, Made
 from validate.report.stored.run_changes import history, since
 from validate.report.write import write_report
 
+# private: _fill: replaced, to bring a case about.
+
 DAYS = [f"2026-11-2{i}T04:00:00+00:00" for i in range(1, 6)]
 
 

@@ -261,7 +261,7 @@ def test_a_missing_library_is_one_line_with_the_command(
     kept(tmp_path / "cube", sample())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(UsageError, match=r"results.parquet needs pyarrow.*install.*tables"):
+    with pytest.raises(UsageError, match=r"results.parquet.*install.*tables"):
         stored_table(tmp_path / "cube")
     with pytest.raises(UsageError, match=r"needs pandas.*install.*tables"):
         frame(())

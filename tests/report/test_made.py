@@ -18,6 +18,8 @@ from validate.report.stored.environment import environment
 from validate.report.stored.provenance import Commit, Made, UsedFile, commit_of, made
 from validate.report.stored.store import document, schema
 
+# private: _memory, _version: called alone, case by case.
+
 CREATED = "2026-11-21T04:00:00Z"
 
 

@@ -5,6 +5,8 @@ import pytest
 
 from validate.report.scenes.markers import _limits
 
+# private: _limits: called alone, case by case.
+
 
 def test_a_line_along_one_axis_has_room_across() -> None:
     """Two markers above each other had a panel of no width, their motion outside of it."""

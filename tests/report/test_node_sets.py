@@ -9,6 +9,8 @@ from validate.report.scenes.maps import TOWARD_EYE, facing, screen
 from validate.report.scenes.node_sets import node_sets_picture
 from validate.scene.geometries.box import box
 
+# private: _fill: called alone, case by case.
+
 MESH = box((0.1, 0.1, 0.1), (2, 2, 2))
 TOP, BOTTOM = MESH.facet_nodes("z1"), MESH.facet_nodes("z0")
 SETS = {"held": BOTTOM, "loaded": TOP}

@@ -21,6 +21,9 @@ from validate.report.scenes.residual_arrows import arrow_axes, magnified, residu
 from validate.report.sections.discrimination import noise_rows, over_noise
 from validate.report.sections.observations import Held
 
+# private: _circle: called alone, case by case.
+# private: _outline: replaced, to bring a case about.
+
 SD = 1e-4  # m
 
 

@@ -17,6 +17,8 @@ from validate.report.html import page
 from validate.report.sections.verdicts import band
 from validate.report.stored.store import document, schema
 
+# private: _content, _document, _holds, _show: called alone, case by case.
+
 CREATED = "2026-11-21T04:00:00Z"
 HELD = replace(PRINTED, expected=4.0, drift=0.01)
 OTHER = "printed for A; not compared with this data (B)"

@@ -7,6 +7,8 @@ from validate.compare.exhibit import Mark, Panel, RegimeMap
 from validate.errors import ComparisonError
 from validate.report.charts.regime_map import _edges, picture
 
+# private: _edges: called alone, case by case.
+
 X = np.array([1e-3, 1e-2, 1e-1])
 CODES = np.array([[0, 0, 1], [0, 1, 2]])
 NOWHERE = np.array([np.nan, 2e-2])

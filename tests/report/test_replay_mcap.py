@@ -40,6 +40,9 @@ from validate.report.replay.view import Track
 from validate.report.sections import observations
 from validate.scene.mesh import boundary_facets
 
+# private: _ALL: a limit or list of the code, which the test must meet exactly.
+# private: _IMAGE_BYTES, _SAMPLES: replaced by a small number: a short test.
+
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]
 Messages = dict[str, list[tuple[int, Any]]]
 LOADS = ("0mm", "3mm", "6mm", "9mm")

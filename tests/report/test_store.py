@@ -16,11 +16,11 @@ from validate.compare.result import Result
 from validate.compare.score import Score
 from validate.errors import UsageError
 from validate.report.export.fields import open_fields, write_fields
-from validate.report.sections.discrimination import _row
-from validate.report.sections.registration import _rest as rest_table
+from validate.report.sections.discrimination import noise_rows
+from validate.report.sections.registration import registration
 from validate.report.stored.environment import without_folder
 from validate.report.stored.json_values import write_json
-from validate.report.stored.store import Json, _rest, document, schema
+from validate.report.stored.store import Json, document, schema
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -56,12 +56,15 @@ def test_every_table_shows_the_root_mean_square() -> None:
     values = np.array([[3.0, 4.0], [0.0, 0.0], [0.0, -5.0]])
     seen = Residual("force.plate", "2mm", values, 0.3, 0.4, "N", "plate force")
     rms = np.sqrt(50 / 3)
-    assert _rest(seen)["rms"] == pytest.approx(rms)
-    (row,) = rest_table((seen,)).rows
+    method = replace(small_result().methods[0], residuals={seen.name: seen})
+    result = replace(small_result(), methods=(method,), rest=(seen,))
+    assert document(result, CREATED)["rest"][0]["rms"] == pytest.approx(rms)
+    shown = registration(result)
+    assert shown is not None
+    (row,) = next(t for t in shown.tables if "noise" in str(t.headings)).rows
     sizes = [cell.value for cell in row if isinstance(cell, TableCell)]
     assert sizes == pytest.approx([rms, 5.0, np.sqrt(2) * 0.3])
-    method = replace(small_result().methods[0], residuals={seen.name: seen})
-    ((_, ratio),) = _row([method], "force.plate").ratios
+    ((_, ratio),) = noise_rows(result)[0].ratios
     assert ratio == pytest.approx(rms / np.sqrt(2 * (0.3**2 + 0.4**2)))
 
 

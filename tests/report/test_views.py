@@ -27,6 +27,8 @@ from validate.report.views.standard import STANDARD, VIEWS
 from validate.report.views.view_filling import filled
 from validate.report.write import table_of, write_report
 
+# private: _added: plug-ins of the test are taken out again.
+
 HEAD = {"methods": [{"name": "kf", "label": "Kalman filter", "accepted": True}]}
 ONE = LongRow(part="score", method="kf", quantity="tip", statistic="rms", unit="m")
 

@@ -99,8 +99,9 @@ def test_some_cuts_and_flips_are_a_body_or_one_line(name: str, tmp_path: Path) -
 @EACH
 def test_cuts_and_flips_are_a_body_or_one_line(name: str, tmp_path: Path) -> None:
     MAKE[name](tmp_path / name)
-    share = 200 if Path(name).suffix in SURFACES else 100 if name in APART else 1
-    under_attack(tmp_path / name, cuts=200 // share, flips=2000 // share)
+    surface = Path(name).suffix in SURFACES
+    cuts, flips = (1, 4) if surface else (2, 6) if name in APART else (60, 600)
+    under_attack(tmp_path / name, cuts, flips)
 
 
 @EACH

@@ -107,7 +107,7 @@ def test_what_bricks_do_not_have_is_refused() -> None:
         quadratic(needle_block(4).mesh)
     with pytest.raises(SceneError, match="quad4 have no quadratic form"):
         refined(needle_block(4))
-    with pytest.raises(SceneError, match="nodal mean dilatation supports simplices, not hex8"):
+    with pytest.raises(SceneError, match=r"nodal mean dilatation.*hex8"):
         replace(rod, dilatation="nodal_mean")
     with pytest.raises(SceneError, match="need triangular facets"):
         replace(rod, foundations=(Foundation("z0", (0,), 1.0),))
@@ -126,11 +126,11 @@ def test_plane_states_and_thicknesses_are_those_of_two_dimensions() -> None:
 
 
 def test_drives_and_weights_are_checked() -> None:
-    with pytest.raises(SceneError, match="expected finite speeds and increasing times"):
+    with pytest.raises(SceneError, match="expected finite speeds and increasing"):
         Drive("d", "x1", (1.0, 0.0), speeds=((1.0, 0.1), (0.0, 0.2)))
     with pytest.raises(SceneError, match="direction of length 2"):
         Weight("w", (0.0, 2.0))
-    with pytest.raises(SceneError, match="needle block of 5 cells a side: an even number"):
+    with pytest.raises(SceneError, match="needle block of 5 cells a side"):
         needle_block(5)
     with pytest.raises(SceneError, match="at least 1"):
         bending_rod(0)

@@ -14,6 +14,8 @@ from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.scene import Drive, Scene, Support
 
+# private: _filling: a cache, emptied as by a new process.
+
 SIZE = (0.03, 0.02, 0.02)
 
 

@@ -16,7 +16,7 @@ from validate.scene.scene import Scene
 
 
 def test_coefficients_that_the_law_would_not_use_are_refused() -> None:
-    with pytest.raises(SceneError, match=r"law 'neo_hooke' does not know C01 = 5.0: .* mooney_riv"):
+    with pytest.raises(SceneError, match=r"'neo_hooke'.*know C01 = 5.0.* mooney_riv"):
         Material(1e4, 0.4, "neo_hooke", coefficients=Coefficients(C01=5.0))
     with pytest.raises(SceneError, match="'svk' does not know volumetric = coupled"):
         Material(1e4, 0.4, "svk", coefficients=Coefficients(volumetric="coupled"))
@@ -34,7 +34,7 @@ def test_malformed_coefficients_are_refused() -> None:
     with pytest.raises(SceneError, match="nan among them"):
         Coefficients(C20=np.nan)
     for wrong in ((1.1, 2.0), (0.5,), (0.5, 0.9)):
-        with pytest.raises(SceneError, match="the first between 0 and 1, the second above 1"):
+        with pytest.raises(SceneError, match=r"between 0 and 1.*above 1"):
             Coefficients(stretches=wrong)
     with pytest.raises(SceneError, match="Ogden: 2 moduli for 1 powers"):
         ogden((1.0, 2.0), (2.0,), 0.4)

@@ -110,7 +110,7 @@ def test_a_declared_foundation_slips_has_springs_or_holds_its_places() -> None:
     assert springs.foundations[0].facets == "x0"
     assert [f.stiffness for f in springs.foundations] == [1e5, 1e5]
     assert [m.thickness for m in springs.membranes] == [1e-3]
-    with pytest.raises(SceneError, match="foundation 'plates': contact 'slip' is of a declared"):
+    with pytest.raises(SceneError, match=r"'plates'.*'slip'"):
         replace(slips, foundations=(replace(ground, facets="x0"),))
 
 

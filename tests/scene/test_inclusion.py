@@ -133,7 +133,7 @@ def test_inclusion_too_near_a_face_for_its_mesh_is_refused() -> None:
 
 
 def test_inclusion_smaller_than_an_element_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"diameter 1 mm is smaller than an element of 23.3 mm"):
+    with pytest.raises(SceneError, match=r"diameter 1 mm.*23.3 mm"):
         block_with_inclusion(BLOCK, (4, 4, 4), Capsule((0.03, 0.0225, 0.035), 0.0005, 0.001))
 
 
@@ -143,7 +143,7 @@ def test_an_element_counts_as_the_widest_beside_the_inclusion() -> None:
     def diameter(mm: float) -> Capsule:
         return Capsule((0.03, 0.0225, 0.040), mm / 2e3, 0.030)
 
-    with pytest.raises(SceneError, match=r"diameter 26.6 mm is smaller than an element of 26.7 mm"):
+    with pytest.raises(SceneError, match=r"diameter 26.6 mm.*26.7 mm"):
         block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.6))
     with pytest.raises(SceneError, match="no node of"):  # the next rule's words
         block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.7))
@@ -151,7 +151,7 @@ def test_an_element_counts_as_the_widest_beside_the_inclusion() -> None:
 
 def test_inclusion_between_the_nodes_is_refused() -> None:
     """As wide as an element, yet every node is outside."""
-    with pytest.raises(SceneError, match=r"no node of the \(8, 8, 8\) mesh .* radius 5.2 mm"):
+    with pytest.raises(SceneError, match=r"\(8, 8, 8\) mesh.* radius 5.2 mm"):
         block_with_inclusion(BLOCK, (8, 8, 8), Capsule((0.03, 0.0225, 0.035), 0.0052, 0.0104))
 
 

@@ -125,7 +125,7 @@ def test_inverted_element_is_named_by_its_number_and_volume() -> None:
 
 def test_flat_element_is_refused() -> None:
     nodes = np.vstack([UNIT_TET, [[1.0, 1.0, 0.0]]])
-    with pytest.raises(SceneError, match="1 of 2 elements inverted or flat, worst element 1"):
+    with pytest.raises(SceneError, match=r"1 of 2 elements.*element 1"):
         require_positive_cells(Mesh(nodes, np.array([[0, 1, 2, 3], [0, 1, 2, 4]]), "tet4"))
 
 

@@ -102,7 +102,7 @@ def test_sizes_are_bounded_before_memory_is_taken(
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("nodes.npy", bytes(65_000_000))
     assert path.stat().st_size < 100_000
-    with pytest.raises(SceneError, match=r"bomb\.npz: 65000000 bytes unpacked, the limit is"):
+    with pytest.raises(SceneError, match=r"bomb\.npz: 65000000 bytes"):
         read_mesh(path)
     monkeypatch.setattr(mesh_file, "MAX_BYTES", 1000)
     with pytest.raises(SceneError, match="the limit of a mesh file is 1000"):

@@ -28,7 +28,7 @@ def test_modulus_must_be_positive(E: float) -> None:
 
 @pytest.mark.parametrize("nu", [0.5000001, 0.51, -1.0, -2.0, math.nan])
 def test_poisson_ratio_has_a_range_and_a_reason(nu: float) -> None:
-    with pytest.raises(SceneError, match=r"expected -1 < nu <= 0.5; use at most 0.4999"):
+    with pytest.raises(SceneError, match=r"expected -1 < nu <= 0.5; use at.*0.4999"):
         Material(1.0, nu)
 
 
@@ -68,13 +68,11 @@ def test_a_regions_cells_are_those_of_the_mesh(cell: int) -> None:
 def test_what_a_plane_mesh_cannot_have_is_refused() -> None:
     plane = box((1.0, 1.0), (1, 1))
     for parts in ({"dilatation": "nodal_mean"}, {"foundations": (Foundation("x0", (0,), 1.0),)}):
-        with pytest.raises(SceneError, match="mean dilatation, foundations and membranes are for"):
+        with pytest.raises(SceneError, match="mean dilatation, foundations"):
             Scene(plane, Material(1.0, 0.3), **parts)  # type: ignore[arg-type]
-    with pytest.raises(SceneError, match="0 copies of the mesh: expected at least 1"):
+    with pytest.raises(SceneError, match=r"0 copies.*least 1"):
         Scene(plane, Material(1.0, 0.3), copies=0)
-    with pytest.raises(
-        SceneError, match="nodal mean dilatation supports one material; remove the reg"
-    ):
+    with pytest.raises(SceneError, match="nodal mean dilatation supports one"):
         Scene(
             box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1.0, 0.3), dilatation="nodal_mean",
             regions=(Region("stiff", np.array([0]), Material(2.0, 0.3)),),
@@ -90,7 +88,7 @@ def test_a_needle_touches_faces_of_simplices() -> None:
         require_usable((needle,), mesh)
     with pytest.raises(SceneError, match="2 needles: expected one"):
         require_usable((needle, needle), mesh)
-    with pytest.raises(SceneError, match="facets of 4 nodes in 3-D: a needle touches simplices"):
+    with pytest.raises(SceneError, match="4 nodes in 3-D"):
         Surface(np.zeros((1, 4), int), 3)
     assert Surface(np.zeros((1, 6), int), 3).facets.shape == (1, 6)
 

@@ -20,6 +20,8 @@ from validate.solve.explicit.central import CentralDifference, CentralStepper, D
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import State
 
+# private: _beta: called alone, case by case.
+
 LAWS = [
     "svk",
     "neo_hooke",
@@ -285,7 +287,5 @@ def test_lagged_damping_is_for_one_stiffness_damping() -> None:
         scene = SimpleNamespace(per_cell=lambda of, betas=betas: np.array(betas))
         assert scheme._beta(scene) == expected  # type: ignore[arg-type]
     scene = SimpleNamespace(per_cell=lambda of: np.array([0.2, 0.1]))
-    with pytest.raises(
-        SceneError, match=r"needs one value of stiffness damping, got \[.*0\.1.*0\.2.*\] s"
-    ):
+    with pytest.raises(SceneError, match=r"needs one value of stiffness damping.*0\.1.*0\.2.*\] s"):
         scheme._beta(scene)  # type: ignore[arg-type]

@@ -182,7 +182,7 @@ def test_drift_beyond_the_limit_is_measured_and_mended(small: Condensed) -> None
 def test_what_follows_from_others_cannot_be_driven() -> None:
     swapped = Swapped(np.array([[1.0, 1.0], [1.0, 1.0]]))
     swapped.swap(0)
-    with pytest.raises(SceneError, match=r"unknown 1 cannot be driven: its compliance is 0"):
+    with pytest.raises(SceneError, match=r"unknown 1 cannot.*0"):
         swapped.swap(1)
 
 

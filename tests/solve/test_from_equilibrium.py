@@ -67,7 +67,7 @@ def test_what_is_let_go_comes_to_rest_undeformed() -> None:
 
 
 def test_a_preload_of_other_inputs_is_refused() -> None:
-    with pytest.raises(SceneError, match="preload of 3 numbers, the scene has 2 inputs: load"):
+    with pytest.raises(SceneError, match=r"3 numbers.*2 inputs"):
         FromEquilibrium(DT, preload=(1.0, 2.0, 3.0)).prepare(build(BAR))
 
 

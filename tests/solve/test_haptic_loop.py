@@ -19,6 +19,8 @@ from validate.solve.haptic.loop import HapticLoop, HapticStepper, between_answer
 from validate.solve.haptic.spring_probe import Hold
 from validate.solve.types import State
 
+# private: _aim, _holding: called alone, case by case.
+
 L, H = 0.1, 1e-3
 TIP = (L / 3, L / 3, 0.1005)
 HAND = HapticLoop(every=1, late=0, pad=0.034, grip=None)

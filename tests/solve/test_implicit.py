@@ -9,6 +9,9 @@ from explicit_scenes import pulled, ran, rise
 from validate.errors import SceneError
 from validate.solve.dynamic.implicit import ImplicitStepper, NewtonDynamics, RateRule
 
+# private: _correction: replaced, to bring a case about.
+# private: _rates: called alone, case by case.
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("rule", "order"), [("average", 2), ("backward_euler", 1)])

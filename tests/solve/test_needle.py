@@ -23,6 +23,8 @@ from validate.solve.haptic.needle import NeedleLoop, NeedleStepper, Surface
 from validate.solve.march import march
 from validate.solve.types import State
 
+# private: _system: called alone, case by case.
+
 DOWN = (0.0, -1.0)
 TIP = (0.0031, 0.001)  # 1 mm over the block, between nodes
 

@@ -144,7 +144,7 @@ def test_a_scheme_of_a_touched_body_steps_and_says_what_its_states_mean(
 def test_a_scheme_of_drives_and_loads_refuses_fluid(scheme: type[Scheme], system: System) -> None:
     with pytest.raises(
         SceneError,
-        match=r"does not support fluid in cavities; .* use ExactPressure or",
+        match=r"does not support fluid in cavities.*use ExactPressure",
     ):
         scheme().prepare(system)
 
@@ -190,7 +190,7 @@ def test_dynamics_at_large_strain_refuse_cavities_and_the_linear_law(
 ) -> None:
     with pytest.raises(SceneError, match="does not support fluid in cavities"):
         scheme().prepare(large)
-    with pytest.raises(SceneError, match="cannot solve the law 'linear', only svk, neo_hooke"):
+    with pytest.raises(SceneError, match=r"'linear'.*neo_hooke"):
         scheme().prepare(build(replace(pressed.scene, material=Material(1e4, 0.4, rho=1000.0))))
 
 
@@ -221,9 +221,7 @@ def test_contact_is_refused_by_the_others(scheme: type[Scheme], pressed: System)
     plate = RigidContact("plate", "z1", RigidPlane((0.0, 0.0, 0.02), down), down)
     material = replace(pressed.scene.material, law=law)
     scene = replace(pressed.scene, material=material, loads=(), contacts=(plate,))
-    with pytest.raises(
-        SceneError, match="does not support contact with rigid bodies, the scene has 1"
-    ):
+    with pytest.raises(SceneError, match=r"does not support.*1"):
         settings(scheme).prepare(build(scene))
 
 

@@ -53,13 +53,13 @@ def test_a_scheme_that_steps_is_run_by_the_same_function() -> None:
     assert run.setup_s > 0
     with pytest.raises(SceneError, match="StretchTest solves only a material point"):
         run_scheme("m", StretchTest(), scene, T, np.ones((10, 1)), np.array([9]))
-    with pytest.raises(SceneError, match="QuasiStatic needs a mesh; use StretchTest"):
+    with pytest.raises(SceneError, match="QuasiStatic needs a mesh; use"):
         run_scheme("m", QuasiStatic(), POINT, T, np.ones((10, 1)), np.array([9]))
 
 
 def test_the_linear_law_has_no_large_stretch() -> None:
     linear = MaterialPoint(Material(1e4, 0.3), "uniaxial")
-    with pytest.raises(SceneError, match="StretchTest cannot solve the law 'linear'"):
+    with pytest.raises(SceneError, match="StretchTest cannot solve the law"):
         run_scheme("m", StretchTest(), linear, T, STRETCHES, np.array([9]))
 
 

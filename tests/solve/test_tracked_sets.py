@@ -125,7 +125,7 @@ def test_forces_have_it_too() -> None:
 
 def test_points_that_say_too_little_are_refused() -> None:
     line = tuple((str(i), (0.0, 0.01 * i, 0.0)) for i in range(4))
-    with pytest.raises(SceneError, match="points determine 5 of the 6 numbers of a rigid"):
+    with pytest.raises(SceneError, match=r"determine 5.*6 numbers"):
         Prescribed("base", BASE, line)
     with pytest.raises(SceneError, match="expected one label for each"):
         Prescribed("base", BASE, (*CORNERS, CORNERS[0]))

@@ -29,6 +29,8 @@ from validate.solve.march import march
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
 
+# private: _increment_energy: called alone, case by case.
+
 SERIES = Prony((0.8, 0.4), (0.05, 1.0))
 SIDE = 0.1
 
@@ -211,17 +213,15 @@ def test_what_an_increment_holds_is_of_the_relaxed_body() -> None:
 
 def test_what_explicit_branches_do_not_have_is_refused() -> None:
     system = relaxing(pulled("neo_hooke", 2))
-    with pytest.raises(SceneError, match="2 threads: a viscoelastic body supports one"):
+    with pytest.raises(SceneError, match="2 threads: a viscoelastic body"):
         CentralDifference(threads=2).prepare(system)
     bricks = grid((SIDE, SIDE, SIDE), (2, 2, 2))
-    with pytest.raises(SceneError, match="explicit hexahedra do not support a Prony series"):
+    with pytest.raises(SceneError, match="explicit hexahedra do not support"):
         CentralDifference().prepare(build(replace(system.scene, body=bricks, dilatation="mixed")))
 
 
 def test_schemes_that_remember_nothing_refuse_a_series() -> None:
     system = relaxing(pulled("neo_hooke", 2))
-    with pytest.raises(
-        SceneError, match=r"NodeEKF does not support a Prony series; use StaticNewton or"
-    ):
+    with pytest.raises(SceneError, match="NodeEKF does not support a Prony"):
         require_handled(system.scene, NodeEKF())
     assert NewtonDynamics.handles.covers(system.scene)

@@ -13,6 +13,8 @@ from validate.study.choose import study as choose
 from validate.study.choose.study import Wanted, left_out, meeting, misses, nearest, wanted
 from validate.study.tradeoff.study import TradeRow
 
+# private: _split: called alone, case by case.
+
 WANTED = Wanted(0.5e-3, 1000.0)
 ANY = Rival("any", "prefactored", Newmark)
 
@@ -87,7 +89,7 @@ def test_what_is_no_quantity_is_refused_in_one_line(error: str, rate: str) -> No
 
 
 def test_a_unit_of_something_else_is_refused() -> None:
-    with pytest.raises(UsageError, match="'s' is not a unit of displacement, force or pressure"):
+    with pytest.raises(UsageError, match="'s' is not a unit of displacement"):
         wanted("0.5s", "1000Hz")
 
 
@@ -106,7 +108,5 @@ def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
 
 
 def test_a_ladder_without_a_rung_is_refused() -> None:
-    with pytest.raises(
-        UsageError, match="no candidate method of the ladder has a cell for this scene; see 'st"
-    ):
+    with pytest.raises(UsageError, match="no candidate method of the ladder"):
         choose.choose(lambda *_: None, None, True, None)  # type: ignore[arg-type]

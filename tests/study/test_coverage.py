@@ -36,6 +36,9 @@ from validate.study.coverage.plan import (
 from validate.study.coverage.study import Coverage, coverage
 from validate.study.coverage.worlds import Study, _alike
 
+# private: _Truth, _alike, _mistaken, _of_method, _sides, _terms: called alone, case by case.
+# private: _readings: replaced, to bring a case about.
+
 ROOT = Path(__file__).parents[2]
 HERE = Where(0)
 TINY = (ROOT / "tests" / "pipeline" / "tiny.py").read_text("utf-8")
@@ -167,9 +170,7 @@ def test_readings_add_up_as_a_linear_body_does() -> None:
     assert base.plus(0.5, step, base).left[0] == pytest.approx([1.0, 2.0, 3.0])
     finer = ExactReading((np.array([2.0, 3.0, 4.0, 5.0, 6.0]),), (np.linspace(0, 2, 5),))
     assert finer.on(base).left[0] == pytest.approx([2.0, 4.0, 6.0])
-    with pytest.raises(
-        ComparisonError, match="8 numbers are measured in the drawn recording, 3 as judged"
-    ):
+    with pytest.raises(ComparisonError, match=r"8 numbers.*3 as"):
         ExactReading((np.zeros(8),), (t,)).on(base)
 
 
@@ -238,7 +239,7 @@ def test_an_input_without_solution_moves_as_the_surrogate_does(
 def test_a_method_that_is_its_own_surrogate_has_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     plus, minus = steps_of(("modulus",))
     own = {plus: Record[ExactReading]("a", refused="no state there"), minus: Record("b", at(9.0))}
-    with pytest.raises(ComparisonError, match="its truth could not be run: no state there"):
+    with pytest.raises(ComparisonError, match="its truth could not be run: no state"):
         coverage_worlds._sides(truth("fem", "fem"), own)
 
 
@@ -352,9 +353,7 @@ def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Pa
 
 
 def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(
-        ComparisonError, match="cell: SimpleNamespace cannot be drawn again; give it"
-    ):
+    with pytest.raises(ComparisonError, match="cell: SimpleNamespace cannot be drawn"):
         coverage_bench.drawable(SimpleNamespace(name="cell"))  # type: ignore[arg-type]
     end = SimpleNamespace(state="diverged", why="not finite")
     ended = SimpleNamespace(registered=[None], runs=[SimpleNamespace(outcome=end)])
@@ -367,7 +366,7 @@ def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
         coverage_bench.run_reading(SimpleNamespace(road=road), cell)  # type: ignore[arg-type]
     monkeypatch.setattr(coverage_bench, "terms_of", lambda *_: ())
     bench = SimpleNamespace(road=road, followed=lambda method: ended)
-    with pytest.raises(ComparisonError, match=r"m: no accepted quantity was compared .diverged"):
+    with pytest.raises(ComparisonError, match="m: no accepted quantity was compared"):
         coverage_bench.run_terms(bench, cell)  # type: ignore[arg-type]
 
 

@@ -24,6 +24,8 @@ from validate.study.filters.study import Best, _best, _edges, usual_score
 from validate.study.filters.withheld_errors import Innovations, Withheld
 from validate.study.sweep import axes
 
+# private: _best, _edges: called alone, case by case.
+
 ONE_SEGMENT = 0.1  # s
 BLOCKS = Blocks((0, 1, 2, 3), ONE_SEGMENT, ONE_SEGMENT, "kf")
 

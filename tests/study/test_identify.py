@@ -17,6 +17,8 @@ from validate.pipeline.experiment.find import load_file
 from validate.study.identify import study as identify_module
 from validate.study.identify.study import IdentifyStudy, identification
 
+# private: _value: called alone, case by case.
+
 ALONE = ("--workers", "0")
 
 

@@ -12,6 +12,8 @@ from validate.study.filters.plan import FilterCell
 from validate.study.filters.ranking import Ranking, dominator, rankings
 from validate.study.filters.score import FilterScores
 
+# private: _require_score: called alone, case by case.
+
 
 def ranked(**cells: tuple[Sequence[float], float | None]) -> Ranking:
     made = [FilterCell(name, (), (), key=name) for name in cells]
@@ -88,7 +90,7 @@ def test_errors_that_differ_by_rounding_are_one_error() -> None:
 
 def test_nothing_is_ranked_by_a_score_that_is_not_there_or_of_cells_that_failed() -> None:
     failed = {str(i): Record(str(i), failed=f"trap {i}") for i in range(3)}
-    with pytest.raises(ComparisonError, match="all 3 cells failed, 0 compared; the first: trap 0"):
+    with pytest.raises(ComparisonError, match=r"all 3 cells.*0 compared.*trap 0"):
         filters._require_score(SimpleNamespace(records=failed), "rmse")  # type: ignore[arg-type]
     good = {"a": Record("a", SimpleNamespace(scores={"top.rmse": 1.0}))}
     filters._require_score(SimpleNamespace(records=good), "top.rmse")  # type: ignore[arg-type]

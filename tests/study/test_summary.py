@@ -20,6 +20,9 @@ from validate.study.stored_runs.predictions import predictions, stored_runs
 from validate.study.stored_runs.summary import Summary, summary
 from validate.study.stored_runs.summary_page import _ROWS, _against, _points, document
 
+# private: _ROWS: a limit or list of the code, which the test must meet exactly.
+# private: _against, _points: called alone, case by case.
+
 
 def check(simulated: float, measured: float = 10.0, **more: Any) -> dict[str, Any]:
     found = {
@@ -208,8 +211,10 @@ def test_the_command_prints_and_draws_all_of_it(tmp_path: Path) -> None:
     assert "3 of 4 stored runs count" in out
     assert "q: a quick run" in out
     folder = tmp_path / "summary"
-    assert "Predicted against measured size" in (folder / "report.html").read_text("utf-8")
-    assert {p.name for p in (folder / "figures").iterdir()} == {"against.png"}
+    page = (folder / "report.html").read_text("utf-8")
+    assert all(f"{kind}: predicted against measured" in page for kind in ("displacement", "force"))
+    figures = {"chart_against_1.png", "chart_against_2.png"}
+    assert {p.name for p in (folder / "figures").iterdir()} == figures
     again = json.loads(here("summary", "--out", str(tmp_path), "--json")[1])
     with (folder / "tables" / "predictions.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))

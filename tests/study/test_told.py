@@ -14,6 +14,11 @@ from validate.study.stability.static_map import _cells
 from validate.study.stability.static_map import _map as gain_map
 from validate.study.stability.study import points
 
+# private: _COST: a limit or list of the code, which the test must meet exactly.
+# private: _cells, _map, _marks, _pareto_chart, _pareto_exhibit, _ranking_exhibit:
+#   called alone, case by case.
+# private: _rows, _under: replaced, to bring a case about.
+
 BASE = Turned(4e3, 0.45, 1e3, 1.0, 1e-3, 5)
 
 

@@ -49,6 +49,10 @@ from validate.study.tradeoff.held import held_bytes
 from validate.study.tradeoff.page import cells_table, trade_document
 from validate.study.tradeoff.study import Trade, TradeRow, front, trade_cells, traded
 
+# private: _choice_passages, _locking, _measured, _predicted, _sharing, _solved, _trade_passages:
+#   called alone, case by case.
+# private: _march, _scheme: replaced, to bring a case about.
+
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
 AVERAGE = Rival("average", "prefactored", Newmark)
@@ -458,9 +462,7 @@ def test_a_trade_without_its_reference_compares_nothing() -> None:
     trial = SimpleNamespace(reference=("tet4", 9))
     cell = SimpleNamespace(part="best", element="tet4", level=9, key="k")
     done = SimpleNamespace(records={"k": Record("k", failed="out of memory")})
-    with pytest.raises(
-        ComparisonError, match="no reference, so nothing was compared: out of memory"
-    ):
+    with pytest.raises(ComparisonError, match="no reference, so nothing was compared"):
         trade.traded(None, trial, (cell,), done, True)  # type: ignore[arg-type]
 
 
@@ -473,7 +475,7 @@ def test_a_reference_that_ends_early_names_its_mesh(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(trade_cell, "_march", lambda *_: run)
     trial = SimpleNamespace(build=lambda *_: None)
     cell = SimpleNamespace(part="best", element="tet4", level=9, steps=(0.1,))
-    with pytest.raises(ComparisonError, match="run on tet4 mesh 9 ended at step 3: not finite"):
+    with pytest.raises(ComparisonError, match="tet4 mesh 9 ended at step 3"):
         trade_cell.run_cell(trial, cell)  # type: ignore[arg-type]
 
 
@@ -517,21 +519,17 @@ def test_a_solver_that_is_refused_has_a_stride_of_its_words(
 def test_studies_of_what_cannot_be_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stability_cell, "body_of", lambda experiment: None)
     job = SimpleNamespace(experiment=lambda: None)
-    with pytest.raises(
-        ComparisonError, match="the experiment declares no density, so no scheme can step"
-    ):
+    with pytest.raises(ComparisonError, match="the experiment declares no density, so"):
         stability_cell.open_bench(job)  # type: ignore[arg-type]
     marked = SimpleNamespace(markers=("tip",), steps=None)
     experiment = SimpleNamespace(name="x", methods={"kf": marked}, reference="", accepted=("kf",))
-    with pytest.raises(
-        ComparisonError, match="x: every method uses markers, so none can be the truth"
-    ):
+    with pytest.raises(ComparisonError, match="x: every method uses markers, so none"):
         coverage_plan.true_method(experiment, "kf")  # type: ignore[arg-type]
     failed = SimpleNamespace(failure=("not_converged", "no root"))
     stepper = SimpleNamespace(rest=lambda: None, step=lambda *_: failed)
     exact = SimpleNamespace(on=lambda columns: stepper)
     monkeypatch.setattr(gain, "ExactPressure", lambda: exact)
-    with pytest.raises(ComparisonError, match="no pressure keeps the volume constant: no root"):
+    with pytest.raises(ComparisonError, match="no pressure keeps the volume constant"):
         gain._predicted(None, None)  # type: ignore[arg-type]
 
     def coupled(*_: object) -> None:

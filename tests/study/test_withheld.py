@@ -270,11 +270,9 @@ def test_a_marker_that_is_held_out_by_name_scores_and_is_not_given(tmp_path: obj
 
 def test_held_out_names_are_markers_that_move_and_leave_one_to_the_filter(tmp_path: Path) -> None:
     bench, cell = two_markers(tmp_path)
-    with pytest.raises(
-        UsageError, match="--hold-out a: no moving marker has that name; moving markers are"
-    ):
+    with pytest.raises(UsageError, match="--hold-out a: no"):
         run_cell(bench, replace(cell, hold_out=("a",)))
-    with pytest.raises(UsageError, match="--hold-out top, side leaves nothing of top, side to"):
+    with pytest.raises(UsageError, match="--hold-out top, side leaves"):
         run_cell(bench, replace(cell, hold_out=("top", "side")))
 
 
@@ -327,7 +325,7 @@ def test_a_measured_recording_is_ranked_on_blocks_and_other_markers(
 
 def test_where_every_setting_of_a_filter_fails_the_reason_is_said(tmp_path: Path) -> None:
     pulled = load_file(experiment_file(tmp_path))
-    with pytest.raises(ComparisonError, match=r"all 1 settings of filters failed; .*Q = -1 m2"):
+    with pytest.raises(ComparisonError, match=r"all 1 settings.*Q = -1 m2"):
         study(
             pulled, ["methods.kf.Q=-1"], methods=("kf", "plain"), seeds=1, out=tmp_path,
             where=Where(workers=0),

@@ -5,6 +5,8 @@ import pytest
 
 from validate.twin.sensors import OutlineSensor
 
+# private: _segmented: called alone, case by case.
+
 
 def test_an_outline_scatters_along_its_normal() -> None:
     """Of a circle the noise moves radii by sd, and no polar angle."""

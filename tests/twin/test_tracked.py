@@ -132,7 +132,7 @@ def test_rest_in_front_is_not_doubled_and_must_be_rest() -> None:
     exact = Camera(0.0)
     same = made(exact, begun).markers["markers"].x
     assert np.array_equal(same, made(exact).markers["markers"].x)
-    with pytest.raises(RecordingError, match="4 mm away from their rest position at t = 0"):
+    with pytest.raises(RecordingError, match=r"4 mm away from their.*0"):
         made(exact, replace(begun, u=begun.u[::-1]))
 
 
@@ -193,14 +193,14 @@ def test_settings_that_mean_nothing_are_refused(settings: dict[str, float]) -> N
 def test_clashes_and_wrong_lengths_are_refused() -> None:
     with pytest.raises(RecordingError, match=r"\['A'\] are both"):
         record_tracked(ORIGIN, points(), {"A": REST[0]}, Camera(0.0), {})
-    with pytest.raises(RecordingError, match=r"reading 'force': shape \(3,\), expected \(400\)"):
+    with pytest.raises(RecordingError, match=r"'force': shape \(3,\), expected \(400\)"):
         record_tracked(ORIGIN, points(), FIXED, Camera(0.0), {FORCE: Reading(np.zeros(3), "N")})
 
 
 def test_records_that_are_no_vectors_are_refused() -> None:
     recording = made(Camera(0.0))
     spoilt = {**recording.metadata, "camera": {"up": "0 1"}}
-    with pytest.raises(RegistrationError, match="camera 'up' is '0 1': expected three numbers"):
+    with pytest.raises(RegistrationError, match="'up' is '0 1': expected"):
         placed_markers(replace(recording, metadata=spoilt), MESH)
 
 

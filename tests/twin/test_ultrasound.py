@@ -95,5 +95,5 @@ def test_same_seed_same_image() -> None:
 
 
 def test_an_outline_of_wrong_shape_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"outline \(2, 2\): expected at least 3 points"):
+    with pytest.raises(SceneError, match=r"outline \(2, 2\): expected at least 3"):
         b_mode(QUIET, Target(np.zeros((2, 2))), np.random.default_rng(0))

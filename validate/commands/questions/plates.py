@@ -169,7 +169,7 @@ def _solver(found: Answers) -> str:
 def _imports(found: Answers) -> set[str]:
     """The lines that import what the file uses."""
     solver = {
-        "T": {"static.newton import StaticNewton", "static.tabulated import Tabulated"},
+        "T": {"static.newton import StaticNewton", "static.load_table import Tabulated"},
         "E": {"fluid.cavities import ExactPressure"},
         "N": {"fluid.cavities import NoFluid"},
     }[_solver(found)[0]]

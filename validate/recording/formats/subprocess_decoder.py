@@ -94,7 +94,7 @@ def _ended(
     try:
         return subprocess.run(
             python_module(
-                f"{_HOME}.apart",
+                f"{_HOME}.subprocess_decoder",
                 decoder,
                 str(path.absolute()),
                 str(out),
