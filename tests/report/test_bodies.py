@@ -11,6 +11,8 @@ import pytest
 import report_samples
 from report_samples import small_result
 
+from validate.fem.assembly.locate import nearest_node_rows
+from validate.register.markers.markers import MarkerObservation
 from validate.report.scenes import gl
 from validate.report.scenes.bodies import _without_gl
 from validate.report.scenes.body import ShownBody, shown_body
@@ -39,6 +41,30 @@ def test_plates_lie_outside() -> None:
     centres = sorted(float(p.centre[0]) for p in cube_body().plates)
     assert centres[0] < 0
     assert centres[1] > 20
+
+
+def test_markers_stand_where_they_were_measured_and_where_the_run_has_them() -> None:
+    """At the load that is drawn; one that was not seen there is left out."""
+    result = small_result()
+    method = result.methods[0]
+    mesh, recording = method.scene.mesh, method.registered[0]
+    t, rest = recording.t, mesh.nodes[[0, -1, 1]]
+    x = np.repeat(rest[None] + [0.0, 0.0, 3e-3], len(t), axis=0)
+    x[:, 2] = np.nan
+    none: object = None
+    seen = MarkerObservation(
+        "seen", "validates", t, ("a", "b", "c"), x, rest, nearest_node_rows(mesh, rest), 1e-4,
+        np.full(3, 1e-4), none,  # type: ignore[arg-type]
+    )  # fmt: skip
+    registered = (replace(recording, observations=(*recording.observations, seen)),)
+    found = shown_body(replace(result, methods=(replace(method, registered=registered),)))
+    assert found is not None
+    assert found.markers is not None
+    moved = 1e3 * mesh.nodes[[0, -1]] + found.u[[0, -1]]
+    assert found.markers.simulated == pytest.approx(moved)
+    assert found.markers.measured == pytest.approx(1e3 * rest[:2] + [0.0, 0.0, 3.0])
+    off = np.linalg.norm(found.markers.measured - found.markers.simulated, axis=1)
+    assert found.markers.largest == pytest.approx(off.max())
 
 
 def test_drawn_body_follows_the_displacement() -> None:
@@ -92,15 +118,20 @@ import sys
 from dataclasses import replace
 import numpy as np
 from report_samples import small_result
-from validate.report import gl
+from validate.report.scenes import gl
 if not gl.available():
     raise SystemExit(3)
-from validate.report.scenes.body import shown_body
+from validate.report.scenes.body import ShownMarkers, shown_body
 from validate.report.scenes.renders import renders
 one = shown_body(small_result())
 for factor in (1.0, 2.0):
     np.savez(f"{sys.argv[1]}/{factor:g}.npz",
              **{p.name: p.pixels for p in renders(replace(one, u=factor * one.u))})
+at = 1e3 * one.mesh.nodes[[0, -1]] + one.u[[0, -1]]
+marked = renders(replace(one, markers=ShownMarkers(at + [0.0, 0.0, 1.0], at)))
+assert [p.name for p in marked] == ["render_markers", "render_rest", "render_flat", "render_mesh"]
+assert "(largest distance 1.00 mm; arrows 2 times as long)" in marked[0].caption, marked[0].caption
+np.savez(f"{sys.argv[1]}/marked.npz", marked=marked[0].pixels)
 """
 
 
@@ -120,6 +151,12 @@ def test_renders(tmp_path: Path, project_root: Path) -> None:
     if done.returncode == 3:
         pytest.skip("no OpenGL library: renders not tested")
     assert done.returncode == 0, done.stderr
+    with np.load(tmp_path / "marked.npz") as found, np.load(tmp_path / "1.npz") as one:
+        red, green, blue = found["marked"].astype(int).transpose(2, 0, 1)
+        assert ((red > 150) & (green < 130) & (blue < 60)).sum() > 10  # the arrows
+        assert (found["marked"].max(axis=2) < 60).sum() > (
+            one["render_deformed"].max(axis=2) < 60
+        ).sum()  # the markers
     with np.load(tmp_path / "1.npz") as one, np.load(tmp_path / "2.npz") as two:
         assert all(one[name].min() < 200 < one[name].max() for name in one.files)
         assert near(one["render_rest"], two["render_rest"])

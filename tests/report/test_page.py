@@ -67,6 +67,20 @@ def test_self_contained_and_well_formed() -> None:
     assert len(text.encode()) < 2_000_000
 
 
+def test_the_body_and_all_checks_stand_first_and_once() -> None:
+    """Before the contents, whose sections link to them."""
+    _, text = made(small_result())
+    head = text[: text.index("<nav")]
+    for name in ("render_deformed", "cut", "intervals_limits"):
+        if f'id="figure-{name}"' in text:
+            assert f'id="figure-{name}"' in head
+            assert text.count(f'id="figure-{name}"') == 1
+            assert text.count(f'href="#figure-{name}"') == 1
+    assert 'id="figure-intervals_limits"' in head
+    assert "Hz" in head[head.index('class="cost"') :]
+    assert 'class="figures first"' not in empty(small_result())
+
+
 @pytest.mark.slow
 def test_sections_of_a_recording_with_force_only() -> None:
     found, _ = made(small_result())

@@ -5,11 +5,13 @@ from importlib.resources import files
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
-from validate.compare.exhibit import Picture
+from validate.compare.exhibit import Animation, Picture
 from validate.compare.result import Result
 from validate.report.charts.encode import uri
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import across, caption, shown, word_columns
+from validate.report.sections.observations import timed
+from validate.report.views.numbers import with_unit
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
 
@@ -22,20 +24,44 @@ def page(
     `band` is the colour class and the word before the result's sentence.
     """
     colour, word = band
+    shown = [e for e in exhibits if e.shown]
+    first = first_pictures(shown)
     return _template("report.html").render(
-        result=result, exhibits=[e for e in exhibits if e.shown], created=created, colour=colour,
-        word=word,
+        result=result, exhibits=shown, created=created, colour=colour, word=word, first=first,
+        above=[picture.name for picture in first], cost=cost(result),
     )  # fmt: skip
+
+
+#: Pictures of the first screen, by name: the body with what was measured, else the body.
+_BODY = ("render_markers", "render_deformed", "cut", "markers", "outlines")
+_CHECKS = "intervals_limits"
+
+
+def first_pictures(exhibits: Iterable[DrawnExhibit]) -> list[Picture | Animation]:
+    """The body as simulated and measured, and every check against its limit; what is there."""
+    by_name = {picture.name: picture for e in exhibits for picture in e.pictures}
+    body = next((by_name[name] for name in _BODY if name in by_name), None)
+    return [p for p in (body, by_name.get(_CHECKS)) if p is not None]
+
+
+def cost(result: Result) -> str:
+    """The rate of each checked method and how it was measured; "" where none finished a step."""
+    found = [
+        f"{m.called}: {with_unit(times.rate_hz, 'Hz')}"
+        for m in result.methods
+        if m.checks and (times := timed(m.run)) is not None
+    ]
+    return "; ".join(found)
 
 
 def fragment(exhibits: Iterable[DrawnExhibit]) -> str:
     """Some exhibits alone as one HTML text that needs no other file and no script."""
-    return _template("fragment.html").render(exhibits=[e for e in exhibits if e.shown])
+    return _template("fragment.html").render(exhibits=[e for e in exhibits if e.shown], above=[])
 
 
 def sections(exhibits: Iterable[DrawnExhibit]) -> str:
     """Some exhibits in HTML for a page that has a head and a style of its own."""
-    return _template("sections.html").render(exhibits=[e for e in exhibits if e.shown])
+    return _template("sections.html").render(exhibits=[e for e in exhibits if e.shown], above=[])
 
 
 def _template(name: str) -> Template:

@@ -223,7 +223,7 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
         if key in mine.residuals:
             rows = probe_rows(mine.body.mesh, (probe,))
             sd = np.array([rows.apply(s)[0] for s in mine.run.sd])
-            claimed = replace(mine.residuals[key], values=sd, sd=0.0)
+            claimed = replace(mine.residuals[key], values=sd, sd=0.0, t=None)
             found[key] = [Sensitivity(OWN_COVARIANCE, claimed)]
     return found
 
