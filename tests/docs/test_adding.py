@@ -22,7 +22,8 @@ def blocks(project_root: Path) -> list[str]:
 
 
 PARTS = (
-    "solver", "filter", "file format", "sensor", "score", "experiment", "geometry", "view", "command",
+    "solver", "filter", "file format", "sensor", "score", "experiment",
+    "geometry", "view", "command",
 )  # fmt: skip
 
 

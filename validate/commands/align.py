@@ -1,4 +1,4 @@
-"""`validate align`: files of one test, whose clocks know nothing of each other."""
+"""`validate align`: clock offset between recordings of one test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What the commands share: exit codes, kinds of options, and texts of the form PATH=VALUE."""
+"""Arguments that commands share: exit codes, option types and PATH=VALUE texts."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator

@@ -1,4 +1,4 @@
-"""`validate check`: published figures and declared verdicts, today."""
+"""`validate check`: published figures and declared verdicts against current results."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`validate compare`: stored runs side by side, on one screen."""
+"""`validate compare`: stored runs side by side."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""`validate study coverage`: how often our own verdicts are wrong; runs, writes, prints."""
+"""`validate study coverage`: error rates of verdicts on a known truth."""
 
 from validate.commands.arguments import FAILED, OK, pairs
 from validate.commands.screen import Passage, rows, sentences

@@ -1,4 +1,4 @@
-"""`validate data`: recordings made by others by name, and how they come here."""
+"""`validate data`: list and download third-party data sets."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`validate digitise`: the landmarks that the tip of a tracked tool was held on."""
+"""`validate digitise`: landmarks of a body, touched with the tip of a tracked tool."""
 
 import csv
 import io

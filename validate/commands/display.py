@@ -1,4 +1,4 @@
-"""Tables and sentences on the terminal; plain lines when it is not one."""
+"""Tables and sentences on the terminal; plain lines in a pipe or file."""
 
 import os
 import sys

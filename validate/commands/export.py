@@ -1,4 +1,4 @@
-"""`validate export`: a stored run for other programs."""
+"""`validate export`: export a stored run as JUnit XML or LaTeX."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Help pages: commands in groups by what they are for, each page with an example."""
+"""Help pages: commands in groups by purpose, each page with an example."""
 
 import io
 from collections.abc import Iterator

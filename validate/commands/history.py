@@ -1,4 +1,4 @@
-"""`validate history`: the runs of an experiment and what changed from one to the next."""
+"""`validate history`: past runs of an experiment and the changes between them."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""`validate identify`: parameters with profile intervals, or why they are not identifiable."""
+"""`validate identify`: parameters with profile intervals, and their identifiability."""
 
 from validate.commands.arguments import FAILED, OK, Detail, pairs
 from validate.commands.display import shown

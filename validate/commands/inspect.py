@@ -1,4 +1,4 @@
-"""`validate inspect`: what a recording holds, and how it moves."""
+"""`validate inspect`: content of a recording and summary of its motion."""
 
 import json
 from collections.abc import Mapping, Sequence

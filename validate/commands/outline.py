@@ -1,4 +1,4 @@
-"""`validate outline`: outlines found in a recording's images, or drawn by others, as a stream."""
+"""`validate outline`: outlines in a recording's images, or third-party ones, as a stream."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What runs, for how long, and how long it will still take: on standard error.
+"""Progress on standard error: current work, elapsed and remaining time.
 
 On a terminal something moves and the seconds count, whatever is being computed. In a pipe a line
 is written now and then.

@@ -1,4 +1,4 @@
-"""`validate record`: the synthetic recording of an experiment."""
+"""`validate record`: synthetic recording of an experiment."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Summary of a recording in lines that fit a comment of a Python file."""
+"""Summary of a recording as comment lines of a Python file."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`validate import` and `merge`."""
+"""`validate import` and `validate merge`."""
 
 from collections.abc import Mapping
 from pathlib import Path

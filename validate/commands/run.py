@@ -1,4 +1,4 @@
-"""`validate run`."""
+"""`validate run`: run experiments and write their reports."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping

@@ -1,4 +1,4 @@
-"""What a run prints: verdict, deciding checks, identified values, ranking, next steps, report."""
+"""Terminal output of a run: verdict, checks, identified values, ranking, next steps."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

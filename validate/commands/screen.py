@@ -1,4 +1,4 @@
-"""One screen of text: passages of lines that share a number of lines.
+"""One screen of text: passages that share a limited number of lines.
 
 show([Passage("Checks", rows, keep=2, most=8)])  # on at most 25 lines
 """

@@ -1,4 +1,4 @@
-"""`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
+"""`validate study filters|stability|tradeoff|choose`: run a study and print its result."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

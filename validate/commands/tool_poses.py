@@ -1,4 +1,4 @@
-"""Poses of a tracked tool in a recording, as commands name it."""
+"""Poses of a tracked tool in a recording, by the names that commands use."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Relative bias and scatter of predictions over many experiments, as fire models are validated.
+"""Relative bias and scatter of predictions over many experiments, as in validation of fire models.
 
 McGrattan and Toman (2011), "Quantifying the predictive uncertainty of complex numerical models",
 Metrologia 48, 173-180; NUREG-1824, supplement 1 (2016). Measured E and predicted M scatter about

@@ -1,4 +1,4 @@
-"""How often a verdict is wrong: shares with their intervals, and which term of u_val is at fault.
+"""Error rates of verdicts with intervals, and the term of u_val that causes them.
 
 A perfect model is called different in 4.6 % of comparisons where E is normal with the standard
 uncertainty u_val. More than `MOST` says that a term is too narrow, fewer than `LEAST` that one is

@@ -1,4 +1,4 @@
-"""What a recording can tell apart: the size of an effect against the noise of every sensor.
+"""Separability of effects: size of an effect against the noise of every sensor.
 
 An effect is the difference between two models against the same measurement. Over k points with
 noise sd it is seen with separation rms(difference) / sqrt(sd^2/k + shared^2), where `shared` is

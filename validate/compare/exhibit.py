@@ -1,4 +1,4 @@
-"""What a report shows, as plain data: sentences, tables, charts, maps on the mesh, pictures."""
+"""Report items as plain data: sentences, tables, charts, maps on the mesh, images."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Errors of a force over time: of its peak, on the whole, and in phase."""
+"""Errors of a force over time: peak error, relative error and phase."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

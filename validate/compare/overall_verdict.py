@@ -1,4 +1,4 @@
-"""The overall verdict of an experiment: acceptance and validation over all its checks.
+"""Overall verdict of an experiment: acceptance and validation over all its checks.
 
 *Good enough*: every requirement is met. Each check is a test of its own and all must pass, so that
 their number needs no correction: an intersection-union test, Berger (1982), "Multiparameter

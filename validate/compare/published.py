@@ -1,4 +1,4 @@
-"""Printed figures: declared before anything runs, judged by today's value wherever they are shown.
+"""Published figures, declared before a run and checked against its values.
 
 A figure belongs to the data it was printed for: beside other data it is not compared at all.
 """

@@ -1,4 +1,4 @@
-"""The whole comparison of an experiment: what the report shows and the exit code rests on."""
+"""Result of a comparison: all data of a report and of the exit code."""
 
 from __future__ import annotations
 

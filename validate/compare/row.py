@@ -1,4 +1,4 @@
-"""A row of the long table: one number with its labels; and many rows that share them, as arrays."""
+"""Rows of the long table: one labelled number, or many with common labels as arrays."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Scores: a residual's statistics, each with unit, count and definition; never averaged RMSEs."""
+"""Scores: statistics of a residual with unit, count and definition; RMSEs are never averaged."""
 
 from __future__ import annotations
 

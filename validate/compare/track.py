@@ -1,4 +1,4 @@
-"""Errors of a displacement over time at one point, in the papers' own definitions.
+"""Errors of a displacement over time at one point, by the definitions of the papers.
 
 MAE, RMSE and SD as in paper 003, Tables 1-3: SD is the sample standard deviation (ddof 1) of the
 absolute error, not of the signed one. NRMSE as in paper 001: RMSE over the range (largest less

@@ -1,4 +1,4 @@
-"""Two answers per check: does the model differ from what was measured, and is it good enough?
+"""Verdict of a check: does the error differ from zero, and is it good enough?
 
 E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard uncertainties).
 

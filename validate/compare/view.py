@@ -1,4 +1,4 @@
-"""A view: which rows of the long table are shown, how they are arranged, and how it is drawn.
+"""View: declaration of a table, chart or sentence over rows of the long table.
 
 View("late_error", "Error at the last markers", {"part": "score", "quantity": "marker.*",
      "statistic": "rms"}, form="lines", x="at", by="method", unit="mm")

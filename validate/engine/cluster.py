@@ -1,4 +1,4 @@
-"""Cells on Dask: a local cluster on loopback, or a scheduler that already runs."""
+"""Cells on Dask: a local cluster on loopback, or an existing scheduler."""
 
 import logging
 import os

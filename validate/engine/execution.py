@@ -1,4 +1,4 @@
-"""Execution of cells: compute those that the store does not hold, and keep each as it finishes.
+"""Execution of cells: compute those that are not stored, and store each at once.
 
 Whoever plans cells says how a worker opens the job and runs a cell, and reads the records. Cells
 whose time is measured run with little or nothing beside them.

@@ -1,4 +1,4 @@
-"""Where cells run, for as long as a command lasts: this process, local workers or a scheduler."""
+"""Pool of workers of one command: this process, local workers or a scheduler."""
 
 import threading
 from collections.abc import Callable, Sequence

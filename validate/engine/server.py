@@ -1,4 +1,4 @@
-"""The process that local workers are forked from: what they need is imported there, once.
+"""Fork server of local workers: libraries are imported there once.
 
 It starts in a clean environment (`child_process`), with one thread for numerical libraries, and
 deaf to Ctrl-C, which its parent answers. It has no output: a pipe behind the command would wait for

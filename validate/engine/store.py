@@ -1,5 +1,4 @@
-"""What is kept of cells: a JSON file each, its arrays in a .npz beside it, under a key of all that
-makes its numbers."""
+"""Store of cells: one JSON file each, arrays in .npz, under a key of all inputs of its numbers."""
 
 import hashlib
 import io

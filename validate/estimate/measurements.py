@@ -1,4 +1,4 @@
-"""What a filter is given: measurements of displacements, and the steps on which they land."""
+"""Measurements of a filter: displacements, and the time steps that they belong to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

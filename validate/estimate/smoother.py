@@ -1,4 +1,4 @@
-"""Smoothing of a recorded run: every step estimated from all looks, the later ones too.
+"""Smoothing of a recorded run: every step estimated from all measurements, later ones too.
 
 Rauch, Tung & Striebel (1965), in the form of Bryson & Frazier (1963), whose results are the same
 and which inverts no P: ours is singular wherever the start is known or noise acts along few shapes.

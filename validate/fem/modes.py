@@ -1,4 +1,4 @@
-"""Mode shapes, frequencies and dampings of a system: K phi = w^2 M phi."""
+"""Mode shapes, frequencies and damping ratios of a system: K phi = w^2 M phi."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Whether anything lets a body move rigidly: the rank of its rigid motions on what is held."""
+"""Rigid-body motions of a supported body: rank of its constraints."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The system of a scene: stiffness, held unknowns, factorisation, and its response columns.
+"""System of a scene: stiffness, constrained unknowns, factorisation, response columns.
 
 A linear scene with drives and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
 + sum_i P_i u_i. They are solved for once; every later step is a short product (the columns of the

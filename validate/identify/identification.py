@@ -1,4 +1,4 @@
-"""What a recording says of parameters: values, 95 % intervals, correlations, and what it does not.
+"""Identification result: values, 95 % intervals, correlations, unidentifiable parameters.
 
 `identify` asks for fits from seeded starts, then for both sides of every parameter's profile;
 whoever evaluates them may do so side by side. "Not identifiable" is a result: an interval wider

@@ -1,4 +1,4 @@
-"""Bounded least squares over a callable residual that is dear: scipy's trust region, few calls.
+"""Bounded least squares of an expensive residual: scipy's trust region with few calls.
 
 The Jacobian is taken by differences once and then follows the steps (Broyden 1965); where the
 optimiser stops it is taken anew, and what that promises decides whether the end is one.

@@ -1,4 +1,4 @@
-"""The apparent compressive modulus of a cylinder from force-displacement logs.
+"""Apparent compressive modulus of a cylinder from force-displacement logs.
 
 Definition. Stress is F / A0 and strain (d - d_contact) / h0 (engineering, on the undeformed
 cylinder). E_apparent is the least-squares slope of stress over strain, with free intercept, over

@@ -1,4 +1,4 @@
-"""What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
+"""Motion of a recording: amplitude, direction, frequencies, rest intervals, gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
 first principal axis of its displacements); of outlines that of places at every 10 degrees about the

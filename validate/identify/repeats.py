@@ -1,4 +1,4 @@
-"""Several logs of one test, of one specimen or several, as one recording: their mean and scatter.
+"""Repeated tests of one or several specimens as one recording: mean and scatter.
 
 Each log is counted from contact, its cell's offset taken off, and its first loading is read at
 displacements that all share. Every specimen has one vote. The logs themselves stay beside.

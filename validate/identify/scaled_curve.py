@@ -1,4 +1,4 @@
-"""Closed-form fit of a modulus: the scale of a law's unit curve, and where its load begins.
+"""Closed-form fit of a modulus: scale of a law's unit curve, and the start of its load.
 
 A law whose force is proportional to its modulus needs one solution with a unit modulus: the modulus
 is the scale that fits the measured force, a linear least-squares problem. Where the load begins is

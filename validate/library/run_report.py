@@ -1,4 +1,4 @@
-"""One run with its report: what the command `validate run` and the function `run` share."""
+"""One run with its report: common part of `validate run` and the function `run`."""
 
 import logging
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""A stored run as an object: verdict, checks, table, fields, figures."""
+"""Result of a stored run: verdict, checks, table, fields, figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

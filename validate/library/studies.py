@@ -1,4 +1,4 @@
-"""The studies: what `validate study`, `validate identify` and the function `study` share.
+"""Studies: common part of `validate study`, `validate identify` and the function `study`.
 
 Each returns what it found and the page that it wrote; an interruption keeps finished cells.
 """

@@ -1,4 +1,4 @@
-"""A stored study as an object: answer, table of cells, figures."""
+"""Result of a stored study: answer, table of cells, figures."""
 
 import csv
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""An experiment and the pipeline from its recording to a comparison.
+"""Experiment and pipeline: from a recording to a comparison.
 
 from validate.pipeline import load, run_in_memory
 result = run_in_memory(load("fluid_phantom"), {"material.E": "14000"})

@@ -1,4 +1,4 @@
-"""Trial solvers of a block that swings, held at one end and compared at the other."""
+"""Trial solvers of a swinging block, clamped at one end and compared at the other."""
 
 from collections.abc import Callable
 from dataclasses import replace

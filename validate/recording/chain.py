@@ -1,5 +1,4 @@
-"""Frames along a chain of transforms: whether they turn as bodies do, and whether two ways from one
-frame to another say the same.
+"""Chains of coordinate transforms: proper rotations, and consistency of two paths.
 
 A pose `<X>To<Y>/rotation`, `/translation`, or `<X>/...` in the frame Y, is T_Y_from_X. One pose
 alone stands for all times. Poses that link frames anew make a tree; each other one closes a way,

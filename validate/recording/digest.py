@@ -1,4 +1,4 @@
-"""What must be read from a recording, in short: the JSON that lies beside a twin's file.
+"""Digest of a twin's recording: short JSON beside its file.
 
 Every array is held by shape, first and last row, sum and a SHA-256 of its little-endian bytes. The
 hash is what must be equal; the rest tells a reader of a failed comparison what has changed.

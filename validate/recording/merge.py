@@ -1,4 +1,4 @@
-"""Files of one test with clocks of their own become one recording on the clock of the first.
+"""Merge of recordings of one test onto the clock of the first.
 
 The streams of a further file share one clock, so one offset moves all of them. Whether that clock
 also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1),

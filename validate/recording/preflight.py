@@ -1,4 +1,4 @@
-"""What a file holds and what is wrong with it, whoever wrote it: the pre-flight check.
+"""Pre-flight check of a file of any format: its content and its faults.
 
 An MCAP file is inspected as it is; one of another format by what its reader makes of it.
 

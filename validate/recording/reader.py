@@ -1,4 +1,4 @@
-"""What a reader of one format is, and what all of them need.
+"""Type of a reader of one format, and helpers of all readers.
 
 A new format of the package is one file with its `Reader`, and a line in `readers`.
 """

@@ -1,4 +1,4 @@
-"""Readers of recordings: the package's own, those of plug-ins and those that a script adds."""
+"""Registry of readers: built-in ones, plug-ins and those of scripts."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Scales of images, outlines and markers beyond reason: by how much, and which unit may be meant.
+"""Implausible scales of images, outlines and markers, and the unit that may be meant.
 
 A recording whose metres are millimetres agrees with itself as well as any other, so it is asked
 back where images enter.

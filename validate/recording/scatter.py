@@ -1,4 +1,4 @@
-"""What repeats of a test say of a recording that is their mean: how far it may be off."""
+"""Scatter of repeated tests as uncertainty of their mean recording."""
 
 import math
 

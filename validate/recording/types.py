@@ -1,4 +1,4 @@
-"""What a recording holds. Every type is frozen and checks itself once, when it is made.
+"""Types of a recording: markers, signals, outlines, images. All are frozen and checked once.
 
 Times are float seconds from the recording's first message; the int64 nanoseconds of that moment
 are kept in `Recording.t0_ns`. Positions are metres, one named frame per stream.

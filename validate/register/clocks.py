@@ -1,5 +1,4 @@
-"""What clocks do to a measurement that moves: u = sd_t |dy/dt| where one is uncertain, in u_D; and
-samples at other times than the ones that are wanted.
+"""Time-stamp uncertainty of a moving measurement, u = sd_t |dy/dt|, and interpolation in time.
 
 All samples of a stream lie off together by an uncertain clock, so this is a systematic part, which
 averaging leaves.

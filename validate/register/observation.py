@@ -1,4 +1,4 @@
-"""What was measured, in the scene's frame, and how a run is read where it was measured.
+"""Observations in the scene's frame, and their simulated counterpart in a run.
 
 Every kind of sensor is one file beside this one: its class keeps the measured samples and says how
 a run deviates from them. Comparison, filters and reports know nothing of a sensor but this.

@@ -1,4 +1,4 @@
-"""A recording in the scene's frame: its observations, and which of them are compared."""
+"""Registered recording: its observations in the scene's frame, and the compared ones."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar

@@ -1,4 +1,4 @@
-"""Registration after the declaration of a scene: streams by name drive it or are compared.
+"""Registration by names: streams drive the declared inputs of a scene or are compared.
 
 A signal with the name of an input (a drive, a load, a rigid body that moves) drives it; an input
 with a value is constant. `<drive>.force` in N is predicted by the force of that drive or rigid

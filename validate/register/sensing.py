@@ -1,4 +1,4 @@
-"""What a sensor may be off by, as small parameters that any experiment can hold and identify.
+"""Sensor errors (gain, delay, bias, pose) as small parameters that can be identified.
 
 An experiment takes one into its parameters and applies it where it registers a recording:
 `cell = parameters.cell.of(cell)`. Their defaults change nothing; one that is None stands open.

@@ -1,4 +1,4 @@
-"""Signals: a number or several over time, driving a simulation or predicted by a trace of it."""
+"""Signals over time that drive a simulation or that one of its traces predicts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Nominal stresses of a material point, compared relative to what was measured.
+"""Nominal stresses of a material point, compared relative to the measurement.
 
 Curves that were read off a printed figure are as uncertain as the stress is large, and stresses of
 one curve differ a hundredfold: an absolute error would be that of the last few rows alone.

@@ -1,4 +1,4 @@
-"""An exhibit drawn: its charts, heats, regimes and maps as pictures; its files.
+"""Drawing of report items: charts, heat maps and regime maps as figures, and their files.
 
 Every part of a report is drawn and encoded by itself, so that workers can draw parts side by side.
 """

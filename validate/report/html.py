@@ -1,4 +1,4 @@
-"""The page from drawn exhibits, by jinja2."""
+"""HTML page of a report, by jinja2."""
 
 from collections.abc import Iterable
 from importlib.resources import files

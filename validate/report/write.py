@@ -1,4 +1,4 @@
-"""The report folder, written beside its place and moved there when complete."""
+"""Writer of the report folder, which replaces the former one when complete."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A rigid indenter as it is declared: it stands where it touches the body after a gap."""
+"""Rigid indenters: declared gap, and position in touch with the body."""
 
 from dataclasses import MISSING, dataclass, replace
 from typing import Literal, Protocol

@@ -1,4 +1,4 @@
-"""The laws at large strain: which there are, what each can handle, and their further coefficients.
+"""Constitutive laws at large strain: names, capabilities and further coefficients.
 
 Every law has the Young's modulus and Poisson ratio of its material at small strain; what is left
 over is given here as the field writes it. C10 of Mooney-Rivlin and Yeoh and mu_1 of Ogden follow:

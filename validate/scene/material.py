@@ -1,4 +1,4 @@
-"""What a body is made of: isotropic elasticity, damping, density, and the law at large strain."""
+"""Material: isotropic elasticity, damping, density, and the law at large strain."""
 
 from dataclasses import MISSING, dataclass, field, replace
 from typing import Literal

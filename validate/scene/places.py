@@ -1,4 +1,4 @@
-"""Where a part of a scene sits, in a user's words: a label, a side, a plane, a box or a point.
+"""Places of a scene's parts: a label, a side, a plane, a box or a point.
 
     top                            the facet set of that name
     zmax                           the facets on the body's highest plane across z

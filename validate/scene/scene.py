@@ -1,4 +1,4 @@
-"""The scene: a body, what it is made of, how it is held and driven, and the fluid in it.
+"""Scene: a body, its material, supports, drives, loads and the fluid in it.
 
 Declared, it is the parameter tree of an experiment: its body is a geometry
 (`scene.geometries.specification`), its places are words (`scene.places`). What is simulated is

@@ -1,4 +1,4 @@
-"""A point tool: the tip of a needle whose path is given, and the surface that it may touch."""
+"""Point tool: tip of a needle with a given path, and the surface that it may touch."""
 
 from dataclasses import MISSING, dataclass
 

@@ -1,4 +1,4 @@
-"""What inputs do to the free unknowns: motions of drives, forces of loads, the start from rest."""
+"""Excitation of the free unknowns: motions of drives, forces of loads, start from rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a scheme or filter can handle, declared on its settings, and the one refusal of the rest."""
+"""Capabilities of a scheme or filter, declared on its settings, and refusal of other scenes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

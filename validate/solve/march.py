@@ -1,4 +1,4 @@
-"""The loop over steps, written once: it steps, times, traces and stops where a step fails."""
+"""Time loop of all schemes: steps, timing, traces, and stop at a failed step."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

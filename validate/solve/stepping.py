@@ -1,4 +1,4 @@
-"""A time-stepping scheme as its step map per mode, and its predicted stability limit.
+"""Step map of a time-stepping scheme per mode, and its predicted stability limit.
 
 A mode is q'' + c q' + w^2 q = 0. Maps are taken in units of the step (w h, c h), which keeps their
 entries of order 1 whatever the step. Linear solvers (direct, CG, Gauss-Seidel) share one map. Every

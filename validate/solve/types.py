@@ -1,4 +1,4 @@
-"""States, outcomes and runs."""
+"""Types of the solvers: states, outcomes and runs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""A page without methods and recordings of its own: that of a study, or over stored runs.
+"""Page of a study or of several stored runs, without methods and recordings of its own.
 
 It imports no solver: a summary of a thousand runs needs none.
 """

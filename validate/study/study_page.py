@@ -1,4 +1,4 @@
-"""A finished study as its folder: results.json, tables, figures and a page; cells stay."""
+"""Folder of a finished study: results.json, tables, figures and a page; its cells stay."""
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime

@@ -1,4 +1,4 @@
-"""Twins: a simulated experiment recorded as if it had been measured.
+"""Simulated sensors of a twin: stage, outline, pen and load cell, each with its noise.
 
 A twin is made by another and finer model than those it is used to judge, then walks the same road
 as a real recording. Each sensor draws from its own random stream, so that changing one leaves the

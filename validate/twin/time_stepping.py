@@ -1,4 +1,4 @@
-"""A twin of a moving body: a scene solved at finer steps than the models', then tracked."""
+"""Twin of a moving body: a scene solved at finer steps than the models', then tracked."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

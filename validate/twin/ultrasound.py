@@ -1,4 +1,4 @@
-"""B-mode images: speckle of many scatterers under a point spread, seen through a scanner.
+"""Synthetic B-mode images: speckle of many scatterers under a point-spread function.
 
 Complex white scatterers, weighted by the echo amplitude of the tissue and blurred by an anisotropic
 Gaussian, give a circular Gaussian field, so the envelope of uniform tissue is Rayleigh distributed

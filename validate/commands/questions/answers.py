@@ -1,4 +1,4 @@
-"""Answers to the questions of `validate new`: from a terminal, from TOML, or a list of open ones.
+"""Answers of `validate new`, from a terminal or TOML; list of open questions.
 
 A question is asked where the recording does not tell. One whose default stands is answered by it
 where nobody is there; without a default it is open, and all open ones are named at once.

@@ -1,4 +1,4 @@
-"""Questions about a rigid indenter on a measured body, and about the machine that moves it."""
+"""Questions about a rigid indenter and its testing machine."""
 
 from typing import Any
 

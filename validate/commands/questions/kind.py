@@ -1,4 +1,4 @@
-"""One kind of experiment that `validate new` writes."""
+"""Base type of the kinds of experiments that `validate new` writes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

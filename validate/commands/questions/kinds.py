@@ -1,4 +1,4 @@
-"""Kinds of questions about a measured body: what each takes, checked as it is answered."""
+"""Questions that several kinds of experiments share, with checks of the answers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Questions about a body that moves in time, and the methods of its experiment."""
+"""Questions about dynamics of a body and the methods of its experiment."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

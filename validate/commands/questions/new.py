@@ -1,4 +1,4 @@
-"""`validate new`: an experiment file filled with what a recording holds and a user answers.
+"""`validate new`: write an experiment file from a recording and answers.
 
 Texts of the recording are data: they enter the file as Python literals or in comments without line
 ends, never as code.

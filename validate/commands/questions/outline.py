@@ -1,4 +1,4 @@
-"""What `validate new` asks of images beside a log: which surface they show, and where they lie."""
+"""Questions about images that accompany a log: visible surface and image plane."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields as attributes

@@ -1,4 +1,4 @@
-"""The declaration that answers about a body make: its scene, and what is measured of it."""
+"""Declaration of a measured body's scene and observations from the answers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace

@@ -1,4 +1,4 @@
-"""The boundary of a deformed body as flat pieces: segments in the plane, triangles in space.
+"""Boundary of a deformed body: segments in the plane, triangles in space.
 
 Quadratic facets become the pieces between their nodes (2 segments, 4 triangles); a quadrilateral
 facet becomes 4 triangles round its middle, which enclose the volume under its bilinear patch; one

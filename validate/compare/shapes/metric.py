@@ -1,4 +1,4 @@
-"""What a metric is: a name, a formula, its unit, what it rests on, a definition."""
+"""Type of a metric: name, formula, unit, inputs and definition."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Two displacement fields side by side on one mesh: what every metric of two runs reads."""
+"""Pair of displacement fields on one mesh, the input of metrics of two runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What must hold before shapes are compared: cells upright, boundary outward, no crossings.
+"""Preconditions of a shape comparison: cell orientation, outward boundary, no crossings.
 
 An inside-out boundary has an empty symmetric difference with anything in most libraries, so that a
 wrong body would score 0: it is refused here first.

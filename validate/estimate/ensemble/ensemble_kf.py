@@ -1,4 +1,4 @@
-"""Ensemble Kalman filter: random members of one model, corrected by their own sample covariance.
+"""Ensemble Kalman filter: random members of one model, corrected by sample covariance.
 
 Members differ in parameters and loads, which may walk, and so in their states (Evensen 1994, with
 the perturbed measurements of Burgers et al. 1998, or without any, Sakov & Oke 2008). Few members

@@ -1,4 +1,4 @@
-"""The stepper of filters that run several members of one model, each with parameters of its own.
+"""Stepper of filters with several model members, each with its own parameters.
 
 Between measurements every member is a run of the model; at one, an `Analysis` corrects states and
 parameters together. What is estimated is the members' mean, with their spread.

@@ -1,4 +1,4 @@
-"""What a filter may doubt of a model besides its state, chosen by name, and what it scales.
+"""Uncertain model parameters that a filter can estimate together with its state.
 
     stiffness        of every cell            stiffness.<region>  of a region's cells
     stiffness.body   of cells of no region    support.<facets>    of a foundation (or its number)

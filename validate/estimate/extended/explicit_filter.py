@@ -1,4 +1,4 @@
-"""The stepper of filters that predict with the explicit step, around a core that they bring."""
+"""Stepper of filters that predict with the explicit step, with an exchangeable core."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The plain explicit step that the nonlinear filters predict with (paper 003, eqs 18-23).
+"""Explicit step that the nonlinear filters predict with (paper 003, eqs 18-23).
 
 Central difference on lumped masses: U_{t+dt} from U_t, U_{t-dt} and the forces at time t. Damping
 is the mass-proportional share of Rayleigh's, which stays diagonal.

@@ -1,4 +1,4 @@
-"""Compiled arithmetic of the nonlinear filters: the explicit step and the node-level update.
+"""Compiled loops of the nonlinear filters: explicit step and node-level update.
 
 Paper 003, eqs 35-39. P is packed by row, one column a component or node:
 "component" 1 row of variances m^2, "companion" 3 rows (U_t, cross, U_{t-dt}) of 2 x 2 covariances,

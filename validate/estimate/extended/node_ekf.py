@@ -1,4 +1,4 @@
-"""The extended Kalman filter node by node, as paper 003 prints it (steps i-iv, eqs 24-39).
+"""Extended Kalman filter by node as in paper 003 (steps i-iv, eqs 24-39).
 
 Every component of every node is a filter of its own: its covariance sees the diagonal of the
 tangent only, so nothing that is measured at one node reaches another. Without measurements P grows

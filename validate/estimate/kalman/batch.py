@@ -1,4 +1,4 @@
-"""Many recordings of one experiment filtered together: they share the gains, which need no data."""
+"""Batch filtering of many recordings of one experiment with common gains."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Covariance recursions of a linear Kalman filter: they need no data, only when data comes.
+"""Covariance recursions of a linear Kalman filter; they need times of data, no values.
 
 A `Claim` is what the filter claims about its error. Updates are kept as the pair G, B of Joseph's
 form at the best gain, P+ = P- + G B^T + B G^T with B = G S_yy / 2 - P- H^T, which is symmetric by

@@ -1,4 +1,4 @@
-"""Kalman filters whose state is the displacement vector: paper 001's, in two sets of coordinates.
+"""Kalman filters whose state is the displacement vector (paper 001), nodal or modal.
 
 The state equation is Newmark's step, u' = J^-1 A u + J^-1 (L v + M a + f) (paper 001, eqs 11-14):
 velocity and acceleration are inputs, recursed beside the filter and not part of its state, so P

@@ -1,4 +1,4 @@
-"""The formulas of a Kalman filter, written once: predict, innovation, gain, update.
+"""Kalman filter formulas: predict, innovation, gain, update.
 
 Pure functions of states x (n,), covariances P (n, n) and measurements z (m,), NaN = missing, all of
 one system of units; `filterpy_oracle.oracle_table` shows that they equal filterpy's to rounding.

@@ -1,4 +1,4 @@
-"""Gains before any data: those of a linear filter depend only on when what is measured."""
+"""Precomputed gains of a linear filter; they depend only on the schedule of measurements."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""KF-FEM as paper 001 prints it: the state is the displacement vector of all free unknowns.
+"""KF-FEM as in paper 001: the state is the displacement vector of all free unknowns.
 
 The reading that gives the paper's NRMSE .0116: its noise "intensity of 0.001" is a variance in mm^2
 (1e-9 m^2) for Q, R and P0 alike, P0 is that at t = 0 and the first measurement comes after one

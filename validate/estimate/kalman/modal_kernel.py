@@ -1,4 +1,4 @@
-"""Compiled loops over modes: the covariance of a diagonal transition, and a filter's whole walk."""
+"""Compiled loops over modes: covariance of a diagonal transition, and all steps of a filter."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The same filter as KF-FEM in modal coordinates, where a step of the covariance is no product.
+"""KF-FEM in modal coordinates, where a covariance step needs no matrix product.
 
 Newmark's transition is diagonal there, so P- = P * f f^T + Q takes one pass over P instead of two
 dense products; with all modes the estimate equals KF-FEM's to rounding, white Q included (it is

@@ -1,4 +1,4 @@
-"""Covariance of the observed unknowns alone: all gains of a linear filter by a small recursion.
+"""Covariance of the observed unknowns: all gains of a linear filter by a small recursion.
 
 A gain needs P H^T only. With V (n, r) spanning H^T, A H^T, A^2 H^T, ... and A V = V T the columns
 P V close among themselves: (P- V) = A (P V) T + Q V, (P+ V) = P- V - G H P- V. They stay in the

@@ -1,4 +1,4 @@
-"""A linear system in few modes with unknown load, as a model whose state is the whole state.
+"""Linear system in few modes with unknown load, as a small state-space model.
 
 x = (q, q', r, b): amplitudes and rates of the lowest modes, the rest r and a bias b in N of every
 load, which walks at random. Every mode is exact for loads held at their end value over a step. What

@@ -1,4 +1,4 @@
-"""An extended Kalman filter on few shapes and the bias of the loads, beside the plain explicit run.
+"""Extended Kalman filter on few mode shapes and a load bias, with an explicit step.
 
 Between measurements the body runs at full size and full nonlinearity; what is uncertain are r
 amplitudes of U_t and of U_{t-h} along the shapes Phi, and one bias N a load (a random walk: a body

@@ -1,4 +1,4 @@
-"""Kalman filter on few modes with a load bias, its gains precomputed or the steady one.
+"""Kalman filter on few modes with a load bias; gains precomputed or steady.
 
 The gains of a linear filter need no data, so a step costs what the model's step costs and one small
 product. The steady gain comes from the discrete Riccati equation.

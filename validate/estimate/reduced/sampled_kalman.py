@@ -1,4 +1,4 @@
-"""Kalman filters by samples, for any small model: unscented and ensemble, as pure functions."""
+"""Unscented and ensemble Kalman filters of any small model, as pure functions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The stepper of filters with a small state: what they share, around a core that they bring."""
+"""Stepper of filters with a small state, with an exchangeable core."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7); masses by scikit-fem.
+"""Stiffness, mass and damping matrices (paper 000, eqs 1-5; paper 001, eq 7).
 
 The stiffness is pointwise, mixed or with nodal mean dilatation; materials may differ from cell to
 cell.

@@ -1,4 +1,4 @@
-"""Interpolation rows: the displacement at any point as a weighted sum of nodal displacements."""
+"""Interpolation rows: displacement at any point as weighted sum of nodal displacements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

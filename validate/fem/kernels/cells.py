@@ -1,5 +1,6 @@
-"""Compiled element loops of tet4 that take one cell after the other: laws with branches and
-logarithms, which no vector register takes, memories of viscoelastic cells, and looks at energies.
+"""Compiled element loops of tet4, cell by cell: laws with branches, viscoelasticity, energies.
+
+Vector lanes support neither branches nor logarithms, so that these loops take one cell at a time.
 
 Geometry is (blocks, 11 x 16), or with the card of a law (blocks, 11 + k, 16): the compiler knows
 which, so that neither kind is in the code of the other. Cells (blocks, 4, 16) hold 8 x node. The

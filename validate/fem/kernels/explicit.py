@@ -1,4 +1,4 @@
-"""Compiled element loops of a body at large strain: forces, tangents of nodes, products, looks.
+"""Compiled element loops at large strain: forces, tangents by node, products, strain energy.
 
 Which loop takes a body is told by its geometry, whose kind the compiler knows: tet4 of two moduli
 (blocks, 11 x 16), tet4 whose law has a card (blocks, 11 + k, 16), mixed hex8 (four dimensions,

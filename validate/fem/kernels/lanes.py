@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-call, untyped-decorator"
-"""Several cells at once, one in each lane of a vector register: a number for compiled loops.
+"""Vector lanes: a number type for compiled loops that holds several cells at once.
 
 `Lanes` holds 8 doubles or 16 floats and knows + - * / and minus; with it the tensor functions of
 `fem.kernels.tensors` and the laws at a point, written for one cell, do 8 or 16 in the same time. It

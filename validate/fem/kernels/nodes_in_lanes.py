@@ -1,6 +1,5 @@
 # mypy: disable-error-code="no-untyped-call, untyped-decorator"
-"""Nodes of cells turned into lanes and back (`fem.kernels.lanes`): what element loops gather and
-add up.
+"""Gather and scatter of nodes between cells and vector lanes (`fem.kernels.lanes`).
 
 A node has four numbers in a row, x, y, z and a pad, or a multiple of four: read and written at
 once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 8 x node.

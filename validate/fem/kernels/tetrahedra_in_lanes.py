@@ -1,5 +1,4 @@
-"""Compiled element loops of tet4 that take 8 cells at once, 16 in single precision
-(`fem.kernels.lanes`).
+"""Compiled element loops of tet4, 8 cells at once (16 in single precision).
 
 St. Venant-Kirchhoff, neo-Hooke, and Mooney-Rivlin and Yeoh in their split form. A block of 16 cells
 has its numbers side by side, row by row; the nodes' displacements are copied with a pad, so that a

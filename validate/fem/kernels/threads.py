@@ -1,4 +1,4 @@
-"""How many threads share a step: as many as a measured pilot shows to pay, one where no core idles.
+"""Number of threads of an explicit step, chosen by a measured pilot.
 
 Threads meet at the end of every step: where another process has a core, all wait for the one that
 it keeps, and a step takes several times as long as alone. So the machine is asked first, then a

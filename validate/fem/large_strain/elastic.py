@@ -1,4 +1,4 @@
-"""What Newton's method needs of a body: of one at large strain, and of a linear one."""
+"""Common interface of linear and large-strain bodies for Newton's method."""
 
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,5 +1,4 @@
-"""A body of tet4 or mixed hex8 at large strain for explicit schemes: the forces of
-`fem.large_strain.hyperelastic`, compiled.
+"""Bodies of tet4 or mixed hex8 at large strain for explicit schemes, with compiled forces.
 
 The element loops are in `fem.kernels.explicit` and `fem.kernels.bricks`; this is their packing and
 their interface.

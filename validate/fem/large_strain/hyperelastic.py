@@ -1,4 +1,4 @@
-"""A hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
+"""Hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
 
 f_int = sum over points of w P : dN/dX, K_t its derivative (Bonet & Wood 2008, ch. 9). The isochoric
 law acts at every point, the volumetric one on the law's measure of volume change (tr E or J - 1):

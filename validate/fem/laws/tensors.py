@@ -1,5 +1,4 @@
-"""Tensors of the displacement gradient H = F - I per point, written so that small strains keep
-their digits."""
+"""Tensors of the displacement gradient H = F - I, accurate at small strains."""
 
 import numpy as np
 

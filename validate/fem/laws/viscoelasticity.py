@@ -1,4 +1,4 @@
-"""Finite viscoelasticity: the isochoric stress of a law and the state of its branches.
+"""Finite viscoelasticity: isochoric stress of a law and the state of its branches.
 
 Every branch follows dQ_i/dt + Q_i/tau_i = g_i dS/dt, with S the second Piola-Kirchhoff stress of
 the isochoric law; the whole stress is S_vol + S + sum of Q_i (Holzapfel 2000, 6.10; Simo & Hughes

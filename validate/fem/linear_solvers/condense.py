@@ -1,4 +1,4 @@
-"""A linear system on the nodes that matter alone: exact, no approximation (paper 000, eqs 17-20).
+"""Static condensation of a linear system on selected nodes, exact (paper 000, eqs 17-20).
 
 Forces act on kept nodes only, so that only their rows and columns of the inverse are needed. Two
 forms: `dense` holds all of them (the paper's explicit inverse, m^2 numbers), `by columns` keeps the

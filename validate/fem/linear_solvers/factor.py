@@ -1,4 +1,4 @@
-"""Factorisation of a symmetric positive definite matrix: the one place that chooses a solver."""
+"""Factorisation of a symmetric positive definite matrix; the only choice of a solver."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Dynamics of a measured body: its methods, its damping, and its uncertain parameters.
+"""Dynamics of a measured body: methods, damping and uncertain parameters.
 
 One scene, one registration and one error budget for everything that moves a body: a release, a
 weight, a force, a pressure or a displacement over time. What differs is the load alone.

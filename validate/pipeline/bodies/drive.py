@@ -1,5 +1,4 @@
-"""What moves or loads a measured body: the one drive, indenter, load, pressure or set of tracked
-points of its scene, or its weight; by the signal of that name, markers, notes, or a release."""
+"""Drive of a measured body: drive, indenter, load, pressure, tracked points, weight or release."""
 
 from collections.abc import Mapping
 from dataclasses import replace

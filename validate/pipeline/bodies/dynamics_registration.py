@@ -1,5 +1,4 @@
-"""Registration of a measured body that moves in time: its start, its steps, its loads, and its
-markers and force at every sample.
+"""Registration of a moving body: start, time steps, loads, markers and force at every sample.
 
 The body rests until the start, where the recording's clock is set to 0; loads and displacements
 count from there. The start is a sample: where a release lies between two of them, half the interval

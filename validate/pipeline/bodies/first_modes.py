@@ -1,4 +1,4 @@
-"""The first natural frequencies of a body as it is held."""
+"""First natural frequencies of a supported body."""
 
 from collections.abc import Mapping
 from dataclasses import replace

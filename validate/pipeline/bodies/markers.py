@@ -1,4 +1,4 @@
-"""A measured body's markers in its own frame: by their layout, or as they were recorded there."""
+"""Markers of a measured body in its own frame: by their layout, or as recorded there."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

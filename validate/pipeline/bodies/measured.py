@@ -1,5 +1,4 @@
-"""Any body under what a recording says moved it: a mesh file, block or cylinder, held and moved
-where its scene says, judged by force, markers and outlines; and the experiment that follows.
+"""Experiment of a measured body: mesh file, block or cylinder, against force, markers, outlines.
 
 Statics at evenly spaced instants, or the motion in time (`moving_body`). In statics the body is
 unloaded at the first one: what is compared of markers and outlines counts from there. An open

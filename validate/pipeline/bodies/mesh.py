@@ -1,4 +1,4 @@
-"""Mesh of a measured body: of its declared geometry, and how many unknowns it has."""
+"""Mesh of a measured body from its declared geometry, and its number of unknowns."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The modulus of a measured body, identified by every judged law itself, with its budget.
+"""Modulus of a measured body, identified with each tested law, with its budget.
 
 Force under a displacement is in proportion to the modulus at a fixed Poisson ratio: one solution
 with a unit modulus is scaled to the measured force up to `seen.fit_to` of the load. A second one

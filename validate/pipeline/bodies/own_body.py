@@ -1,4 +1,4 @@
-"""An experiment's own body on coarser and finer meshes, and the motion or load it was given.
+"""User-defined body of an experiment on coarser and finer meshes, with its prescribed input.
 
 A parameter refines the mesh where it changes the number of nodes and leaves the body's extents and
 volume as they are. Without such a parameter the mesh that was built is refined uniformly.

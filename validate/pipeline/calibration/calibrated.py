@@ -1,4 +1,4 @@
-"""Identification before prediction: what stands open is found on what calibrates, kept apart.
+"""Calibration before prediction: open parameters are identified on separate data.
 
 What was identified goes on with its covariance as uncertain inputs, along its principal axes; what
 calibrated is named, so that no figure serves twice.

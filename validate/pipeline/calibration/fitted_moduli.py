@@ -1,4 +1,4 @@
-"""Moduli that each method was fitted with, as parameters carry them, and how inputs move them.
+"""Moduli fitted by each method as parameters, and their change with uncertain inputs.
 
 A judged law has the modulus that the same law was identified with. So parameters hold one entry a
 model: its name, its modulus Pa and the displacement m at which its load begins.

@@ -1,4 +1,4 @@
-"""Free parameters of an identification as a user writes them: `a,b` or `path=low:high`."""
+"""Free parameters of an identification in the user's notation: `a,b` or `path=low:high`."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""One calibration as mathematics: coordinates of the free parameters -> whitened residuals."""
+"""Calibration as a least-squares problem: free parameters -> whitened residuals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Sentences on an identification: what was fitted, its uncertainty, what stays undetermined."""
+"""Sentences on an identification: fitted values, uncertainty, unidentifiable parameters."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Does each filter know how wrong it is? Innovations, NIS and node errors against their bands."""
+"""Consistency scores of each filter: innovations, NIS and node errors against their bands."""
 
 from collections.abc import Mapping
 

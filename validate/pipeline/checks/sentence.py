@@ -1,4 +1,4 @@
-"""The words that open a report and a terminal: what was judged by what, and what came of it."""
+"""Verdict sentence of a report and of the terminal."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence

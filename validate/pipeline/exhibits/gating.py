@@ -1,4 +1,4 @@
-"""Measurements that the gate of a filter rejected: how many, of which marker, when, how far off."""
+"""Measurements that a filter's gate rejected: number, marker, time and distance."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""A declaration as JSON: exact, and data.
+"""JSON form of a declared experiment, exact and without code.
 
 An object is {"type": name of its class, ...} with the fields that are not their defaults; numbers
 are in SI. What is code stays in the experiment's file: {"code": "twin.record"} says where in its

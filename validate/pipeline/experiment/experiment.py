@@ -1,4 +1,4 @@
-"""What an experiment declares. One experiment is one Python file in `experiments/`.
+"""Declaration of an experiment. One experiment is one Python file in `experiments/`.
 
 An experiment file is code: run only your own. A recording is data: nothing in it is executed.
 """

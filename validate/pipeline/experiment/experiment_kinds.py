@@ -1,4 +1,4 @@
-"""Kinds of experiments: the settings of a kind make its declaration complete."""
+"""Kinds of experiments: the settings of a kind complete its declaration."""
 
 from collections.abc import Callable, Mapping
 from functools import cache

@@ -1,4 +1,4 @@
-"""Experiments by name or by file: the one that is asked for is run, and only that."""
+"""Experiments by name or file; only the requested file is run."""
 
 import ast
 import importlib.util

@@ -1,4 +1,4 @@
-"""The solver that a method's constitutive law needs.
+"""Solver that a method's constitutive law needs.
 
 What a method changes of the scene's material has a law, its settings solve it. Where a user sets
 another law, a static method takes a solver of that law: that of the experiment's own static method

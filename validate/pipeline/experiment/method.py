@@ -1,4 +1,4 @@
-"""A method of an experiment: a scheme or a filter, and the scene options it is built with."""
+"""Method of an experiment: a scheme or a filter, with its changes of the scene."""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace

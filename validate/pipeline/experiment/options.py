@@ -1,4 +1,4 @@
-"""What a user may change of an experiment, and where the experiment lies."""
+"""User options of a run (values, methods, cases), and the folder of the experiment."""
 
 import os
 from collections.abc import Mapping

@@ -1,5 +1,4 @@
-"""What the recordings say of an experiment's parameters, what they leave open, and where every
-value comes from."""
+"""Origin of every parameter: recording, user, default or identified; open parameters."""
 
 import ast
 import math

@@ -1,4 +1,4 @@
-"""The parameters of a declared experiment: its recording, its scene, and settings of its own.
+"""Parameters of a declared experiment: its recording, its scene, and further settings.
 
 The scene's paths have no prefix (`material.E`, `body.cells`), nor have the settings' own.
 """

@@ -1,4 +1,4 @@
-"""Variations: a path of the parameters and a rule that says how its value changes.
+"""Variations: a path of the parameters and a rule for the change of its value.
 
     {"twin.stiffness": 0.8, "membranes.wall.thickness": "0.1 mm"}   values, of a case or an effect
     {"material.E": "x 1.1", "mesh.cells": "+ 1"}              a factor, a step

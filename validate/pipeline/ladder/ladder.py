@@ -1,4 +1,4 @@
-"""How an experiment enters the studies: what is refined, what solves it, what is compared.
+"""Ladder of an experiment in studies: refinements, solvers and compared quantities.
 
 An experiment may declare its ladder; `pipeline.ladder.default` derives one from its scene.
 """

@@ -1,4 +1,4 @@
-"""The loop against the clock: a place in, a tick of the model, a force out.
+"""Real-time loop: position in, one step of the model, force out, with deadlines.
 
 A tick that is not there when the next one is due is missed, and counted. Whatever comes in, no
 force beyond the model's own limit goes out; without a new place it fades to zero.

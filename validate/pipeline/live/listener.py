@@ -1,4 +1,4 @@
-"""Positions from UDP packets on loopback; forces go back to whoever sends them.
+"""Positions from UDP packets on loopback; forces return to the sender.
 
 Nothing that arrives ends the loop: what is no sound packet is counted by its fault. After `RESYNC`
 packets in a row that are late or out of order the sender's clock and numbers are taken anew; until

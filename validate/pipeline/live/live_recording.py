@@ -1,4 +1,4 @@
-"""The recording of a live loop, which `validate run` replays to the same numbers."""
+"""Recording of a real-time loop, which `validate run` replays to the same numbers."""
 
 from collections.abc import Mapping
 from dataclasses import replace

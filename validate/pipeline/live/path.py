@@ -1,4 +1,4 @@
-"""Positions from a recorded path, each when its time has come."""
+"""Positions from a recorded path, each at its recorded time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Preparation of a method for a live loop: the same system that `validate run` uses."""
+"""Preparation of a method for a real-time loop, with the same system as `validate run`."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,4 @@
-"""Bodies pressed between two plates, or pulled between two grips, from a log of displacement and
-force: the experiment that follows from a scene and its `Compression`.
+"""Experiment of a compression or tension test, from a log of displacement and force.
 
 The body is a cylinder or a mesh file (`pipeline.plates.scene`). Displacement counts from contact
 less the toe (where the fitted line reaches zero force), force from the cell's own offset; the first

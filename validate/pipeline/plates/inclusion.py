@@ -1,5 +1,4 @@
-"""A block with a fluid-filled inclusion between two plates, from outlines, markers and a stage:
-what a file declares beside its scene, and the experiment that follows.
+"""Experiment of a block with a fluid-filled inclusion between plates (outlines, markers, stage).
 
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 """

@@ -1,4 +1,4 @@
-"""A block with an inclusion: the body of a scene whose mesh follows from a recording.
+"""Block with an inclusion: a body whose mesh follows from a recording.
 
 The settings beside such a scene say where the outlines are (`streams`) and how the image lies
 (`registration`); see `pipeline.plates.inclusion`.

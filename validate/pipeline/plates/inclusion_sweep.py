@@ -1,4 +1,4 @@
-"""The inclusion from a sweep of parallel images across its long axis (paper 000, section 4.4).
+"""Inclusion from a sweep of parallel images across its long axis (paper 000, section 4.4).
 
 Stream "sweep" holds the outlines (or the images to outline) of the phantom at rest, with the pose
 of its image plane at position 0; signal "sweep_position" says how far the plane then lay along its

@@ -1,5 +1,4 @@
-"""What the images of a pressed body show of it: its own edge, or the wall of an inclusion, against
-the section of the simulated surface with the plane of the images.
+"""Outlines in images of a pressed body against the section of its simulated surface.
 
 The images' place in the body's frame (axis z, the resting plate at z = 0) is declared, or stands in
 the recording; without either nothing is compared. They rest with that plate.

@@ -1,4 +1,4 @@
-"""The scene of a body between two plates or grips: contact, sizes, and the modulus of a model.
+"""Scene of a body between two plates or grips: contact, sizes, and the modulus of a model.
 
     Scene(
         body=Cylinder("25 mm", "20 mm", element="tet10", part="quarter"),

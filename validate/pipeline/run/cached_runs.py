@@ -1,4 +1,4 @@
-"""The inputs of a run, and whether a stored run has the same ones and can be used again.
+"""Inputs of a run, and reuse of a stored run with the same inputs.
 
 Everything is held by its content: code and libraries, the machine, the experiment's file with its
 helpers, meshes, recordings and every parameter. What has no hash is never taken as unchanged.

@@ -1,4 +1,4 @@
-"""Runs as cells of the engine: kept in a store, side by side on workers, taken up after a break.
+"""Runs as cells of the engine: stored, in parallel on workers, resumed after an interruption.
 
 A cell names a method, a case and the parameters as JSON; its key is the hash of all that its
 numbers rest on: these, the recordings, mesh files, the code and the experiment's own files. Two

@@ -1,4 +1,4 @@
-"""What all cells of a run or a study share: the experiment as a worker opens it."""
+"""Job of a run or study: data that all its cells share, loaded by a worker."""
 
 import hashlib
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Whether the systems of an experiment fit in memory, asked first; and a mesh that does."""
+"""Memory check of an experiment's systems before a run, and a mesh that fits."""
 
 from collections.abc import Mapping
 from typing import Any

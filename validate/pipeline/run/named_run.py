@@ -1,4 +1,4 @@
-"""The name of a run: its experiment's, and what the user changed with a short hash of it.
+"""Name of a run: the experiment's name, the user's changes and a short hash.
 
 Nothing is overwritten unseen: a run that computes something else has a folder of its own. What is
 computed counts, not how it was typed: `15kPa` and `15000` are one run.

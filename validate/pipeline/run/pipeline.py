@@ -1,4 +1,4 @@
-"""The pipeline: recording -> scene -> registration -> system -> run -> comparison.
+"""Pipeline: recording -> scene -> registration -> system -> run -> comparison.
 
 One for every experiment, at holds or over time, with a twin's truth beside or without one.
 """

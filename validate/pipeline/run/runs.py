@@ -1,4 +1,4 @@
-"""The runs of an experiment: each method with each change of the parameters, on each case, once."""
+"""All runs of an experiment: methods, changed parameters and cases, each once."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""The settings of a twin in its recording: the truth follows the recording, not later settings.
+"""Settings of a twin in its recording; the truth follows the recording, not later settings.
 
 A user who changes a material asks what a wrong model does, so the truth must stay; a user who
 changes the twin asks for another recording, so it is made anew in memory.

@@ -1,4 +1,4 @@
-"""Streams with clocks of their own: the offset between two of them, and a stream moved by it.
+"""Clock offset between two streams, and a stream shifted by it.
 
 It stands on the recording floor because clocks are mended before anything is registered or
 compared. An offset is what must be *added* to a stream's times to bring them onto the reference's

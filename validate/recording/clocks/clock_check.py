@@ -1,4 +1,4 @@
-"""What a stream's times look like, before anything is concluded from its values.
+"""Check of a stream's time stamps: steps, duplicates, backward steps and gaps.
 
 Time of a measurement: the stamp in its message, else its publish time, never its log time, which
 holds the recorder's delays.

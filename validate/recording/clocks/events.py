@@ -1,4 +1,4 @@
-"""The moment of a marked event in a signal, and the offset between two streams that both show it.
+"""Events in signals (onset, step), and the offset between two streams of one event.
 
 An onset is where a signal leaves its rest and begins to climb or fall; a step is where it crosses
 the middle between two levels.

@@ -1,4 +1,4 @@
-"""At which lag one signal follows another: found on a grid, then refined between the samples.
+"""Lag between two signals: grid search, then refinement between the samples.
 
 scipy is loaded by what computes a lag: looking into a recording needs none of it.
 """

@@ -1,4 +1,4 @@
-"""MATLAB 5 and 7.3 files: arrays that the user names, points and stacks of images.
+"""Reader of MATLAB 5 and 7.3 files: points, stacks of images, arrays by name.
 
 Such a file states neither units nor times: what an array needs to become a stream is asked for.
 """

@@ -1,4 +1,4 @@
-"""What a file does not say itself, as users say it: `--map KEY=VALUE`."""
+"""Parser of `--map KEY=VALUE`: facts that a file does not contain."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Bags of ROS: rosbag2's SQLite or its folder, and ROS 1's. What is in them is read as in MCAP."""
+"""Reader of ROS bags (rosbag2 SQLite or folder, ROS 1), converted to MCAP messages."""
 
 import re
 import tempfile

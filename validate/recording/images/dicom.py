@@ -1,4 +1,4 @@
-"""DICOM images, above all of ultrasound: each calibrated region is a stream with its own scale."""
+"""Reader of DICOM images, mainly ultrasound: one stream per calibrated region."""
 
 from collections.abc import Mapping
 from pathlib import Path

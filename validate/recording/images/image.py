@@ -1,4 +1,4 @@
-"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Owns OpenCV.
+"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Only OpenCV user.
 
 A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk, length
 of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard error;

@@ -1,4 +1,4 @@
-"""A lens bends straight lines: images straightened by the camera's calibration."""
+"""Lens distortion: correction of images by the camera's calibration."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,5 +1,7 @@
-"""What a file of a camera's calibration holds, by OpenCV, in a process of its own: its own YAML,
-XML and JSON, and the YAML of ROS' camera_calibration, which lacks OpenCV's first line."""
+"""Camera calibration files (OpenCV YAML, XML, JSON; ROS YAML), read by OpenCV in a subprocess.
+
+The YAML of ROS' camera_calibration lacks OpenCV's first line.
+"""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Pictures as cameras and recorders pack them (PNG, JPEG, TIFF, BMP), made grey. Owns Pillow here.
+"""Compressed images of cameras (PNG, JPEG, TIFF, BMP) as grey images, by Pillow.
 
 For images of others: ours are PNG, grey, and checked chunk by chunk in `image`.
 """

@@ -1,5 +1,4 @@
-"""Tracked sequences: images and 4 x 4 transforms of tools, frame by frame, as the PLUS toolkit
-writes them into MetaImage and NRRD alike.
+"""Tracked sequences of the PLUS toolkit: images and 4 x 4 transforms of tools, frame by frame.
 
 Every frame has fields `Seq_Frame0007_<Tool>To<Frame>Transform`, its `...Status`, `Timestamp` (s)
 and `ImageStatus`. Only what is OK enters the recording: a tool that was not seen has no sample.

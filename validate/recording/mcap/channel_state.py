@@ -1,4 +1,4 @@
-"""The state of a channel of our own schema while its messages pass; samples are not kept.
+"""State of a channel of this package's schema during decoding, without its samples.
 
 Whole batches that are like the first message are taken at once (`batches`), others one by one; so
 a recording of any length is inspected in the memory of its time stamps, and what is wrong with it

@@ -1,4 +1,4 @@
-"""Channels of any schema, JSON or Protobuf, as one MCAP file: whole or not at all, both CRCs, zstd.
+"""Writer of channels of any schema (JSON, Protobuf) as one MCAP file with CRCs and zstd.
 
 The only writer: of recordings and of files that are made to be looked at, such as a report's
 replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channels, messages and

@@ -1,4 +1,4 @@
-"""Messages of others as plain dicts: ROS 2 (CDR), Protobuf, JSON, CBOR. Owns their libraries.
+"""Decoders of third-party messages: ROS 2 (CDR), Protobuf, JSON, CBOR as plain dicts.
 
 Numbers stay numbers, texts texts, bytes bytes, lists lists; times of Protobuf become {sec, nsec}.
 """

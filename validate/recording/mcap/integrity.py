@@ -1,4 +1,4 @@
-"""The front-to-back check of an MCAP file that precedes every use of it.
+"""Integrity check of an MCAP file, front to back, before every use.
 
 One pass reads each byte once: magic at both ends, every record's length, chunk, attachment,
 data-section and summary CRCs (the `mcap` package never checks the last), ids that are used before

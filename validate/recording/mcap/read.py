@@ -1,4 +1,4 @@
-"""An MCAP file as a recording: verified front to back, then read by the index of that check.
+"""Reader of MCAP files: verified front to back, then read by the index of that check.
 
 Topics with schemas of others, mirrors among them, are not read by `read_recording`, which
 experiments use, nor are images without a record of their calibration (`calibration/<topic>`:

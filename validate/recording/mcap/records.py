@@ -1,4 +1,4 @@
-"""The records of an MCAP file, read strictly: no field reaches past its record, nothing unbounded.
+"""Strict parser of MCAP records: no field exceeds its record, all sizes are bounded.
 
 Layout after the MCAP specification (mcap.dev/spec): opcode u8, length u64, content; all integers
 little-endian, strings and maps with a u32 byte length before them. Unlike the `mcap` package's own

@@ -1,4 +1,4 @@
-"""The messages of our own recordings: their JSON schemas, how they are written and read.
+"""JSON schemas of this package's messages, and their encoding and decoding.
 
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane

@@ -1,4 +1,4 @@
-"""From verified messages to streams: decoding, one clock, names and units that stay.
+"""Streams from verified messages: decoding, common clock, constant names and units.
 
 A stream is what one channel of ours holds. Everything that would have to be guessed is refused:
 samples out of order, a unit, frame, spread or set of names that changes on the way, stamps in some

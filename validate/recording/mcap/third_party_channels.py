@@ -1,4 +1,4 @@
-"""Third-party channels of an MCAP file as streams: known types, and numbers that the user names.
+"""Third-party channels of an MCAP file as streams: known types, and numbers by name.
 
 Of a type that is not known a field becomes a signal by `--map /topic.field.sub=UNIT`. Samples are
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.

@@ -1,4 +1,4 @@
-"""A verified MCAP file: its content, and its messages by the index that verification made."""
+"""Verified MCAP file: its content, and its messages by index."""
 
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager

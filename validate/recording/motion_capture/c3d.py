@@ -1,4 +1,4 @@
-"""C3D, the file of motion capture: labelled points, analog channels, residuals.
+"""Reader of C3D motion capture: labelled points, analog channels, residuals.
 
 The file's own words are taken: labels, unit, rate. A residual is the mean distance of the rays that
 meet in a point, not a standard deviation: it is told, never used as one.

@@ -1,4 +1,4 @@
-"""What a C3D file holds, as plain arrays. The only file that imports ezc3d."""
+"""Arrays of a C3D file. The only file that imports ezc3d."""
 
 import tempfile
 from collections.abc import Iterator

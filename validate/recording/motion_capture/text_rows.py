@@ -1,4 +1,4 @@
-"""Tables of coordinates as motion capture and trackers write them: rows of cells and numbers.
+"""Text tables of coordinates from motion capture and trackers: rows of cells and numbers.
 
 A blank cell, `nan`, `NULL` or `-` is "not seen". Where no number has a point a comma is one.
 Programs that log write line by line: where one was ended the last line is cut. It is left out then,

@@ -1,4 +1,4 @@
-"""Where a dark closed region lies in an image, roughly: discs against the sectors of a ring."""
+"""Rough search for dark closed regions in an image: discs against the sectors of a ring."""
 
 from dataclasses import dataclass
 

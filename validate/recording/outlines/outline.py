@@ -1,5 +1,4 @@
-"""The outline of an anechoic inclusion in a B-mode image, with its uncertainty, or the reason why
-there is none.
+"""Outline of an anechoic inclusion in a B-mode image, with uncertainty or a reason for refusal.
 
 No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
 (`discs`), unless a centre and radius are given; the wall is the closed path in polar

@@ -1,4 +1,4 @@
-"""A dark region's wall in polar coordinates: speckle statistics, closed path, place of the wall.
+"""Wall of a dark region in polar coordinates: speckle statistics, closed path, wall position.
 
 Every pixel weighs in by how much likelier it is inside than outside (Gaussian grey levels of the
 region and of its surroundings, the latter from ray to ray, so that a shadow weighs little), divided

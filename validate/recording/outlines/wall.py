@@ -1,4 +1,4 @@
-"""The place of a blurred wall, corrected for blur.
+"""Position of a blurred wall, corrected for blur.
 
 A path between grey levels lies inward of the wall, because the logarithm lifts the skirt of the
 point spread. The wall of the scatterers is where half of the power is left: 3.01 dB below the level

@@ -1,4 +1,4 @@
-"""Text of an export as tables: header blocks, names, units and rows, one or several in a file.
+"""Parser of text exports: header blocks, names, units and rows; one or several tables.
 
 A table begins with a line of names that rows follow. Tables much shorter than the others (results,
 statistics) are kept as header lines and named in the notes. Blank lines may stand anywhere.

@@ -1,4 +1,4 @@
-"""Lines of text as cells: which separator, which lines are rows, names or units."""
+"""Lines of text as cells: separator, and lines of rows, names or units."""
 
 import csv
 import math

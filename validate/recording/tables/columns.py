@@ -1,4 +1,4 @@
-"""Which columns of a force-displacement table are time, displacement and force; what the user says.
+"""Columns of time, displacement and force in a table, by name, unit or `--map`.
 
 Words are in `vocabulary`; where one word names a length on one machine and a strain on another, the
 column's unit decides.

@@ -1,4 +1,4 @@
-"""What a force-displacement table must satisfy before it is believed.
+"""Consistency checks of a force-displacement table.
 
 Strain and stress columns are used here only: they are derived from displacement and force, so they
 must agree with them. All arrays are (n,) and in SI.

@@ -1,4 +1,4 @@
-"""Which way compression points in a force-displacement table, and which columns to flip for it."""
+"""Sign of compression in a force-displacement table, and columns to invert."""
 
 import re
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""Displacement fields, as programs of digital image correlation export them.
+"""Reader of displacement fields exported by digital image correlation.
 
 A row is a point of a grid and all rows are one instant. A recording has no stream for that: read
 over time, the rows would be one point that jumps from place to place.

@@ -1,4 +1,4 @@
-"""Bytes of a text file as text: the encoding is chosen by evidence, and the evidence is told.
+"""Text encoding of a file, chosen by evidence that the recording lists.
 
 UTF-8 and UTF-16 prove themselves. Older encodings do not: nearly every byte is a letter in each of
 them. So each candidate is decoded, and the one in which the words of testing machines appear wins

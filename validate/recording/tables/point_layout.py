@@ -1,4 +1,4 @@
-"""Which columns of a table are points, by its lines of names: coordinates, times, labels, units.
+"""Columns of points in a table, by names: coordinates, times, labels, units.
 
 A line of names, as `time (s), tip_x (mm), ...`; DeepLabCut's three or four lines, a column a cell.
 """

@@ -1,4 +1,4 @@
-"""Force and displacement of a table that holds stress, strain or stretch: by sizes that are said.
+"""Force and displacement from stress, strain or stretch, by declared specimen sizes.
 
 With the length L and the area A of the specimen before the test, and the stretch s = 1 + e of an
 engineering strain e: displacement e L, force (engineering stress) A. A true strain is ln s; a true

@@ -1,4 +1,4 @@
-"""Nominal stress against stretch as text: one curve of a material, or a plane of two stretches."""
+"""Reader of nominal stress against stretch: one curve, or a plane of two stretches."""
 
 import hashlib
 from dataclasses import dataclass

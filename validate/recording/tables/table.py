@@ -1,4 +1,4 @@
-"""One table of a testing machine's export: header block, columns with units, cells as written.
+"""Table of a testing machine's export: header block, columns with units, cells as text.
 
 Knows no quantities. Units may stand in the column names, as `(mm)`, `[mm]`, `/mm`, `in mm` or
 `_mm`, or in a row of their own.

@@ -1,4 +1,4 @@
-"""The words of testing machines' exports, in the languages they are written in.
+"""Vocabulary of testing machines' exports in several languages.
 
 Kept without accents and in lower case (`plain`): exports lose accents, and a text decoded with the
 wrong table shows other letters. Chinese and Japanese words are looked for inside a text, the others

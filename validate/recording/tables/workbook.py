@@ -1,5 +1,7 @@
-"""Testing machines' exports as workbooks (.xlsx, .xls, .ods): the sheet with the test, read as text
-is."""
+"""Reader of testing machines' workbooks (.xlsx, .xls, .ods): the sheet with the test, as text.
+
+The sheet is read with the same parser as text exports.
+"""
 
 import zipfile
 from collections.abc import Mapping

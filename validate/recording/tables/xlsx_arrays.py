@@ -1,4 +1,4 @@
-"""The sheets of a workbook as text. The only file that imports openpyxl."""
+"""Sheets of a workbook as text. The only file that imports openpyxl."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Displacements measured at many points of a body at one instant, as of tracked particles."""
+"""Displacements of many points of a body at one instant, as from particle tracking."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

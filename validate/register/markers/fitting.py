@@ -1,4 +1,4 @@
-"""How markers are fitted to their layout: the card that every experiment with markers shares."""
+"""Settings of the fit of markers to their layout."""
 
 from dataclasses import dataclass
 from typing import Literal

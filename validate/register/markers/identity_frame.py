@@ -1,4 +1,4 @@
-"""Markers that are already in the body's frame: nothing is fitted, any number of them will do."""
+"""Markers that are recorded in the body's frame, without a fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

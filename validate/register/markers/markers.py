@@ -1,4 +1,4 @@
-"""Tracked markers: registered at rest, read from a run where they sit in the body."""
+"""Tracked markers: registered at rest, interpolated from a run at their material points."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""How good a point registration is: errors at the markers, at the target, mirrors and outliers.
+"""Quality measures of a point registration: FRE, TRE, mirror images and outliers.
 
 FLE is the localisation error of one marker, FRE the residual at the markers, TRE the error at a
 point of interest; all are rms distances in m over all d axes. FRE is no accuracy: it does not know

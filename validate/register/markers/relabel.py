@@ -1,4 +1,4 @@
-"""Do the names fit the points? Relabelling by iterated closest assignment.
+"""Check of marker names: relabelling by iterated closest assignment.
 
 Given labels are never changed: a better labelling is only reported. With points alone, labels that
 are wrong by a symmetry of the marker set (a regular grid turned by half a turn) fit as well as the

@@ -1,4 +1,4 @@
-"""Marker displacements since rest: errors of the layout cancel; a wrong rotation does not."""
+"""Marker displacements since rest: layout errors cancel; a wrong rotation does not."""
 
 from dataclasses import replace
 

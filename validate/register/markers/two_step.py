@@ -1,4 +1,4 @@
-"""The two-step least-squares registration of planar markers of paper 000.
+"""Two-step least-squares registration of planar markers (paper 000).
 
 Gosline, Salcudean, Yan, "Haptic simulation of linear elastic media with fluid pockets" (2004),
 section 4.5: the undeformed markers are fitted to a plane, then linear least squares compensates

@@ -1,4 +1,4 @@
-"""Outlines seen in an image plane, against the section of the deformed wall with that plane."""
+"""Outlines in an image plane, against the section of the deformed wall with that plane."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

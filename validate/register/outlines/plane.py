@@ -1,4 +1,4 @@
-"""Image planes: poses, and the section of a deformed surface with the plane of an image."""
+"""Image planes: poses, and the section of a deformed surface with an image plane."""
 
 from dataclasses import dataclass
 

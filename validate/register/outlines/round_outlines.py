@@ -1,4 +1,4 @@
-"""Outlines of a round body, image by image: its diameter, against that of a rigid circle."""
+"""Diameter of a round body's outlines, image by image, against a rigid circle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""From a sweep of parallel images to the inclusion's surface (paper 000, section 4.4).
+"""Surface of an inclusion from a sweep of parallel images (paper 000, section 4.4).
 
 The paper takes images at 2 mm steps across the inclusion's long axis and reads centre and radius
 off each by hand. Here each slice keeps its free outline beside, because the circle is an assumption

@@ -1,4 +1,4 @@
-"""Where a tracked tip stands still: dwells, and the place of each with its uncertainty.
+"""Dwells of a tracked tip: intervals at rest, and the position of each with uncertainty.
 
 A tip that stands on a point while its stylus is turned wanders: the offset of the tip is known only
 so well, and a tracker is distorted. That wander is no noise, and its mean over a dwell is not

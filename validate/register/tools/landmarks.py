@@ -1,5 +1,4 @@
-"""Landmarks of a rigid body that a tracked tip touched: its pose, and each landmark predicted from
-the others.
+"""Landmarks of a rigid body from a tracked tip: pose, and leave-one-out prediction.
 
 What the pose was fitted on is no evidence of it. Left out one by one, every landmark is.
 """

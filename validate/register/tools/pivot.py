@@ -1,4 +1,4 @@
-"""Pivot calibration: the tip of a tracked tool, from poses while the tip stands on a point.
+"""Pivot calibration: tip of a tracked tool from rotations about a fixed point.
 
 R_i p + T_i = c for every pose i: the tip p in the tool's frame and the point c follow by linear
 least squares (the algebraic one step of Yaniv, "Which pivot calibration?", Proc. SPIE 9415, 2015);

@@ -1,4 +1,4 @@
-"""One axes of a chart: lines, points, bands, named levels, and ticks that can be read."""
+"""One axes of a chart: lines, points, bands, named levels, and readable ticks."""
 
 from collections.abc import Sequence
 from textwrap import fill

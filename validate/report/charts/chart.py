@@ -1,4 +1,4 @@
-"""A chart as a picture: all lines on one axes, or one axes a line where they could not be followed.
+"""Chart as a figure: all lines on one axes, or one axes per line where they would overlap.
 
 The legend lies below the axes. What lies below rounding on a logarithmic axis is named and not
 drawn.

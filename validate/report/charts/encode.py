@@ -1,4 +1,4 @@
-"""Pictures as files and as data URIs: PNG and GIF in the folder, the smaller WebP in the page."""
+"""Encoding of figures: PNG and GIF files, and smaller WebP data URIs for the page."""
 
 import base64
 from dataclasses import dataclass

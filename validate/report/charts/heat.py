@@ -1,4 +1,4 @@
-"""Numbers over two axes as coloured squares, each with its number where there is room."""
+"""Heat map: numbers over two axes as coloured squares, labelled where there is room."""
 
 import matplotlib as mpl
 import numpy as np

@@ -1,4 +1,4 @@
-"""Errors with their intervals against their limits as one picture: a line for each check."""
+"""Error intervals against their limits as one figure, one line per check."""
 
 from textwrap import fill
 

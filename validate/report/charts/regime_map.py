@@ -1,4 +1,4 @@
-"""What happens over a logarithmic axis and rows, as coloured squares: one panel a method.
+"""Regime map: outcomes over a logarithmic axis as coloured squares, one panel per method.
 
 Colours, hatches and words tell regimes apart; the predicted border is a line, named settings are
 marks.

@@ -1,4 +1,4 @@
-"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
+"""Figure style: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
 
 Figures are `WIDTH` wide where they can be: a telephone and a printed page show that much with
 letters that can be read.

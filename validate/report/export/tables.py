@@ -1,4 +1,4 @@
-"""Tables of numbers: how an entry reads on the page, and tables and charts as CSV files."""
+"""Tables of numbers: format of entries on the page, and tables and charts as CSV files."""
 
 import csv
 from collections.abc import Iterable, Iterator

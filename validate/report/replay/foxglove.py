@@ -1,4 +1,4 @@
-"""Messages in Foxglove's well-known schemas, in Protobuf. Owns foxglove-schemas-protobuf.
+"""Messages in Foxglove's well-known schemas, in Protobuf, by foxglove-schemas-protobuf.
 
 Lengths m, colours 0..1, rotations x y z w.
 """

@@ -1,4 +1,4 @@
-"""replay.layout.json: which panels show a replay, to be imported in Foxglove or Lichtblick.
+"""replay.layout.json: panels of a replay for Foxglove or Lichtblick.
 
 The form is that in which both export a layout: panels by id, and a tree of splits. One recording:
 its bodies, outlines and markers beside its images and one plot a signal, measured and simulated;

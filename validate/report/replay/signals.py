@@ -1,4 +1,4 @@
-"""Topics of a replay that are no geometry: signals and images over time."""
+"""Topics of a replay over time: signals and images."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What a replay is made from: one recording with one run, and the topics that come of it."""
+"""Input of a replay: one recording with one run, and the topics made from it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

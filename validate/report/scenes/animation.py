@@ -1,4 +1,4 @@
-"""The outline through the load: the measured one over the simulated one, moving."""
+"""Animation of an outline over the load: measured over simulated."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

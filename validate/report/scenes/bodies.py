@@ -1,4 +1,4 @@
-"""The section that shows the simulated body: rendered where GL is, else drawn."""
+"""Report section of the simulated body: rendered where OpenGL is available, else drawn."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The simulated body to be drawn: deformed state, plates, the plane that opens it, the camera."""
+"""Geometry of a drawn body: deformed state, plates, cutting plane, camera."""
 
 from dataclasses import dataclass
 

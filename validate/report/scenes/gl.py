@@ -1,4 +1,4 @@
-"""Whether this machine can render off-screen, found out without risk.
+"""Safe test for off-screen rendering on this machine.
 
 Without GL libraries VTK ends the process with a segmentation fault at its first window, so the
 first window is opened in a process of its own. `VALIDATE_NO_GL=1` answers no at once.

@@ -1,4 +1,4 @@
-"""Numbers at the nodes: their common ranges and, for machines that cannot render, flat drawings."""
+"""Nodal maps: common ranges and, for machines that cannot render, flat drawings."""
 
 from collections.abc import Iterable
 from dataclasses import replace

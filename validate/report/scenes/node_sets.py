@@ -1,4 +1,4 @@
-"""Where a body is held, loaded and watched: its surface from two corners, nodes on it."""
+"""Figure of supports, loads and probes: the body's surface from two corners."""
 
 from collections.abc import Mapping
 from typing import Any

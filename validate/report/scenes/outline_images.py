@@ -1,5 +1,4 @@
-"""The images of a recording with what was found in them: the outline, the circle through a round
-one, and the section that a run has there."""
+"""Images of a recording with outlines, fitted circles and simulated sections."""
 
 from dataclasses import dataclass
 from textwrap import fill

@@ -1,4 +1,4 @@
-"""Points, a path and small errors in space."""
+"""Figures of points, a path and small errors in space."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

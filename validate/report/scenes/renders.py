@@ -1,4 +1,4 @@
-"""Off-screen renders of the simulated body, and of numbers at the nodes, by pyvista.
+"""Off-screen renders of the simulated body and of nodal values, by pyvista.
 
 Import only after `gl.available()`.
 """

@@ -1,4 +1,4 @@
-"""Which effects a recording can distinguish: errors against noise, effects against sensors."""
+"""Distinguishable effects of a recording: errors and effects against sensor noise."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Observations of a registered recording for sections and replays, and the methods shown.
+"""Observations of a registered recording for sections and replays, and the displayed methods.
 
 Nothing else in this package opens a `Registered`.
 """

@@ -1,4 +1,4 @@
-"""What every report shows, in order: views of the long table, and parts drawn from the result."""
+"""Order of the report's sections: views of the long table, and parts drawn from the result."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields

@@ -1,4 +1,4 @@
-"""The verdict in words: over all checks, as declared, and what u_input rests on (ASME V&V 20)."""
+"""Verdict in words: over all checks, as declared, with the basis of u_input (ASME V&V 20)."""
 
 from collections.abc import Iterator, Mapping
 

@@ -1,4 +1,4 @@
-"""The machine and the versions that made a result: no user, no host, no path."""
+"""Machine and versions behind a result, without user, host or path."""
 
 import contextlib
 import os

@@ -1,5 +1,4 @@
-"""Exhibits in results.json (tables whole, charts thinned, maps by their extremes), what is read of
-them again, and every number in them as a row.
+"""Report items in results.json: tables in full, charts thinned, maps by extremes; as rows.
 
 The numbers stay in results.json, their only home; rows are made where `part` asks for them.
 """

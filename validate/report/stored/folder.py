@@ -1,4 +1,4 @@
-"""Folders of results: written beside their place, synced, and exchanged with it when complete.
+"""Result folders: written beside their place, synced, and exchanged when complete.
 
 One process writes a folder at a time, by a lock that ends with it. What an interrupted process left
 is put back or removed by the next one that takes the lock.

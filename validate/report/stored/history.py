@@ -1,4 +1,4 @@
-"""What a report folder held before: a line of JSON for every run that a newer one replaced.
+"""History of a report folder: a line of JSON for every replaced run.
 
 The line is what the run's long table says in short, so that a folder of any age has a history. A
 run is carried over unless all that made it (code, files, parameters) is equal.

@@ -1,4 +1,4 @@
-"""Provenance of a run: its command, the commit of its code, and the files that it read."""
+"""Provenance of a run: its command, the commit of its code, and its input files."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""An error, its uncertainty and its limit as one bar of characters."""
+"""Error, uncertainty and limit as one bar of characters."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""Drawers: a filled view, or any exhibit, as a file, static figures, a page, text for a terminal.
+"""Output of views and report items: files, static figures, HTML, terminal text.
 
 Each takes an exhibit, and the run whose methods have their colours.
 """

@@ -1,4 +1,4 @@
-"""Tables and sentences in a given width: words stay whole, lines end where their text does."""
+"""Tables and sentences in a given width, with unbroken words."""
 
 import os
 from collections.abc import Iterator, Sequence

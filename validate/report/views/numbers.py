@@ -1,4 +1,4 @@
-"""Numbers as people read them: SI in, mm, mm², ms, N and Pa out, three significant digits."""
+"""Number format: SI in; mm, mm², ms, N and Pa out, with three significant digits."""
 
 import math
 

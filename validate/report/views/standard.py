@@ -1,4 +1,4 @@
-"""The views of every run, by the names that `validate show` and `.plot` call them.
+"""Standard views of every run, with their names in `validate show` and `.plot`.
 
 VIEWS.add(View("late_error", "Error at the last markers", {"part": "score"}, x="method", by="name"))
 """

@@ -1,4 +1,4 @@
-"""A view filled with the rows of a table: number tables, charts, heats, intervals, sentences.
+"""Filling of a view with rows of a table: number tables, charts, heat maps, sentences.
 
 These are plain data that every drawer takes; nothing here draws.
 """

@@ -1,4 +1,4 @@
-"""A planar block with rectangular cavities in a row, as the geometry of a scene.
+"""Planar block with rectangular cavities in a row.
 
     HollowBlock(cells=40)                                          one cavity of 10 mm in 50 mm
     HollowBlock(cells=40, cavities=Cavities(2, septum="5 mm"))     two, with a wall between them

@@ -1,4 +1,4 @@
-"""Geometries: what a body's mesh is made from, resolved late.
+"""Geometries: declared shapes that are meshed when a scene is resolved.
 
     Box(("4 mm", "4 mm", "7 mm"), cells=(4, 4, 7))                 a block from the origin Box(...,
     element="hex27", symmetry=("x", "y"), grading=3.0)    a quarter of it Cylinder("30 mm", "20 mm",

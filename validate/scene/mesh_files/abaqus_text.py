@@ -1,4 +1,4 @@
-"""The blocks of an Abaqus input file: keyword, parameters, rows, and where they stand.
+"""Parser of the blocks of an Abaqus input file: keyword, parameters, rows, line numbers.
 
 A flat file has no parts; one by Abaqus/CAE has parts, and an assembly with their instances. Rows of
 other files in the deck's folder (`*Include`, `input=`) stand in their place; rows that make nodes

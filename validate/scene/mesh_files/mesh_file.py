@@ -1,4 +1,4 @@
-"""Meshes as files: npz of plain arrays, read without pickle, sizes bounded before memory is taken.
+"""Mesh files as npz of plain arrays, read without pickle, with bounded sizes.
 
 Arrays: "kind" (text), "nodes" (n, d) float64 m, "cells" (e, k) int32, one "facets.<set>" (f, m)
 int32 per facet set, and "provenance" (text), which is for people.

@@ -1,5 +1,4 @@
-"""Meshes as VTK's unstructured grids in plain text, for programs of others: the order of nodes and
-cells is kept, and numbers have all their digits."""
+"""Writer of VTK unstructured grids (.vtu, text): nodes and cells in order, full precision."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What linear schemes with inertia share: fields, traces and the forces of drives."""
+"""Common parts of linear schemes with inertia: fields, traces and forces of drives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

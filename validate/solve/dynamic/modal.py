@@ -1,4 +1,4 @@
-"""Modal superposition: u = sum of mode shapes times coordinates, plus statics of what is cut off.
+"""Modal superposition with static correction for truncated modes.
 
 Every mode is q'' + c q' + w^2 q = f, stepped on its own: exactly for a force that is linear or
 constant within the step, or by the rules of `newmark_rule` (all modes then equal Newmark itself).

@@ -1,4 +1,4 @@
-"""Explicit linear dynamics of paper 002, section V.B: Newmark's family with beta = 0, gamma = 1/2.
+"""Explicit linear dynamics (paper 002, section V.B): Newmark with beta = 0, gamma = 1/2.
 
 u' = u + h v + h^2/2 a, (M + h/2 C) a' = f' - K u' - C (v + h/2 a), v' = v + h/2 (a + a'). Lumped
 masses and C = alpha M make that a division; all else is one solve with a matrix factorised once.

@@ -1,4 +1,4 @@
-"""Any program as a scheme: a job's folder goes out, an answer comes back, and both are checked."""
+"""External simulator as a scheme: writes a job, reads the answer, checks both."""
 
 import tempfile
 from collections.abc import Callable, Mapping

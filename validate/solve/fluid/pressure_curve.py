@@ -1,4 +1,4 @@
-"""Pressure against volume of a cavity in a linear body: an exact cubic, its line, its slopes.
+"""Pressure-volume curve of a cavity in a linear body: exact cubic, linearisation, slopes.
 
 With fixed normals the volume is a polynomial in the amounts z of the response columns; along one
 pressure it is a cubic (a quadratic in the plane). Source: paper 000, section 3.3.

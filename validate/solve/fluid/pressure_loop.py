@@ -1,4 +1,4 @@
-"""The paper's proportional pressure law and its relatives, side by side: what each update costs.
+"""Proportional pressure control of paper 000 and its variants, with the cost of each update.
 
 P <- P + G (1 - V/V0) until |1 - V/V0| <= tolerance (paper 000, eqs 9 and 10). They differ in G:
 

@@ -1,4 +1,4 @@
-"""Force and displacement changing places on a condensed system (paper 000's boundary swap).
+"""Boundary swap of paper 000: force and displacement change places on a condensed system.
 
 For forces on all kept unknowns u = A f. An unknown whose displacement is given instead changes
 places with its force by a principal pivot, a rank-one update of the dense matrix. Rounding adds up

@@ -1,4 +1,4 @@
-"""A probe at haptic rate on a body that is simulated at a rate of its own (paper 003, section 3.5).
+"""Haptic loop: a probe at haptic rate on a slower simulation (paper 003, section 3.5).
 
 The body is St. Venant-Kirchhoff (or another law at large strain) by central difference, with as
 many substeps as its critical step needs. It reads the probe at every n-th tick and answers by a

@@ -1,4 +1,4 @@
-"""A needle against a body with a fluid pocket, tick by tick (paper 000, section 5.2).
+"""Needle against a body with a fluid pocket, tick by tick (paper 000, section 5.2).
 
 Where the tip enters the surface, that point joins the working set: its displacement along the local
 axes at the needle is that of the tip, the rest of the body is condensed away. A change of contact

@@ -1,4 +1,4 @@
-"""Rates that hands and eyes need."""
+"""Rates of haptic and visual feedback."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The probe of paper 004, section 3: a spring to the surface node nearest to it."""
+"""Spring probe of paper 004, section 3: a spring to the nearest surface node."""
 
 from dataclasses import dataclass
 from typing import Protocol

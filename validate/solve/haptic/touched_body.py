@@ -1,4 +1,4 @@
-"""A body at large strain under the spring of a probe, stepped explicitly from reading to reading.
+"""Body at large strain under a spring probe, stepped explicitly between readings.
 
 The spring and the nodes that share it enter the compiled step of `CentralDifference` itself: as a
 stiffness of the body, and as a load that follows the probe. So it acts at every substep, on a probe

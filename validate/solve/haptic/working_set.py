@@ -1,4 +1,4 @@
-"""Displacements imposed on a condensed system on the fly: nodes, points of facets, local axes.
+"""Displacements imposed on a condensed system at run time: nodes, facet points, local axes.
 
 A tool that touches the body gives the displacement of a few combinations c . u of kept unknowns;
 their forces follow from a system as small as their number (paper 000, section 5.2: a contact adds

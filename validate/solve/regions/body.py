@@ -1,4 +1,4 @@
-"""A system's free unknowns as regions take them, and the regions around a place of its surface."""
+"""Free unknowns of a system by region, and regions around a place of its surface."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,5 +1,4 @@
-"""A reduced model of a touched body: what regions (`solve.regions.scheme`) must beat on a linear
-one.
+"""Krylov-reduced model of a touched linear body, the benchmark of `solve.regions.scheme`.
 
 Displacements are sums of a few Krylov vectors, K^-1 f, K^-1 M K^-1 f, ... of a unit force at the
 contact in every direction; the first of them have its statics exactly. Steps are those of eq 3 of

@@ -1,4 +1,4 @@
-"""Regions that see each other by displacements alone: the coupled map of one tick (paper 004, 5.2).
+"""Coupled step of regions that exchange displacements only (paper 004, 5.2).
 
 In a tick the primary region is solved first, then every other region that is due, outward; each
 has its own period T and its own history. What a region shows to the others between its solves is

@@ -1,4 +1,4 @@
-"""A primary region of another law than the rest: at large strain, or one that relaxes.
+"""Primary region with a law of its own: large strain or viscoelastic.
 
 What paper 004 names as future work. The body's own linear stiffness stays everywhere; the cells all
 of whose free nodes are in the primary region add what their law has beyond it, r(u) = f(u) - K u.

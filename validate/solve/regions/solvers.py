@@ -1,4 +1,4 @@
-"""The solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one.
+"""Solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one.
 
 All carry the displacements u now and u- one period T before. The other regions enter by their
 displacements on the right side (eq 7).

@@ -1,4 +1,4 @@
-"""Ways to solve J x = b again and again for one J: what a step costs is mostly this choice.
+"""Solvers of J x = b for many b and one J, the main cost of a step.
 
 Iterative ones stop at a residual of `tolerance` |b|, which is no bound of the error: at 1e-6 the
 solution of a soft, nearly incompressible body is off by 6e-6 to 3e-3.

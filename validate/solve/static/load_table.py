@@ -1,4 +1,4 @@
-"""A static scheme solved on a grid of loads, and interpolated between them.
+"""Static scheme tabulated on a grid of loads, and interpolated between them.
 
 A body without memory is in one state per load, so a recorded stage that ramps and holds needs no
 solution per sample: cubic Lagrange interpolation between converged states is exact at the grid and

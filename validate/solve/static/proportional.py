@@ -1,4 +1,4 @@
-"""Statics under displacements alone: no modulus moves the field, and every force is proportional.
+"""Statics under prescribed displacements, where the modulus only scales the forces.
 
 One solution at E = 1 Pa, with the law's coefficients in proportion, therefore serves all moduli of
 a body: an identification of its modulus then costs one run.

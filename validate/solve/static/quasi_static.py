@@ -1,4 +1,4 @@
-"""Statics at every step, K u = f: what a slow enough motion tends to. No mass is assembled."""
+"""Quasi-static scheme: K u = f at every step, without mass."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Nodes against rigid bodies: which touch, and the constraints that hold them, without a penalty.
+"""Contact detection of nodes and rigid bodies, with constraints instead of a penalty.
 
 A node is open, sticks or slips. What touches loses the unknown along the normal, what sticks all of
 them: with u = T z + u_0 a Newton step is T^T K T z = -T^T (r + K u_0), and the contact forces are

@@ -1,4 +1,4 @@
-"""What a choice shows: the verdict, the scene's numbers, the ladder with its evidence."""
+"""Report of a choice: verdict, the scene's figures, candidate methods with their evidence."""
 
 from collections.abc import Iterator
 from types import SimpleNamespace

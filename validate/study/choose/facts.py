@@ -1,4 +1,4 @@
-"""A scene's own numbers, and what they ask of a method: a choice shows them beside its pilots."""
+"""Figures of a scene and the requirements on a method that follow from them."""
 
 import json
 from collections.abc import Iterator

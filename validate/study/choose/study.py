@@ -1,4 +1,4 @@
-"""The cheapest method of a scene that meets an error and a rate: a ladder, climbed by pilot runs.
+"""Choice of the cheapest method that meets an error and a rate, by pilot runs.
 
 The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The choice is
 the fastest cell of all that meet both. Once one does, candidates are left out whose step on their

@@ -1,4 +1,4 @@
-"""On a worker: exact readings of a world, and what the checks of a method are judged with."""
+"""Worker data of a coverage study: exact readings of a model, and terms of the checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""On a worker: draws of a method's recordings, each judged in every world.
+"""Cell of a coverage study: draws of a method's recordings, with verdicts in every world.
 
 A drawn recording is the real one with its samples where a true model would have them: exact
 readings less measured samples add up, so that inputs, and parameters that are wrong, are

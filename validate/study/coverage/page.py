@@ -1,4 +1,4 @@
-"""What a coverage study tells: its sentence, its part of results.json and its table of draws."""
+"""Page of a coverage study: sentence, part of results.json and table of draws."""
 
 from collections import Counter
 from dataclasses import asdict

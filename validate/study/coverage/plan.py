@@ -1,4 +1,4 @@
-"""What a coverage study runs: readings of a perfect model and of wrong ones, then draws."""
+"""Plan of a coverage study: readings of a perfect model and of wrong ones, then draws."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Coverage of our own verdicts: how often a perfect model is called different, and a wrong one not.
+"""Coverage study: how often a perfect model is rejected, and a wrong one accepted.
 
 from validate.study.coverage.study import coverage
 found = coverage("kf_cube")

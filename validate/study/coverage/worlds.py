@@ -1,4 +1,4 @@
-"""Exact readings of a judged method in all worlds of a coverage study, each solved once.
+"""Exact readings of a tested method in all worlds of a coverage study, each solved once.
 
 What is dear is solved less often: inputs and wrong parameters then act by straight lines, and the
 study says so.

@@ -1,4 +1,4 @@
-"""What the cells of a filter study share: recordings, registrations, systems and truths."""
+"""Worker data that cells of a filter study share: recordings, registrations, systems, truths."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""A filter study's cell: one method with its settings, on every seed or on the measured recordings.
+"""Cell of a filter study: one method with its settings, on every seed or recording.
 
 Seeds change the noise only: a linear filter whose gains need no data runs them all at once, every
 other method one by one.

@@ -1,4 +1,4 @@
-"""What a filter study will run: every method with every set of values, over common seeds."""
+"""Plan of a filter study: every method with every set of values, over common seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Predictive likelihood of methods without one: plain FEM and the last measurement held.
+"""Predictive likelihood of methods without one: plain FEM and the last measurement.
 
 A Gaussian about the prediction, of variance R + q per measured component: R is the noise of one
 measurement, q >= 0 the variance of the model. Its maximum-likelihood estimate over errors e is

@@ -1,5 +1,4 @@
-"""Scores of a filter study: errors against a twin's truth, errors at what was withheld, likelihood
-of the innovations, and NIS."""
+"""Scores of a filter study: true error, error at withheld data, log-likelihood and NIS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

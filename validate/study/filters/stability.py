@@ -1,5 +1,4 @@
-"""How filters end when their step, noise settings or measurements are far from what they were made
-for: every run finishes, or has diverged or is refused, with the reason."""
+"""Robustness of filters far from their design settings: finished, diverged or refused."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The filter sweep: every method and setting over common seeds, ranked with intervals.
+"""Filter study: every method and setting over common seeds, ranked with intervals.
 
 from validate.study.filters.study import study
 result = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))

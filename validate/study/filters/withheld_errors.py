@@ -1,5 +1,4 @@
-"""Errors of an estimate at data that it was not given: withheld markers, later samples, outlines
-and forces.
+"""Errors of an estimate at withheld data: markers, later samples, outlines and forces.
 
 Squared errors are summed over short segments of time, so that a ranking can put them together in
 blocks as long as its innovations stay correlated.

@@ -1,4 +1,4 @@
-"""What of an identification a worker evaluates: a fit from one start, or one side of a profile."""
+"""Cell of an identification: a fit from one start, or one side of a profile."""
 
 from dataclasses import dataclass
 from typing import Any

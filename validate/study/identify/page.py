@@ -1,4 +1,4 @@
-"""What an identification tells: its sentence, its part of results.json and its table of cells."""
+"""Page of an identification: sentence, part of results.json and table of cells."""
 
 from dataclasses import asdict
 from typing import Any

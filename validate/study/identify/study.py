@@ -1,4 +1,4 @@
-"""Identification of an experiment's parameters: starts and profiles side by side, kept as they end.
+"""Identification of an experiment's parameters: starts and profiles in parallel, stored at once.
 
 from validate.study.identify.study import identification
 found = identification("silicone_beam", wanted=("material.E=1e5:1e6",))

@@ -1,4 +1,4 @@
-"""One variant on a worker: all modes once, then every scheme and step on them.
+"""Cell of a stability map: all modes of one variant, then every scheme and step.
 
 Radii, measured and predicted limits, condition numbers, locking, rounding and drift; or the one
 line for which the variant is refused.

@@ -1,4 +1,4 @@
-"""The stability map of a static experiment: the gain of the loop that keeps a fluid's volume.
+"""Stability of a pressure loop: critical gain of a static experiment with a fluid.
 
 Nothing steps in time there, but paper 000's loop P <- P + Kp (1 - V/V0) (eqs 9 and 10) is a fixed
 point that settles where every |1 - Kp dV/dP / V0| < 1. Predicted: 2 / (dV/dP / V0) at the pressure

@@ -1,4 +1,4 @@
-"""What a stability map tells: its sentence, its part of results.json and its table of cells."""
+"""Page of a stability map: sentence, part of results.json and table of cells."""
 
 from collections import Counter
 from collections.abc import Mapping

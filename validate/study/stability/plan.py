@@ -1,4 +1,4 @@
-"""Which variants of a body a stability map holds: each axis alone, and axes in pairs."""
+"""Plan of a stability map: variants of a body along each axis and along pairs of axes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

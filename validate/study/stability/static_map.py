@@ -1,4 +1,4 @@
-"""Stability of a static experiment: the gain of its pressure loop, or that nothing is stepped."""
+"""Stability of a static experiment: gain of its pressure loop, if it has one."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

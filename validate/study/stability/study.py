@@ -1,4 +1,4 @@
-"""The stability map of an experiment's body: every scheme over step, material, damping, mesh.
+"""Stability map of an experiment's body: every scheme over step, material, damping, mesh.
 
 from validate.study.stability.study import stability
 found = stability("needle_block")

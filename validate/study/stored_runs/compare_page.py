@@ -1,4 +1,4 @@
-"""Stored runs side by side as a folder: page with pictures, all scores as a table, one document."""
+"""Folder of a comparison of stored runs: page with figures, table of scores, one document."""
 
 from pathlib import Path
 from typing import Any

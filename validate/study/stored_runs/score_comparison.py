@@ -1,4 +1,4 @@
-"""Comparison of stored runs by the scores in their long tables. Nothing is run."""
+"""Comparison of stored runs by the scores in their long tables."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A statement over all stored runs: how far off predictions are, by what was measured."""
+"""Summary of all stored runs: bias and scatter of predictions, by measured quantity."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A statement over all stored runs as a page, its tables and one JSON document."""
+"""Page of a summary of all stored runs, with its tables and one JSON document."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace

@@ -1,4 +1,4 @@
-"""One solver on one mesh of a ladder, timed and kept with its answer; or an answer to compare with.
+"""Cell of a trade-off: one solver on one mesh, timed and stored; or a reference answer.
 
 Cells with a solver run one after another on one thread: times of workers side by side would be
 those of their quarrel over memory.

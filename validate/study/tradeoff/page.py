@@ -1,4 +1,4 @@
-"""What a trade or a choice tells: its sentence, its part of results.json, its table of cells."""
+"""Page of a trade-off or choice: sentence, part of results.json, table of cells."""
 
 from collections.abc import Mapping
 from typing import Any

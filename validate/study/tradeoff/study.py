@@ -1,4 +1,4 @@
-"""Error against time per step: every solver x element x mesh x step of an experiment's ladder.
+"""Trade-off study: every solver x element x mesh x step of an experiment's ladder.
 
 The error is taken apart: what is left with a solver that makes none on that mesh is the mesh's, the
 rest is the solver's; what the declared law costs is a pair of runs at large strain.
