@@ -160,7 +160,7 @@ def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[st
 
 
 def document(found: SideBySide) -> dict[str, Any]:
-    """The comparison as one JSON document, SI."""
+    """Return the comparison as one JSON document, SI."""
     return {
         "runs": [
             {"name": r.name, "experiment": r.experiment, "created": r.created,

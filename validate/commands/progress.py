@@ -90,7 +90,7 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Yields what the work reports to: done, total, what comes next."""
+    """Yield what the work reports to: done, total, what comes next."""
     watch, screen = Watch(title), console(error=True)
     if _QUIET.get():
         yield watch.report
@@ -113,7 +113,7 @@ def _bar(watch: Watch, screen: Console) -> Iterator[None]:
 
 
 def drawn(watch: Watch, spinner: Spinner, width: int) -> RenderableType:
-    """A line with what is known of the time, and below it what is being done."""
+    """Return a line with what is known of the time, and below it what is being done."""
     head = Table.grid(padding=(0, 1))
     times = f"{watch.elapsed}, {watch.left}" if watch.left else watch.elapsed
     head.add_row(spinner, watch.title, ProgressBar(1.0, watch.share, width=_BAR), times)

@@ -69,7 +69,7 @@ def _fits(word: str, unit: str) -> bool:
 
 
 def size_of(residual: Residual) -> Size | None:
-    """The size of what was compared; None without a measured one, or with noise alone.
+    """Return the size of what was compared; None without a measured one, or with noise alone.
 
     Of many points: simulated = b measured, b the least-squares factor of the simulated values on
     the measured ones through zero, <s, m>/<m, m>, with the noise's share c sd^2 out of <m, m>.

@@ -116,7 +116,7 @@ def reach(errors: Floats) -> float:
 def term(
     name: str, part: float, errors: Floats, kind: Literal["measurement", "input"] = "input"
 ) -> Term:
-    """A term by what E (n,) of it alone was over the draws."""
+    """Return a term by what E (n,) of it alone was over the draws."""
     return Term(name, part, reach(errors), rms(errors) if len(errors) else 0.0, kind)
 
 

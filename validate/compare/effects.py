@@ -57,7 +57,7 @@ def effect(
     shared: Mapping[str, float],
     sensors: Sequence[Sensor],
 ) -> Effect:
-    """The effect of going from one model to the other; `shared` (SI) per quantity's name."""
+    """Return the effect of going from one model to the other; `shared` (SI) per quantity's name."""
     names = [n for n in one if n in other and one[n].values.shape == other[n].values.shape]
     recorded = [n for n in names if one[n].sd > 0]
     changes = tuple(_change(one[n], other[n], one[n].sd, shared.get(n, 0.0)) for n in names)

@@ -36,7 +36,7 @@ class TableCell:
 
 
 def plain(entry: Entry | TableCell) -> Entry:
-    """The entry itself, whatever else a cell says of it."""
+    """Return the entry itself, whatever else a cell says of it."""
     return entry.value if isinstance(entry, TableCell) else entry
 
 
@@ -293,6 +293,6 @@ class Exhibit:
 
 
 def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:
-    """The exhibit with a sentence under each of its charts that is named."""
+    """Return the exhibit with a sentence under each of its charts that is named."""
     charts = (replace(c, caption=captions.get(c.name, c.caption)) for c in exhibit.charts)
     return replace(exhibit, charts=tuple(charts))

@@ -119,7 +119,7 @@ class ForcePair:
 def force_pair(
     name: str, run: Signal, reference: Signal, lag_within: float, against: str
 ) -> ForcePair:
-    """The run interpolated at the reference's times that it meets, gaps excluded.
+    """Return the run interpolated at the reference's times that it meets, gaps excluded.
 
     Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
     """

@@ -78,8 +78,8 @@ class MovedVerdict:
 def moved(
     checks: Iterable[tuple[str, Check]], expected: Sequence[Expected]
 ) -> tuple[MovedVerdict, ...]:
-    """The checks, each with its method's name, whose verdict is not the one that the last fitting
-    declaration expects; where none fits, those that are adverse."""
+    """Return the checks, each with its method's name, whose verdict is not the one that the last
+    fitting declaration expects; where none fits, those that are adverse."""
     found = []
     for method, check in checks:
         fitting = [e for e in expected if e.fits(method, check.name)]
@@ -160,7 +160,7 @@ class Overall:
 
 
 def judge_all(checks: Sequence[Check]) -> Overall:
-    """The verdict over all checks, in their order."""
+    """Return the verdict over all checks, in their order."""
     undecided = [c for c in checks if c.acceptance == "undecided"]
     tested = [
         c for c in [*(c for c in checks if c.evidence), *undecided]

@@ -162,7 +162,7 @@ class Figure:
             )
 
     def beside(self, values: Values) -> Published:
-        """The figure with our value; one that cannot be computed says what it lacks."""
+        """Return the figure with our value; one that cannot be computed says what it lacks."""
         ours, reason, missing = None, "", ""
         try:
             if not self.other:

@@ -106,7 +106,7 @@ def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
 
 
 def reached_end(registered: Registered, run: Run) -> bool:
-    """Whether a run finished at the last recorded input."""
+    """Return whether a run finished at the last recorded input."""
     return run.finished and bool(run.t[-1] >= registered.t[-1] - 1e-9)
 
 

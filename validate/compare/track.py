@@ -35,7 +35,8 @@ class TrackError:
 
 
 def track_error(name: str, component: str, estimate: Floats, reference: Floats) -> TrackError:
-    """The error of traces (nt,) m at equal times; raises `ComparisonError` for other lengths."""
+    """Return the error of traces (nt,) m at equal times; raises `ComparisonError` for other
+    lengths."""
     if estimate.shape != reference.shape:
         raise ComparisonError(
             f"{name}: {len(estimate)} estimated and {len(reference)} reference times; a run that "
@@ -61,7 +62,7 @@ def largest(error: TrackError) -> float:
 
 
 def nrmse(error: TrackError) -> float:
-    """Raises `ComparisonError` where the reference does not move."""
+    """Raise `ComparisonError` where the reference does not move."""
     if error.spread <= 0:
         raise ComparisonError(f"{error.name}: the reference does not move, so NRMSE is not defined")
     return rmse(error) / error.spread

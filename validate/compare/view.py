@@ -83,7 +83,8 @@ class View:
 
     @classmethod
     def from_json(cls, found: Mapping[str, Any]) -> "View":
-        """The view that `to_json` wrote; lists are tuples. Raises `UsageError` as `View` does."""
+        """Return the view that `to_json` wrote; lists are tuples. Raises `UsageError` as `View`
+        does."""
         return cls(**{k: _tuples(v) for k, v in found.items()})
 
 

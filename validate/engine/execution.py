@@ -53,7 +53,7 @@ def finish(
     report: Report | None = None,
     done: Done | None = None,
 ) -> Finished[R]:
-    """Computes the cells that are not in `folder` yet, keeping each as it is finished; `done` is
+    """Compute the cells that are not in `folder` yet, keeping each as it is finished; `done` is
     told of each, too.
 
     A `Pool` is left open for the next plan. Raises `UsageError` when no scheduler answers, and what

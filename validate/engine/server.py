@@ -26,7 +26,7 @@ _OF_WORKERS = {
 
 
 def serve(preload: Sequence[str]) -> None:
-    """Starts the process where it does not run yet; what it cannot import each worker imports."""
+    """Start the process where it does not run yet; what it cannot import each worker imports."""
     set_forkserver_preload(["distributed", *preload])
     with isolating_environment(), _deaf_to_interrupts(), _without_output():
         os.environ.update(_OF_WORKERS)

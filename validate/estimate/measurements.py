@@ -69,8 +69,8 @@ class Measurements:
         return self._only(np.array([i for i, owner in enumerate(owners) if owner in markers]))
 
     def moving(self, free: Ints) -> "Measurements":
-        """The components that any free unknown moves: what is held or driven teaches a filter
-        nothing, and its noise would count as degrees of freedom.
+        """Return the components that any free unknown moves: what is held or driven teaches a
+        filter nothing, and its noise would count as degrees of freedom.
 
         Raises `ComparisonError` when nothing is left.
         """
@@ -134,7 +134,7 @@ class Timetable:
 
 
 def timetable(measurements: Measurements, dt: float) -> Timetable:
-    """Lands every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
+    """Land every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
 
     Raises `ComparisonError` when one lies further off than a hundredth of a step (here a
     measurement is not interpolated) or two share a step.

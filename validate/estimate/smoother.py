@@ -32,7 +32,7 @@ _LEFT = 1e-12  # singular values of W, of the largest, that are left out of more
 
 
 def smooth_setting() -> Any:
-    """The field of every filter that can smooth."""
+    """Return the field of every filter that can smooth."""
     return quantity(
         False, "1", "estimate each step from all measurements, also later ones; not in real time"
     )
@@ -51,7 +51,7 @@ class Transition(Protocol):
     def H(self) -> Floats: ...
 
     def ahead(self, x: Floats) -> Floats:
-        """A x."""
+        """Return a x."""
         ...
 
     def back(self, x: Floats) -> Floats:
@@ -89,7 +89,7 @@ class Smoothed:
     roots: Mapping[int, Floats]
 
     def after(self, step: int) -> Floats:
-        """The correction (n,) of the state after a step 1, 2, ..."""
+        """Return the correction (n,) of the state after a step 1, 2, ..."""
         return np.asarray(self.corrections[step - 1])
 
 
@@ -143,6 +143,6 @@ def _forward(model: Transition, notes: Sequence[Note], away: Floats, kept: Float
 
 
 def require_exact(smooth: bool, gains: str) -> None:
-    """Raises `UsageError` for smoothing by gains that are not those of the filter's own P."""
+    """Raise `UsageError` for smoothing by gains that are not those of the filter's own P."""
     if smooth and gains == "steady":
         raise UsageError("smooth needs the exact gains: take gains='sequence'")

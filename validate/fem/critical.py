@@ -136,7 +136,7 @@ def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float,
 
 
 def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
-    """A safe step s: omega_max^2 <= max_i sum_j |K_ij| / m_i."""
+    """Return a safe step s: omega_max^2 <= max_i sum_j |K_ij| / m_i."""
     sums = np.asarray(abs(K).sum(axis=1)).ravel()
     return 2 / float(np.sqrt((sums / masses).max()))
 

@@ -36,8 +36,8 @@ class Loading:
 
 
 def labels_of(said: str | None, logs: Sequence[Recording]) -> tuple[str, ...]:
-    """The specimen of each log, as the user says; raises `UsageError` where nobody says it, and for
-    recordings that are no logs of a testing machine."""
+    """Return the specimen of each log, as the user says; raises `UsageError` where nobody says it,
+    and for recordings that are no logs of a testing machine."""
     names = [log.name for log in logs]
     for log in logs:
         if not {"displacement", "force"} <= set(log.signals) or "specimen" not in log.metadata:

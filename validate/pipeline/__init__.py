@@ -49,7 +49,8 @@ __all__ = [
 
 
 def load(name: str) -> Experiment:
-    """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
+    """Return the experiment of that name, or of that file; raises `UsageError` naming the
+    nearest."""
     return find(name, Path.cwd())
 
 

@@ -76,7 +76,7 @@ def chain_faults(recording: Recording) -> Iterator[str]:
 
 
 def require_chain(recording: Recording) -> None:
-    """Raises `RecordingError` with the first fault of the recording's frames."""
+    """Raise `RecordingError` with the first fault of the recording's frames."""
     for fault in chain_faults(recording):
         raise RecordingError(f"{recording.name}: {fault}")
 

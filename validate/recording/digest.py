@@ -33,7 +33,7 @@ def digest(recording: Recording) -> Json:
 
 
 def to_text(found: Json) -> str:
-    """The digest as JSON, a line for each array and each metadata record."""
+    """Return the digest as JSON, a line for each array and each metadata record."""
     return "\n".join(_lines(found, 0)) + "\n"
 
 

@@ -34,7 +34,8 @@ def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = Non
 
 
 def odd_scales(recording: Recording) -> tuple[str, ...]:
-    """A line for every stream of images, outlines or markers whose metres may be something else."""
+    """Return a line for every stream of images, outlines or markers whose metres may be something
+    else."""
     return tuple(f"'{topic}': {text}" for topic, text in _odd(recording) if text)
 
 
@@ -71,7 +72,7 @@ def another_unit(stream: object, size: float) -> str:
 
 
 def in_unit(recording: Recording, unit: str, factor: float) -> Recording:
-    """The recording with markers and outlines that were declared in m taken as in `unit`, of
+    """Return the recording with markers and outlines that were declared in m taken as in `unit`, of
     `factor` m; the record "taken_as" says so."""
     markers = {
         n: replace(m, x=factor * m.x, sd=factor * m.sd) for n, m in recording.markers.items()

@@ -87,7 +87,7 @@ class Registered:
         return tuple(o for o in self.observations if o.role != "drives")
 
     def of(self, kind: type[O]) -> tuple[O, ...]:
-        """The observations of one kind that do not drive."""
+        """Return the observations of one kind that do not drive."""
         return tuple(o for o in self.compared if isinstance(o, kind))
 
     def frames(self, t: Floats, most: int) -> Ints:
@@ -101,5 +101,5 @@ class Registered:
         return np.unique(np.concatenate([*rest, *(single or [even]), *film]))
 
     def stage(self, t: float) -> float:
-        """The first input at the step nearest to t s, in its own unit."""
+        """Return the first input at the step nearest to t s, in its own unit."""
         return float(self.inputs[nearest_sample(self.t, t, "the drive"), 0])

@@ -98,8 +98,8 @@ class PoseShift:
     delay: float | None = quantity(0.0, "s", "delay of its clock relative to the drive's clock")
 
     def of(self, seen: MarkerObservation) -> MarkerObservation:
-        """The markers where they were, at the times of the samples; between samples linear, and a
-        marker that is not seen at one of them is not seen.
+        """Return the markers where they were, at the times of the samples; between samples linear,
+        and a marker that is not seen at one of them is not seen.
 
         A motion of the rest with the rest leaves displacements as they are but for their direction.
         Raises `UsageError` for markers in a plane.

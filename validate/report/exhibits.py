@@ -66,8 +66,8 @@ def draw_all(result: HasMethods, found: Iterable[Part]) -> tuple[DrawnExhibit, .
 def drawing(
     result: HasMethods, parts: Iterable[Part], beside: Beside = in_turn
 ) -> Callable[[], tuple[DrawnExhibit, ...]]:
-    """Begins to draw exhibits, or what sections make of the result; what it returns waits for
-    them. Maps of one scale have common colours.
+    """Begin to draw exhibits, or what sections make of the result; what it returns waits for them.
+    Maps of one scale have common colours.
 
     Raises `ComparisonError` naming what stands twice: names become files and anchors.
     """

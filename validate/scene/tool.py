@@ -42,7 +42,7 @@ class Needle:
 
 
 def require_usable(tools: tuple[Needle, ...], mesh: Mesh) -> None:
-    """Raises `SceneError` for needles of another dimension, more than one, or on no faces."""
+    """Raise `SceneError` for needles of another dimension, more than one, or on no faces."""
     if len(tools) > 1:
         raise SceneError(f"{len(tools)} needles: expected one")
     for tool in tools:

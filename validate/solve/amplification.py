@@ -34,7 +34,7 @@ class Amplification:
 
 
 def amplification(system: System, scheme: Newmark | ExplicitLinear) -> Amplification:
-    """The scheme's amplification by modes.
+    """Return the scheme's amplification by modes.
 
     Raises `SceneError` above 2000 free unknowns or where the damping couples the modes.
     """

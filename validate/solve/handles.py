@@ -39,8 +39,8 @@ class Handles:
         return not _refused(self, scene)
 
     def solves(self, law: str) -> bool:
-        """Whether it takes the law. What solves every law at large strain solves those of plug-ins,
-        too."""
+        """Return whether it takes the law. What solves every law at large strain solves those of
+        plug-ins, too."""
         return law in self.law or (set(LARGE) <= set(self.law) and law in further_laws())
 
 
@@ -80,7 +80,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
 
 
 def require_handled(scene: AnyScene, settings: Handling) -> None:
-    """Raises `SceneError` that names what the settings cannot handle, and what can."""
+    """Raise `SceneError` that names what the settings cannot handle, and what can."""
     refused = _refused(settings.handles, scene)
     if refused:
         what, why = refused

@@ -22,7 +22,8 @@ UpdateName = Literal["printed", "lagged"]
 
 
 def newmark_maps(rule: Rule, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
-    """Maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2 (r,)."""
+    """Return the maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2
+    (r,)."""
     h, one, zero = rule.h, np.ones_like(c), np.zeros_like(c)
     q = np.stack(per_mode(rule, c, k)[:3], axis=-1)
     v_old = np.stack([zero, one, zero], axis=-1)

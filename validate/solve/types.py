@@ -122,7 +122,7 @@ class Smoothing(Protocol):
         ...
 
     def smoother(self, notes: Sequence[Any]) -> Callable[[State], State]:
-        """Turns the states of the same steps, in order, into smoothed ones."""
+        """Turn the states of the same steps, in order, into smoothed ones."""
         ...
 
 

@@ -30,7 +30,7 @@ class SteppedTwin:
     finer: int = 1
 
     def run(self, at: Ints) -> Run:
-        """The run at the ends of the models' steps; fields at those numbered `at` (no,)."""
+        """Return the run at the ends of the models' steps; fields at those numbered `at` (no,)."""
         f = self.finer
         dt = self.dt / f
         t: Floats = dt * np.arange(1, self.steps * f + 1, dtype=np.float64)

@@ -121,7 +121,7 @@ class Camera:
 
 
 def require_noise(variance: float) -> None:
-    """Raises `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
+    """Raise `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
     if not variance > 0:
         raise UsageError(
             f"twin.noise = {variance:g} m2: expected a variance above 0; for a tracker without "

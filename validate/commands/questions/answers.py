@@ -46,7 +46,8 @@ class Question:
     words: tuple[str, ...] | None = None
 
     def checked(self, answer: str) -> str:
-        """The answer, stripped; raises `UsageError` that names the question for a wrong one."""
+        """Return the answer, stripped; raises `UsageError` that names the question for a wrong
+        one."""
         answer = answer.strip()
         if self.open and not answer:
             raise UsageError(f"{self.key}: the answer is missing; {self.text}")
@@ -133,13 +134,14 @@ def _beside(question: Question, answer: str, folder: Path | None) -> str:
 
 
 def on_a_terminal() -> bool:
-    """Whether somebody is there to be asked."""
+    """Return whether somebody is there to be asked."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def listed(asks: Asks, given: Answers) -> str:
-    """The questions as a file of answers: those known so far, the given ones answered, and which
-    were answers to none. Raises `UsageError` for a wrong answer; an open one may be empty here."""
+    """Return the questions as a file of answers: those known so far, the given ones answered, and
+    which were answers to none. Raises `UsageError` for a wrong answer; an open one may be empty
+    here."""
     found: dict[str, str] = {}
     lines = []
     for _ in range(_MOST):

@@ -101,8 +101,8 @@ def reach_of(recording: Recording, found: Answers) -> float:
 
 
 def indented(found: Answers, sides: tuple[float, ...], reach: float) -> Geometry:
-    """The block or cylinder with cells that are small below the indenter: of a quarter, where that
-    is enough. Raises `UsageError` for a cylinder that is not pressed so."""
+    """Return the block or cylinder with cells that are small below the indenter: of a quarter,
+    where that is enough. Raises `UsageError` for a cylinder that is not pressed so."""
     quarter, round_ = _is_quarter(found, sides), len(sides) == 2
     if round_ and not quarter:
         raise UsageError(

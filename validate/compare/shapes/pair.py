@@ -162,7 +162,7 @@ def _common(onto: Mesh | Scene | Common | None, other: Field) -> Common:
 
 
 def same_mesh(one: Mesh, other: Mesh) -> bool:
-    """Whether both have the same nodes and cells, so that fields need no interpolation."""
+    """Return whether both have the same nodes and cells, so that fields need no interpolation."""
     return one is other or (
         one.kind == other.kind
         and np.array_equal(one.nodes, other.nodes)

@@ -93,7 +93,7 @@ class Soundness:
 
 
 def soundness(mesh: Mesh, u: Floats, boundary: Boundary) -> Soundness:
-    """The state of the body with displacement u (n, d) m and that deformed boundary."""
+    """Return the state of the body with displacement u (n, d) m and that deformed boundary."""
     return Soundness(
         inverted_cells(mesh, u), len(mesh.cells), enclosed(boundary), crossings(boundary)
     )
@@ -109,7 +109,7 @@ def inverted_cells(mesh: Mesh, u: Floats | None = None) -> Ints:
 
 
 def require_upright(mesh: Mesh, name: str) -> None:
-    """Raises `ComparisonError` with counts when cells are inverted or flat at rest."""
+    """Raise `ComparisonError` with counts when cells are inverted or flat at rest."""
     wrong = inverted_cells(mesh)
     if len(wrong):
         raise ComparisonError(
@@ -119,7 +119,7 @@ def require_upright(mesh: Mesh, name: str) -> None:
 
 
 def require_comparable(sound: Soundness, name: str) -> None:
-    """Raises `ComparisonError` when the deformed boundary is inside out or crosses itself."""
+    """Raise `ComparisonError` when the deformed boundary is inside out or crosses itself."""
     inverted = f"{len(sound.inverted)} of {sound.cells} cells are inverted"
     if sound.volume <= 0:
         raise ComparisonError(

@@ -97,7 +97,7 @@ class EnsembleKf(MemberModel):
             )
 
     def prepare(self, system: System, measurements: Measurements) -> MemberStepper:
-        """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
+        """Raise `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have and for localised shapes, `ComparisonError` for times off the steps."""
         require_handled(system.scene, self)
         members = self.members(system)

@@ -38,7 +38,7 @@ class Doubtful:
     index: int = -1
 
     def value(self, x: float) -> float:
-        """The parameter in its unit, of its coordinate."""
+        """Return the parameter in its unit, of its coordinate."""
         return x if self.kind == "bias" else float(self.nominal * np.exp(x))
 
 
@@ -60,7 +60,8 @@ class Doubts:
         return tuple(j for j, p in enumerate(self.parameters) if p.kind in kinds)
 
     def stiffest(self, x: Floats) -> float:
-        """The largest factor on any stiffness among members x (s, p): no part has a larger one."""
+        """Return the largest factor on any stiffness among members x (s, p): no part has a larger
+        one."""
         return float(np.exp((x @ self._factors).max(initial=0.0)))
 
     @cached_property
@@ -149,8 +150,8 @@ def _known(scene: Scene) -> Iterator[Doubtful]:
 
 
 def parts(scene: Scene, of: Doubts) -> tuple[StiffnessPart, ...]:
-    """The scene's stiffness in parts: one for every group of cells that the parameters tell apart,
-    then one for every foundation."""
+    """Return the scene's stiffness in parts: one for every group of cells that the parameters tell
+    apart, then one for every foundation."""
     p = len(of.parameters)
     masks = np.zeros((len(scene.mesh.cells), p))
     for j in of.columns("stiffness"):

@@ -79,7 +79,7 @@ class NodeEKF:
             raise UsageError("P0 and Qp must be >= 0, and Qm above 0")
 
     def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
-        """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
+        """Raise `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
         require_handled(system.scene, self)
         explicit = explicit_step(system, self.dt, self.substeps, self.precision)

@@ -31,7 +31,7 @@ class Coordinates(Protocol):
         ...
 
     def amplitudes(self, u: Floats) -> Floats:
-        """The coordinates of u (m,) or (m, k)."""
+        """Return the coordinates of u (m,) or (m, k)."""
         ...
 
     def variances(self, P: Floats) -> Floats:

@@ -62,7 +62,7 @@ class Covariance(Recursion, Protocol):
     def P0(self) -> Floats: ...
 
     def ahead(self, x: Floats) -> Floats:
-        """A x."""
+        """Return a x."""
         ...
 
     def back(self, x: Floats) -> Floats:
@@ -80,7 +80,7 @@ def noise(R: Floats, late: Floats | None) -> Floats:
 
 
 def claimed(P: Floats, PHt: Floats) -> Claim:
-    """A claim without an update to come."""
+    """Return a claim without an update to come."""
     none = np.zeros((len(P), 0))
     return Claim(P, PHt, none, none)
 
@@ -106,7 +106,7 @@ class Dense:
         return np.asarray(self.A.T @ x)
 
     def over(self, steps: int) -> tuple[Floats, Floats]:
-        """A and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
+        """Return a and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
         if steps == 1:
             return self.A, self.Q
         if steps not in self._kept:

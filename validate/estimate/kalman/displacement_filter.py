@@ -139,7 +139,7 @@ class DisplacementStepper(InertialStepper):
         return State(0, Estimate(zeros, zeros, zeros, self.excitation.rest(), claim))
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The posterior at the end of a step; `inputs` are those there, loads included."""
+        """Return the posterior at the end of a step; `inputs` are those there, loads included."""
         last: Estimate = state.inner
         k, of = state.k + 1, self.coordinates
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)

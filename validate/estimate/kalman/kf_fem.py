@@ -104,7 +104,7 @@ class KfFem(DisplacementNoise):
     """
 
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
-        """Raises `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
+        """Raise `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
         require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt)
@@ -140,7 +140,7 @@ class KfFem(DisplacementNoise):
 def modal_covariance(
     settings: DisplacementNoise, system: System, measurements: Measurements, modes: InModes
 ) -> Covariance:
-    """The recursion whose transition is diagonal."""
+    """Return the recursion whose transition is diagonal."""
     H = measurements.free(system.free)
     noise, R = noise_shape(settings, system, modes, H), measurements.variances(settings.R)
     seen = np.ascontiguousarray(H @ modes.shapes)
@@ -166,7 +166,7 @@ def stepper_of(
     claimed: Coordinates,
     gains: GainSequence | None,
 ) -> DisplacementStepper:
-    """The stepper in `coordinates`, its covariance recursed in those of `claimed`."""
+    """Return the stepper in `coordinates`, its covariance recursed in those of `claimed`."""
     table, H = timetable(measurements, settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
     rule, a0 = rule_of(settings.rule, settings.dt), settings.a0

@@ -66,7 +66,7 @@ def advance_observed(
 
 
 def mirrored(P: Floats) -> Floats:
-    """The symmetric matrix whose lower triangle P holds."""
+    """Return the symmetric matrix whose lower triangle P holds."""
     lower = np.tril(P)
     return lower + np.tril(P, -1).T
 

@@ -26,7 +26,7 @@ class ModalKf(DisplacementNoise):
     gains: Gains = quantity("every_step", "1", "computed in advance, or at every step")
 
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
-        """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""
+        """Raise `SceneError` for what linear schemes refuse and for damping that couples modes."""
         require_handled(system.scene, self)
         return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))
 

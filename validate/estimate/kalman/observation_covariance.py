@@ -71,7 +71,7 @@ class Observed:
 
 
 def observed(covariance: Decoupled, steps: int, known: Spaces) -> Observed | None:
-    """The narrow recursion if `steps` steps stay in a space that is narrow, else None.
+    """Return the narrow recursion if `steps` steps stay in a space that is narrow, else None.
 
     `known` keeps spaces for filters that differ in their variances only.
     """

@@ -54,7 +54,7 @@ class ReducedModel:
 def reduced_model(
     system: System, measurements: Measurements, dt: float, modes: int, doubt: LoadDoubt, R: Floats
 ) -> ReducedModel:
-    """The model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
+    """Return the model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
 
     Raises `SceneError` for damping that couples the modes.
     """

@@ -53,7 +53,7 @@ class LoadScale:
     smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
-        """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
+        """Raise `SceneError` unless one load moves the scene and the shape creeps, not swings."""
         require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
             raise SceneError(f"{len(system.scene.loads)} loads: one shape needs exactly one load")

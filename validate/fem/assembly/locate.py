@@ -194,7 +194,7 @@ def _csr(nodes: Ints, weights: Floats, mesh: Mesh) -> sparse.csr_array:
 
 
 def require_inside(rows: Rows, names: tuple[str, ...], limit: float) -> None:
-    """Raises `RegistrationError` naming the points further than `limit` m from the mesh."""
+    """Raise `RegistrationError` naming the points further than `limit` m from the mesh."""
     far = np.flatnonzero(rows.outside > limit)
     if len(far):
         worst = far[int(np.argmax(rows.outside[far]))]

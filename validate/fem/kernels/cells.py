@@ -141,7 +141,7 @@ def _first_along(law: int, H: Nine, D: Nine, a: float, b: float, card: Floats) -
 
 @inlined
 def add_carded(law: int, geometry: Floats, cells: Any, u: Floats, f: Floats) -> None:
-    """Adds the forces of laws that have a card."""
+    """Add the forces of laws that have a card."""
     for block in range(cells.shape[0]):
         for l in range(BLOCK):
             G, card = gradients(geometry, block, l), geometry[block, ROWS:, l]
@@ -175,7 +175,7 @@ def _dyad(axis: int, g: Three) -> Nine:
 def add_carded_blocks(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats
 ) -> None:
-    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,), by their columns."""
+    """Add forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,), by their columns."""
     rows = np.uint64(3 * d.size // f.size)
     for block in range(cells.shape[0]):
         for l in range(BLOCK):

@@ -40,7 +40,7 @@ class ThreadChoice:
 
 
 def chosen(most: int, seconds: Mapping[int, Sequence[float]]) -> ThreadChoice:
-    """The number of threads with the least median, one unless another is clearly faster.
+    """Return the number of threads with the least median, one unless another is clearly faster.
 
     `seconds` of steps by number of threads, of 1 among them; empty where no core was idle.
     """

@@ -52,7 +52,7 @@ class LinearBody:
 
 
 def elastic(system: System) -> Elastic:
-    """The body of a system; raises `SceneError` for what has no form at large strain."""
+    """Return the body of a system; raises `SceneError` for what has no form at large strain."""
     scene = system.scene
     if scene.material.law != "linear":
         return Body(scene)

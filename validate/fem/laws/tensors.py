@@ -34,7 +34,7 @@ def trace(E: Floats) -> Floats:
 
 
 def outer(indices: str, a: Floats, b: Floats) -> Floats:
-    """The product of two tensors per point, e.g. "iJ,jK->JijK"."""
+    """Return the product of two tensors per point, e.g. "iJ,jK->JijK"."""
     inputs, out = indices.split("->")
     left, right = inputs.split(",")
     return np.asarray(np.einsum(f"...{left},...{right}->...{out}", a, b))

@@ -87,12 +87,12 @@ def _time(i: int, m: Material) -> float:
 
 
 def relaxed(scene: Scene) -> Scene:
-    """The scene whose statics are the relaxed limit: what branches are added to."""
+    """Return the scene whose statics are the relaxed limit: what branches are added to."""
     return _made(scene, lambda m: replace(m, prony=replace(m.prony, statics="relaxed")))
 
 
 def taut(scene: Scene) -> Scene:
-    """The scene with all branches taut: its instantaneous moduli."""
+    """Return the scene with all branches taut: its instantaneous moduli."""
     return _made(scene, lambda m: stiffened(m, m.prony.instant))
 
 

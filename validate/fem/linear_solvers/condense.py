@@ -79,7 +79,7 @@ class Condensed:
         return np.asarray((dense + dense.T) / 2)
 
     def column(self, unknown: int) -> Floats:
-        """The dense form's column (W,) m/N of one unknown alone, kept once it was asked for.
+        """Return the dense form's column (W,) m/N of one unknown alone, kept once it was asked for.
 
         Raises `SceneError` for an unknown that is prescribed: a force on it moves nothing.
         """
@@ -91,7 +91,7 @@ class Condensed:
         return self._columns[unknown]
 
     def prefetch(self, unknowns: Ints) -> None:
-        """Keeps the columns of `unknowns` before they are asked for, so that no step has to solve.
+        """Keep the columns of `unknowns` before they are asked for, so that no step has to solve.
 
         Raises `MemoryShortError` where they do not fit.
         """
@@ -140,7 +140,7 @@ class Condensed:
 
 
 def condense(system: System, keep: Ints) -> Condensed:
-    """The system on the nodes `keep`, those of its cavities and those of its driven plates.
+    """Return the system on the nodes `keep`, those of its cavities and those of its driven plates.
 
     Raises `SceneError` for nodes that the mesh does not have and for a law at large strain.
     """

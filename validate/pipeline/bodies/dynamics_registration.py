@@ -62,7 +62,7 @@ class Started:
 
 
 def started(recording: Recording, p: Tree) -> Started:
-    """The recording from `motion.start`, or from where its motion is found to begin.
+    """Return the recording from `motion.start`, or from where its motion is found to begin.
 
     Raises `UsageError` for a start outside the recording.
     """
@@ -186,7 +186,7 @@ def _used(p: Tree, topic: str | None) -> set[str]:
 
 
 def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -> Registered:
-    """Loads at every step, markers, force and outlines at every sample.
+    """Return loads at every step, markers, force and outlines at every sample.
 
     Raises `ComparisonError` where nothing is compared, `RegistrationError` as the parts do.
     """

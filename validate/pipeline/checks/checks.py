@@ -72,7 +72,8 @@ class Terms:
 
 
 def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
-    """The verdict on everything that the experiment accepts; what compared nothing has failed.
+    """Return the verdict on everything that the experiment accepts; what compared nothing has
+    failed.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
@@ -252,7 +253,7 @@ def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
 
 
 def shown_effects(road: Road) -> tuple[EffectSpec, ...]:
-    """The effects whose methods the user runs anyway; none in a quick run.
+    """Return the effects whose methods the user runs anyway; none in a quick run.
 
     None either without an accepted method: its u_num and u_input are part of what hides an effect.
     """

@@ -49,7 +49,7 @@ class Refined:
         return {part: self._converged(part, residual, rounding) for part in self._runs}
 
     def numerical(self, residual: Residual, limit: float = inf) -> Numerical:
-        """The parts of u_num, how each was found, and what would decide within `limit`."""
+        """Return the parts of u_num, how each was found, and what would decide within `limit`."""
         found = self.of(residual, limit)
         deciding = {part: self._deciding(part, c, limit) for part, c in found.items() if c}
         lost = [part for part, c in found.items() if c is None or not c.asymptotic]

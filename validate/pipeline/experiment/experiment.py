@@ -88,7 +88,7 @@ class Input:
         return lambda parameters: self.move(parameters, z)
 
     def at(self, method: str, z: float) -> Variant:
-        """The method with this input off by z standard uncertainties."""
+        """Return the method with this input off by z standard uncertainties."""
         return Variant(method, self.by(z), off=tuple(z * x for x in self.off))
 
 
@@ -174,7 +174,7 @@ Variation = Input | MeshLadder | StepLadder | Free | Sweep
 def vary(
     path: str | tuple[str, ...], rule: str, name: str = "", doc: str = "", source: str = "assumed"
 ) -> Any:
-    """A variation by path and rule; several paths of an input move together.
+    """Return a variation by path and rule; several paths of an input move together.
 
         vary("material.E", "relative 3 %")                        an uncertain input
         vary("material.nu", "absolute 0.005, below 0.5")          (`pipeline.experiment.variation`)
@@ -208,8 +208,8 @@ def free(
     source: str = "assumed",
     helps: str = "",
 ) -> Free:
-    """A parameter that is identified where it stands open, between bounds with their unit, `on`
-    residuals (a quantity, or quantity@load) that are then no evidence."""
+    """Return a parameter that is identified where it stands open, between bounds with their unit,
+    `on` residuals (a quantity, or quantity@load) that are then no evidence."""
     names = (on,) if isinstance(on, str) else tuple(on)
     return Free(path, bound(low, path), bound(high, path), source, helps, names)
 
@@ -235,7 +235,8 @@ class Identified:
     mesh: "MeshLadder | None" = None
 
     def of(self, experiment: "Experiment") -> "Experiment":
-        """The experiment with the inputs and meshes that the identification left uncertain."""
+        """Return the experiment with the inputs and meshes that the identification left
+        uncertain."""
         declared = experiment.uncertainty
         if declared is None:
             return experiment
@@ -301,7 +302,7 @@ class Twin:
     read: Callable[[Recording, Any], Recording] = _as_read
 
     def made(self, parameters: Any, progress: Progress) -> Recording:
-        """A recording in memory, as one that was loaded."""
+        """Return a recording in memory, as one that was loaded."""
         return self.read(self.record(parameters, progress), parameters)
 
 

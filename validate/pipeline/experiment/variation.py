@@ -206,7 +206,7 @@ def swept(rule: str, path: str) -> str:
 
 
 def bound(given: str | float, path: str) -> float:
-    """A bound in SI, from a number or a text with its unit."""
+    """Return a bound in SI, from a number or a text with its unit."""
     if not isinstance(given, str):
         return given
     parts = split(given)

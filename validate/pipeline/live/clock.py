@@ -143,7 +143,7 @@ def live(
     clock: Callable[[], float] = perf_counter,
     wait: Callable[[float], None] = sleep,
 ) -> Lived:
-    """Runs until the source ends, or for so many seconds; an interruption ends it, too."""
+    """Run until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
     _first_too(stepper.threads)
     kept, skipped = _Ticked(), 0

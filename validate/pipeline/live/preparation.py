@@ -38,7 +38,7 @@ class Prepared:
 
 
 def prepared(experiment: Experiment, options: Options, method: str = "") -> Prepared:
-    """Prepares a method (none: the first one accepted).
+    """Prepare a method (none: the first one accepted).
 
     Raises `UsageError` for an experiment without a tool, and what the pipeline raises.
     """

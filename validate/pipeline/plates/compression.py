@@ -67,7 +67,7 @@ def compression(
     *,
     folder: Path = Path(),
 ) -> Experiment:
-    """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that the
+    """Return the experiment: `force` is judged in the windows "fit" and "beyond", outlines that the
     settings name at images of their own.
 
     `folder` is that of the experiment's file, from which a mesh file is found. Raises `UsageError`

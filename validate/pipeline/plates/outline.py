@@ -156,7 +156,7 @@ def _shifted(axis: int) -> Callable[[Tree, float], Tree]:
 
 
 def stiffer(tree: Tree, by: float) -> Tree:
-    """The body with the given moduli times a factor; those that are identified follow by
+    """Return the body with the given moduli times a factor; those that are identified follow by
     themselves."""
     moduli = {path: value_at(tree, path)[0] for path in MODULI}
     return tree.given({path: by * E for path, E in moduli.items() if E is not None})

@@ -89,12 +89,12 @@ def between(ends: Ends, tree: Tree) -> Mapping[str, Any]:
 
 
 def ends_of(scene: Scene) -> Ends:
-    """Whether the moving plate holds the body sideways."""
+    """Return whether the moving plate holds the body sideways."""
     return "bonded" if any(s.facets == UPPER for s in scene.supports) else "slip"
 
 
 def kind_of_test(tree: Tree) -> TestKind:
-    """Whether the upper plate presses or pulls; raises `UsageError` for another motion."""
+    """Return whether the upper plate presses or pulls; raises `UsageError` for another motion."""
     moved = {(d.name, d.facets, tuple(d.direction)) for d in tree.scene.drives}
     for kind, sign in (("compression", -1.0), ("tension", 1.0)):
         if moved == {("stage", UPPER, (0.0, 0.0, sign))}:
@@ -125,7 +125,7 @@ def model_name(law: str, ends: str, order: int) -> str:
 
 
 def by_model(scene: Scene) -> str:
-    """The name of the model that a scene was built with."""
+    """Return the name of the model that a scene was built with."""
     return model_name(scene.material.law, ends_of(scene), scene.mesh.order)
 
 
@@ -143,7 +143,7 @@ class BuiltPressed(Built):
         return super().__call__(recording, tree, own)
 
     def model(self, tree: Tree) -> str:
-        """The name of the model with these parameters, a method's changes among them."""
+        """Return the name of the model with these parameters, a method's changes among them."""
         order = mesh_of(None, tree, self.folder).order
         return model_name(tree.scene.material.law, ends_of(tree.scene), order)
 

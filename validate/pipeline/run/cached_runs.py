@@ -88,7 +88,7 @@ def _used(recording: Recording, role: str) -> UsedFile:
 
 
 def stored_run(experiment: Experiment, folder: Path) -> tuple[Json | None, str]:
-    """Checks and printed figures of the run in `folder`, as results.json has them, where the
+    """Return checks and printed figures of the run in `folder`, as results.json has them, where the
     experiment as declared would be computed from the same; else None and what differs ("" where
     nothing is stored).
 

@@ -89,7 +89,7 @@ class RunJob:
 
 
 def open_road(job: RunJob) -> Road:
-    """The road on a worker, with its recordings."""
+    """Return the road on a worker, with its recordings."""
     experiment = with_simulators(job.of.experiment(), job.of.simulators)
     options = Options(dict(job.of.values), (), job.of.quick, simulators=job.of.simulators)
     declared, methods = configure(experiment, options)

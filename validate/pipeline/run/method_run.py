@@ -119,7 +119,7 @@ class Followed:
         return self.run.t * self.seen.time_scale
 
     def reference(self, probe: str) -> Floats:
-        """The truth (nt, d) m at the times of the run's own steps."""
+        """Return the truth (nt, d) m at the times of the run's own steps."""
         at = np.searchsorted(self.seen.t, self.run.t - 1e-9)
         return self.truth.probes[probe][at]
 

@@ -65,8 +65,8 @@ def compare(
     identify: Identify = here,
     by: Solves | None = None,
 ) -> Result:
-    """Runs an experiment and judges it; `identify` finds what its calibrations leave open, `by`
-    solves its runs (none: in this process).
+    """Run an experiment and compute its verdicts; `identify` finds what its calibrations leave
+    open, `by` solves its runs (none: in this process).
 
     Raises children of `ValidateError` for bad input.
     """

@@ -19,7 +19,7 @@ _OF_IMAGES = ("brightness", "change")
 
 
 def channel(recording: Recording, name: str) -> Signal:
-    """The channel as a signal (nt, 1), samples where nothing was seen left out.
+    """Return the channel as a signal (nt, 1), samples where nothing was seen left out.
 
     Raises `UsageError` with the channels that there are.
     """

@@ -28,7 +28,7 @@ def offset_by_event(
     windows: tuple[Window | None, Window | None] = (None, None),
     min_coverage: float = MIN_COVERAGE,
 ) -> Offset:
-    """The offset that brings the stream's event onto the reference's.
+    """Return the offset that brings the stream's event onto the reference's.
 
     `windows` are the times (s) between which each signal shows the event and nothing else, None:
     everywhere. Raises `RecordingError` where no or no single event is found, or coverage is small.

@@ -23,8 +23,8 @@ _YAML, _SAYS = "metadata.yaml", b"rosbag2_bagfile_information"
 
 
 def read_bag(path: Path, options: Options) -> Recording:
-    """The messages of a bag that mean something, as `validate.recording.mcap.read.read_all` has
-    them, with its options; a folder is read whole, in the order of its files.
+    """Return the messages of a bag that mean something, as `validate.recording.mcap.read.read_all`
+    has them, with its options; a folder is read whole, in the order of its files.
 
     A bag that holds no definitions of its types is read by those of ROS 2 Humble. Raises
     `RecordingError` for a bag that is cut or damaged, or of which nothing is a stream.

@@ -22,8 +22,9 @@ _MODELS = ("", "plumb_bob", "rational_polynomial")
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The camera's matrix `K` (3, 3) px, distortion `D` (k,), `size` (w, h) px and reprojection
-    `error` px; NaN of what is not stated. Raises `RecordingError` for other models of a lens."""
+    """Return the camera's matrix `K` (3, 3) px, distortion `D` (k,), `size` (w, h) px and
+    reprojection `error` px; NaN of what is not stated. Raises `RecordingError` for other models of
+    a lens."""
     import cv2
 
     text = _text(path)

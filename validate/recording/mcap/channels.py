@@ -33,7 +33,7 @@ class MessageSchema:
 
 
 def json_schema(name: str, definition: Json) -> MessageSchema:
-    """The schema of messages that `schemas.to_bytes` writes."""
+    """Return the schema of messages that `schemas.to_bytes` writes."""
     return MessageSchema(name, JSON_SCHEMA, to_bytes(definition))
 
 

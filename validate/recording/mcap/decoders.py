@@ -122,7 +122,7 @@ def _cbor() -> Decoder:
 
 
 def binary(value: Any) -> bytes:
-    """The bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
+    """Return the bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
     if isinstance(value, str):
         try:
             return base64.b64decode(value, validate=True)

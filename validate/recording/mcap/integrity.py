@@ -66,7 +66,7 @@ class Sums:
         self._handed: deque[Future[None]] = deque()
 
     def update(self, data: bytes) -> None:
-        """Adds bytes behind the others."""
+        """Add bytes behind the others."""
         self._waiting.append(data)
         self._size += len(data)
         if self._size >= _HASHED_AT_ONCE:
@@ -83,7 +83,7 @@ class Sums:
         self._crc = 0
 
     def hexdigest(self) -> str:
-        """The SHA-256 of all bytes; nothing can be added afterwards."""
+        """Return the SHA-256 of all bytes; nothing can be added afterwards."""
         self._settle()
         if self._thread is not None:
             self._thread.shutdown()

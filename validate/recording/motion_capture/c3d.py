@@ -34,7 +34,7 @@ Found = tuple[dict[str, Stream], dict[str, str]]  # streams, and why others are 
 
 
 def names_of(found: Held) -> tuple[str, ...]:
-    """A name for everything among the points."""
+    """Return a name for everything among the points."""
     return distinct(found["labels"].tolist(), found["points"].shape[1])
 
 

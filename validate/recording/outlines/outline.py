@@ -178,7 +178,7 @@ def extract_outline(
     shape: Shape = "free",
     bright: bool = False,
 ) -> Outline:
-    """The outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
+    """Return the outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
 
     `centre` (2,) m and `radius` m may be given roughly (a radius within a third of the true one);
     m_per_px is (x, y). `shape` "free" follows the wall, the others fit it. Raises `RecordingError`
@@ -253,7 +253,7 @@ def outlines_of(
     bright: bool = False,
     images: str = "",
 ) -> Contours:
-    """The outline of every image; sd is the root mean square of all.
+    """Return the outline of every image; sd is the root mean square of all.
 
     `images` is the topic of the frames, kept with the outlines. Other options as in
     `extract_outline`. Raises `RecordingError` naming the first image without one and how many there

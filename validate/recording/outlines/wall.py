@@ -33,7 +33,7 @@ class Placed:
 
 
 def placed(grey: Grey, wall: Wall, bright: bool) -> Placed:
-    """The wall's points moved from the path to where half of the power is left."""
+    """Return the wall's points moved from the path to where half of the power is left."""
     points = wall.centre + wall.radius[:, None] * DIRECTIONS
     normals = _normals(points)
     s = np.linspace(-_SPAN, _SPAN, _SAMPLES) * float(wall.radius.mean())

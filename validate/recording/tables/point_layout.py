@@ -64,7 +64,7 @@ class PointLayout:
 
 
 def layout_of(held: TextRows) -> PointLayout | None:
-    """The first lines that name points; none where none do."""
+    """Return the first lines that name points; none where none do."""
     if found := _of_deeplabcut(held.rows):
         return found
     for i, row in enumerate(held.rows[:_DEEPEST]):

@@ -54,7 +54,7 @@ def read_stretch_stress(path: Path, unit: str | None = None) -> Recording:
 
 
 def signals_of(curve: Curve) -> dict[str, Signal]:
-    """The curve as signals; row numbers for times."""
+    """Return the curve as signals; row numbers for times."""
     t = np.arange(len(curve.stretch), dtype=np.float64)
     return {
         "stretch": Signal(t, curve.stretch, "1", 0.0, "specimen"),

@@ -57,7 +57,7 @@ class DisplacementObservation:
         return np.asarray(from_rest(run.t[run.at], moved, self.t)[-1] - self.u.ravel())
 
     def anew(self, left: Floats, draw: AnyDraw) -> "DisplacementObservation":
-        """The points as far as `left` (k d,) m has them, noise drawn."""
+        """Return the points as far as `left` (k d,) m has them, noise drawn."""
         exact = self.u + left.reshape(self.u.shape)
         return replace(self, u=exact + draw.white(self.sd, exact.shape))
 

@@ -20,5 +20,5 @@ class MarkerFit:
     robust: bool = quantity(False, "1", "leave outliers out of the fit, still compared")
 
     def noise(self, recorded: float) -> float | tuple[float, ...]:
-        """The noise m that is used: one for all axes, or one for each."""
+        """Return the noise m that is used: one for all axes, or one for each."""
         return self.sd if len(self.sd) > 1 else (*self.sd, recorded)[0]

@@ -26,7 +26,7 @@ class AsDeclared(Registration):
 
 
 def as_declared(names: Sequence[str], places: Floats, sd: float) -> AsDeclared:
-    """The markers at places (k, 3) m of both frames, with noise `sd` m per axis."""
+    """Return the markers at places (k, 3) m of both frames, with noise `sd` m per axis."""
     return AsDeclared(
         Similarity(np.eye(3), np.zeros(3)), tuple(names), places, np.zeros_like(places), sd,
         "rigid", Reflection(0.0, np.inf), Scale(1.0, 0.0),

@@ -38,7 +38,8 @@ class Relabelling:
 
 
 def relabellings(source: Floats, target: Floats, fit: Fit, noise: float) -> tuple[Relabelling, ...]:
-    """The best labelling found, followed by others equally good; points (k, d) m, noise m per axis.
+    """Return the best labelling found, followed by others equally good; points (k, d) m, noise m
+    per axis.
 
     Starts from the given labels; unless moving fewer than half of them explains the excess
     (`label_fault`), also from the principal axes of both sets, with `TURNS` rotations about the

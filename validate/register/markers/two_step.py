@@ -41,7 +41,7 @@ class Plane(NamedTuple):
 
 
 def fit_plane(points: ArrayLike, name: str = "points", up: ArrayLike | None = None) -> Plane:
-    """The total least squares plane of points (k, 3) m, its normal on the side of `up` (3,).
+    """Return the total least squares plane of points (k, 3) m, its normal on the side of `up` (3,).
 
     Raises `RegistrationError` for degenerate sets, a set without a plane (third over second rms
     spread above `PLANAR`) and an `up` within the plane.

@@ -63,7 +63,7 @@ class RoundOutlines:
         return {self.name: "m"}
 
     def left(self, run: Simulated) -> Floats:
-        """The body's diameter less those of the circles (nt,) m."""
+        """Return the body's diameter less those of the circles (nt,) m."""
         return self._lengths(run)[np.clip(np.searchsorted(run.t, self.t), 0, len(run.t) - 1)] - (
             self.diameters
         )

@@ -103,7 +103,7 @@ class ImagePlane:
 
 
 def image_plane(seen: SeenPoints) -> ImagePlane:
-    """Raises `RegistrationError` for too few points, and for ones that leave a motion of the plane
+    """Raise `RegistrationError` for too few points, and for ones that leave a motion of the plane
     open, as wires seen from one direction do."""
     pose, scale, J = _fitted(seen)
     off = _misses(seen, pose, scale)

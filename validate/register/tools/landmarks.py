@@ -42,7 +42,7 @@ class Match:
     rms: float
 
     def has(self, known: tuple[int, int, int], seen: Ints) -> bool:
-        """Whether those landmarks are at those places."""
+        """Return whether those landmarks are at those places."""
         at = dict(zip(self.known.tolist(), self.seen.tolist(), strict=True))
         return bool([at.get(k) for k in known] == seen.tolist())
 

@@ -42,7 +42,7 @@ class Pivot:
 
 
 def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
-    """The tip from rotations R (n, 3, 3) and places T (n, 3) m; `point` (n,) counts from 0.
+    """Return the tip from rotations R (n, 3, 3) and places T (n, 3) m; `point` (n,) counts from 0.
 
     Poses that lie beyond four standard deviations of the others, while the tip came or left, are
     not used. The standard deviation is found by leaving out parts in time, so that noise that lasts

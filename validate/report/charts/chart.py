@@ -46,7 +46,7 @@ _NAME = 60  # letters of a legend's entry in one line
 
 
 def picture(result: HasMethods, chart: Chart) -> Picture:
-    """The chart drawn; series named after a method have its colour of all other figures."""
+    """Return the chart drawn; series named after a method have its colour of all other figures."""
     pixels = draw(*drawing(result, chart))
     names = "; ".join(dict.fromkeys(s.name for s in chart.series))
     scale = {"x": " Logarithmic x.", "y": " Logarithmic y.", "xy": " Logarithmic axes."}

@@ -19,7 +19,7 @@ _EMPTY = "#BDBDBD"
 
 
 def picture(heat: Heat) -> Picture:
-    """The heat drawn; squares without a number are grey."""
+    """Return the heat drawn; squares without a number are grey."""
     rows, columns = heat.values.shape
     turn = "" if heat.centre is None else f" White is {heat.centre:g}."
     scale = " Logarithmic colours." if _logarithmic(heat.values) else ""

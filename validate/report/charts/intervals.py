@@ -18,7 +18,7 @@ _COLOURS = {"good enough": PALETTE[2], "not distinguishable": PALETTE[2],
 
 
 def picture(shown: Intervals) -> Picture:
-    """The intervals drawn, at most `_MOST`: the largest shares of their limits."""
+    """Return the intervals drawn, at most `_MOST`: the largest shares of their limits."""
     _, _, of = shares(shown)
     order = _order(shown)
     left = len(shown.labels) - len(order)

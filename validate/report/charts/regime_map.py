@@ -26,7 +26,7 @@ _SIGNS = ("o", "s", "D", "^", "v", "P")
 
 
 def picture(shown: RegimeMap) -> Picture:
-    """The map drawn; its caption explains line and marks."""
+    """Return the map drawn; its caption explains line and marks."""
     columns = min(_COLUMNS, len(shown.panels))
     rows = -(-len(shown.panels) // columns)
     height = _PANEL + _ROW * len(shown.rows)

@@ -23,7 +23,7 @@ Shown = Sequence[tuple[ReplayView, Sequence[Track]]]
 
 
 def layout(shown: Shown) -> str:
-    """The layout of the topics of every recording, as JSON."""
+    """Return the layout of the topics of every recording, as JSON."""
     panels: dict[str, Json] = {}
     tabs = [{"title": _title(view), "layout": _recording(view, tracks, panels)}
             for view, tracks in shown if tracks]  # fmt: skip

@@ -84,7 +84,7 @@ def _images(view: ReplayView, topic: str, frames: Frames) -> Track:
 
 
 def one_in(count: int, most: int) -> int:
-    """The step that leaves at most `most` of `count`."""
+    """Return the step that leaves at most `most` of `count`."""
     return max(1, -(-count // max(1, most)))
 
 

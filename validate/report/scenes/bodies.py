@@ -19,7 +19,7 @@ _M, _MM = 1e-3, 1e3
 
 
 def body(result: Result) -> Exhibit | None:
-    """Renders of the accepted method at the last load; None when there is no 3-D body."""
+    """Render of the accepted method at the last load; None when there is no 3-D body."""
     shown = shown_body(result)
     if shown is None:
         return None

@@ -31,7 +31,7 @@ _KNOWN: list[str] = []  # the window class that opens, "" for none, once that is
 
 
 def ask() -> None:
-    """Begins to find out beside what comes next, for `available` to answer at once later."""
+    """Begin to find out beside what comes next, for `available` to answer at once later."""
     Thread(target=available, daemon=True).start()
 
 
@@ -60,7 +60,7 @@ def known() -> tuple[str, ...]:
 
 
 def learn(known: tuple[str, ...]) -> None:
-    """Takes over what another process of this machine found out."""
+    """Take over what another process of this machine found out."""
     _KNOWN[:] = known or _KNOWN
 
 

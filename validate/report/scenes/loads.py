@@ -35,7 +35,7 @@ class Instant:
 
 
 def held(registered: Registered, run: Run) -> tuple[Instant, ...]:
-    """The instants that the run computed, in order of time."""
+    """Return the instants that the run computed, in order of time."""
     if not holds(registered):
         times = run.t[run.at]
         rows = zip(times.tolist(), driven(registered, times).tolist(), run.u, strict=True)

@@ -79,9 +79,9 @@ def outlines_over(
     simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
     marks: tuple[PlaceSaid, ...] = (),
 ) -> Picture:
-    """The images nearest to the holds in time, with outlines, with circles where the first outline
-    is round, with what was `simulated` at the holds, and with `marks` in the first; `which` they
-    are, and `words` on what they are for, stand in the caption."""
+    """Return the images nearest to the holds in time, with outlines, with circles where the first
+    outline is round, with what was `simulated` at the holds, and with `marks` in the first; `which`
+    they are, and `words` on what they are for, stand in the caption."""
     circles = _circles(contours, holds)
     lines = [
         [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]

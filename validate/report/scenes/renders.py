@@ -50,7 +50,8 @@ class _View:
 
 
 def renders(body: ShownBody) -> tuple[Picture, ...]:
-    """The body opened and deformed, against the cut at rest and deformed, with element edges.
+    """Return the body opened and deformed, against the cut at rest and deformed, with element
+    edges.
 
     Two of them for a whole body without plates.
     """
@@ -264,7 +265,7 @@ def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:
 
 
 def rendered(shown: NodeMap, span: Range) -> Picture:
-    """The map on the undeformed surface, from a camera that only the mesh moves."""
+    """Return the map on the undeformed surface, from a camera that only the mesh moves."""
     said = words(shown, span)
     return Picture(
         f"map_{shown.name}",

@@ -31,7 +31,8 @@ class SurfacePart:
 
 
 def skins(scene: AnyScene, most: int) -> tuple[SurfacePart, ...]:
-    """The outside and every cavity wall, about `most` triangles in all; none of a 2-D mesh."""
+    """Return the outside and every cavity wall, about `most` triangles in all; none of a 2-D
+    mesh."""
     mesh = scene.mesh
     if mesh.dimension != 3:
         return ()

@@ -157,5 +157,5 @@ def thinned(y: Floats, most: int) -> Ints:
 
 
 def rounded(values: Floats) -> list[float]:
-    """The numbers to seven significant digits, which a file of text writes short."""
+    """Return the numbers to seven significant digits, which a file of text writes short."""
     return [float(f"{v:.{_DIGITS}g}") for v in values.tolist()]

@@ -133,7 +133,7 @@ VIEWS: Registry[View] = Registry("views", STANDARD, lambda view: view.name, view
 
 
 def view_of(name: str) -> View:
-    """The view of that name; raises `UsageError` where there is none."""
+    """Return the view of that name; raises `UsageError` where there is none."""
     known = {view.name: view for view in VIEWS}
     if name not in known:
         raise UsageError(f"no view '{name}'; {nearest_names(name, set(known))}")

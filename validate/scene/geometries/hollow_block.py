@@ -47,8 +47,8 @@ class HollowBlock:
         take_units(self)
 
     def resolved(self, folder: Path) -> Mesh:
-        """The mesh. Raises `SceneError` for cavities that touch each other or the outside, or do
-        not fall on whole squares."""
+        """Return the mesh. Raises `SceneError` for cavities that touch each other or the outside,
+        or do not fall on whole squares."""
         h = self.width / self.cells
         nx, ny = self.cells, _whole(self.height, h, "body.height")
         solid = np.ones((nx, ny), dtype=bool)

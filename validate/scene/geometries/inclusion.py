@@ -244,7 +244,7 @@ class Capsule:
             )
 
     def foot(self, points: Floats) -> Floats:
-        """The nearest point of the axis segment for every point (n, 3)."""
+        """Return the nearest point of the axis segment for every point (n, 3)."""
         half = self.length / 2 - self.radius
         foot = np.tile(np.array(self.centre), (len(points), 1))
         i = self.axis

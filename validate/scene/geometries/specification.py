@@ -47,14 +47,14 @@ class Geometry(Protocol):
     def resolved(self, folder: Path) -> Mesh: ...
 
     def scaled(self, share: float) -> "Geometry":
-        """The similar one with about `share` of the cells along every edge."""
+        """Return the similar one with about `share` of the cells along every edge."""
         ...
 
     def __hash__(self) -> int: ...
 
 
 def cell_size(mesh: Mesh) -> float:
-    """The edge m of a cube (in 2-D a square) as large as a mean cell."""
+    """Return the edge m of a cube (in 2-D a square) as large as a mean cell."""
     return float(np.abs(cell_volumes(mesh)).mean() ** (1 / mesh.dimension))
 
 

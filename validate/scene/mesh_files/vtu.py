@@ -18,7 +18,7 @@ _HEAD = (
 
 
 def write_vtu(mesh: Mesh, path: Path) -> None:
-    """Raises `SceneError` for a kind of cell that is not carried."""
+    """Raise `SceneError` for a kind of cell that is not carried."""
     if mesh.kind not in CELL_TYPES:
         raise SceneError(f"cells of kind {mesh.kind}: a .vtu carries {', '.join(CELL_TYPES)}")
     number = CELL_TYPES[mesh.kind]

@@ -70,12 +70,12 @@ class PressureLoop:
         return (Rival(name, "condensed", lambda dt: PressureLoop(), stepped=False),)
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a line search on several cavities."""
+        """Raise `SceneError` for a line search on several cavities."""
         require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
-        """The scheme on columns that are there already."""
+        """Return the scheme on columns that are there already."""
         count = len(responses.volumes)
         if self.update in ("golden", "piecewise") and count > 1:
             raise SceneError(

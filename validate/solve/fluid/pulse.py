@@ -59,7 +59,7 @@ class PulsePressure:
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
-        """The scheme on columns that are there already."""
+        """Return the scheme on columns that are there already."""
         return PulseStepper(responses, condensed(responses), self)
 
 

@@ -59,7 +59,7 @@ class TouchedBody:
     kept: dict[tuple[int, ...], CentralStepper]
 
     def rest(self, tip: Floats) -> Read:
-        """The body at rest and the probe at `tip` (d,) m."""
+        """Return the body at rest and the probe at `tip` (d,) m."""
         state = self.untouched.rest()
         past: Past = replace(state.inner, inputs=np.zeros(len(tip)))
         return self._read(replace(state, inner=past), None, tip)

@@ -278,7 +278,7 @@ class PrimarySolver:
     kept: list[Factor | Fronts] = field(default_factory=list)
 
     def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
-        """A step of a region that remembers nothing."""
+        """Return a step of a region that remembers nothing."""
         return self.walk(u, before, f, self.law.rest())[0]
 
     def walk(self, u: Floats, before: Floats, f: Floats, memory: Any) -> tuple[Floats, Any]:

@@ -133,7 +133,7 @@ class AsyncRegions:
         return self.law != "linear" or bool(self.prony.g)
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a scene without one probe, or whose surface is all held."""
+        """Raise `SceneError` for a scene without one probe, or whose surface is all held."""
         scene = system.scene
         require_handled(scene, self)
         require_one_probe(system)

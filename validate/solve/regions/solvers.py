@@ -96,7 +96,7 @@ def semi_implicit(body: RegionMatrices, at: Ints, T: Floats) -> SemiImplicit:
 
 
 def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> RegionSolver:
-    """The named solver of the unknowns `at` (w,), once every T s."""
+    """Return the named solver of the unknowns `at` (w,), once every T s."""
     if name in ("semi_implicit", "static"):
         return semi_implicit(body, at, np.full(len(at), np.inf if name == "static" else T))
     kind = Explicit if name == "explicit" else ImplicitExplicit
@@ -107,7 +107,8 @@ def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> Reg
 def critical_period(
     name: SolverName, body: RegionMatrices, at: Ints, taut: sparse.csr_array | None = None
 ) -> float:
-    """The longest stable T s of an explicit region whose neighbours stand still; else infinite.
+    """Return the longest stable T s of an explicit region whose neighbours stand still; else
+    infinite.
 
     `taut` (w, w) N/m is what a law adds to K at once. Eq 5: 2/w, whatever the damping. Eq 6:
     w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.

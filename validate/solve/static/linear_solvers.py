@@ -176,7 +176,7 @@ def solver_of(
     places: Floats,
     tolerance: float = TOLERANCE,
 ) -> Solver:
-    """The solver by name; unknown i belongs to node `node[i]` at `places[node[i]]` m.
+    """Return the solver by name; unknown i belongs to node `node[i]` at `places[node[i]]` m.
 
     Raises `SceneError` for a J that is not positive definite (the prefactored one sees it), or a
     dense one above 4000 unknowns.

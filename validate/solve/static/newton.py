@@ -82,7 +82,7 @@ class StaticNewton:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a linear law or a body that can move rigidly."""
+        """Raise `SceneError` for a linear law or a body that can move rigidly."""
         scene = system.scene
         require_handled(scene, self)
         if not (scene.cavities or scene.inputs):

@@ -153,7 +153,7 @@ def time_bound(pilot: Measured | None) -> float | None:
 
 
 def require_judged(trial: Trial, unit: ErrorUnit) -> None:
-    """Raises `UsageError` where the scene has nothing in that unit, naming what it has."""
+    """Raise `UsageError` where the scene has nothing in that unit, naming what it has."""
     element, levels = next(iter(trial.meshes.items()))
     scene = trial.build(element, levels[0], "linear")
     has = {"m": ("displacements",), "N": driving(scene), "Pa": cavity_pressures(scene)}

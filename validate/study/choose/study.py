@@ -133,14 +133,14 @@ def misses(row: TradeRow, want: Wanted, by: str, dynamic: bool) -> tuple[float, 
 
 
 def meeting(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> list[TradeRow]:
-    """The rows that meet both and leave nothing of the scene out, fastest first."""
+    """Return the rows that meet both and leave nothing of the scene out, fastest first."""
     whole = [r for r in rows if not r.solver.lacks]
     good = [r for r in whole if max(misses(r, want, by, dynamic)) <= 1]
     return sorted(good, key=lambda r: r.time_s or 0.0)
 
 
 def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> TradeRow:
-    """The row whose worse miss is least; raises `UsageError` when no row has an error."""
+    """Return the row whose worse miss is least; raises `UsageError` when no row has an error."""
     scored = [r for r in rows if error_of(r, by) is not None and not r.solver.lacks]
     if not scored:
         raise UsageError(f"none of {len(rows)} pilot runs has an error; see 'study tradeoff'")
@@ -154,7 +154,8 @@ def choose(
     again: Again,
     effects: ShownEffects | None = None,
 ) -> Choice:
-    """The choice from trades that grow rung by rung; `again` runs a row's cell with another step s.
+    """Return the choice from trades that grow rung by rung; `again` runs a row's cell with another
+    step s.
 
     Where large strain could not be solved, what the declared law costs is not counted either.
     Raises `UsageError` where no rung has a cell, or no cell an error.

@@ -50,7 +50,7 @@ def _named(study: Coverage, word: str) -> str:
 
 
 def document(study: Coverage) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """Return the study's own part of results.json: SI, nothing that is not finite."""
     return {
         "kind": "coverage",
         "passed": study.passed,

@@ -221,7 +221,7 @@ def finished(study: Study, plan: Plan[C, R], where: Where | None) -> Finished[R]
 
 
 def kept(bench: T, job: Job) -> T:
-    """The bench that is open already."""
+    """Return the bench that is open already."""
     return bench
 
 

@@ -22,7 +22,8 @@ Records = Mapping[str, Record[FilterScores]]
 
 
 def with_likelihoods(cells: Sequence[FilterCell], records: Records) -> Records:
-    """The records, with a likelihood for the methods without innovations of every condition."""
+    """Return the records, with a likelihood for the methods without innovations of every
+    condition."""
     scored = dict(records)
     for condition in dict.fromkeys(c.condition for c in cells):
         values = {

@@ -128,7 +128,7 @@ def _factors(settings: Any, name: str) -> tuple[float, float]:
 
 
 def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
-    """Raises what the settings or the registration refuse."""
+    """Raise what the settings or the registration refuse."""
     ready = _changed(bench.ready(change.cell, change.cell.seeds[0])[0], change)
     steps = min(STEPS, len(ready.registered.t))
     ready = replace(ready, method=replace(ready.method, steps=steps))
@@ -207,7 +207,7 @@ def endings_document(endings: FilterEndings) -> list[dict[str, Any] | None]:
 
 
 def with_endings(findings: Findings, endings: FilterEndings) -> Findings:
-    """The page of a stability map with how filters end."""
+    """Return the page of a stability map with how filters end."""
     return replace(
         findings,
         exhibits=(*findings.exhibits, endings_exhibit(endings)),

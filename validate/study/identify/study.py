@@ -99,7 +99,7 @@ class InCells:
         return Job(str(self._path), file_sha256(self._path), hashes, values, self._options.quick)
 
     def finished(self, plan: Plan[C, R]) -> list[R]:
-        """The cells' values in order."""
+        """Return the cells' values in order."""
         found = finish(
             replace(plan, shares=True, after=self._after), self._folder, self._where, self._report
         )
@@ -174,7 +174,7 @@ def identification(
     where: Where | None = None,
     report: Report | None = None,
 ) -> IdentifyStudy:
-    """Runs what is not finished yet in `out`/<name>/study-identify/cells.
+    """Run what is not finished yet in `out`/<name>/study-identify/cells.
 
     Raises children of `ValidateError` for bad input, and where no start converges.
     """

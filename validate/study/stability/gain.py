@@ -119,7 +119,7 @@ def open_bench(job: Job) -> GainBench:
 
 
 def run_cell(bench: GainBench, cell: GainCell) -> GainLimit:
-    """Raises `ComparisonError` where no pressure keeps the volume."""
+    """Raise `ComparisonError` where no pressure keeps the volume."""
     drives = cell.load * bench.largest
     tuned = tuned_gain(bench.responses)
     reach = 10 ** (DECADES / 2)

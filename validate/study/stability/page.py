@@ -41,7 +41,7 @@ def sentence(study: Stability) -> str:
 
 
 def document(study: Stability) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """Return the study's own part of results.json: SI, nothing that is not finite."""
     return {
         "kind": "stability",
         "passed": study.passed,

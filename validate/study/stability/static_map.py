@@ -19,7 +19,7 @@ _NOTHING = (
 
 
 def told_nothing(experiment: Experiment, quick: bool) -> Findings:
-    """A page that says so."""
+    """Return a page that says so."""
     said = _NOTHING.format(name=experiment.name)
     words = Exhibit("stability", "No scheme steps in time", (said,))
     document = {"kind": "stability", "points": 0}

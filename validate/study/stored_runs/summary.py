@@ -74,7 +74,7 @@ def summary(reports: Path) -> Summary:
 
 
 def area_of(point: Foretold) -> float:
-    """The area metric of one prediction, in its unit."""
+    """Return the area metric of one prediction, in its unit."""
     return area_metric(point.error, point.u_simulated, point.u_measured)
 
 

@@ -148,7 +148,7 @@ def open_trial(job: Job) -> Trial:
 
 
 def run_cell(trial: Trial, cell: TradeCell) -> Measured:
-    """Raises what an answer to compare with ends with; a solver's failures are in its strides."""
+    """Raise what an answer to compare with ends with; a solver's failures are in its strides."""
     if cell.part == "solver":
         return _measured(trial, cell, trial.solver(cell.solver))
     scheme, law = _scheme(trial, cell)

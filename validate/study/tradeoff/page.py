@@ -66,7 +66,7 @@ def cells_table(trade: Trade) -> NumberTable:
 
 
 def trade_document(trade: Trade) -> dict[str, Any]:
-    """The trade's part of results.json: SI, nothing that is not finite."""
+    """Return the trade's part of results.json: SI, nothing that is not finite."""
     fronts = {by: trade.front(by) for by in ("error", "total")}
     cells = cells_table(trade)
     return {
