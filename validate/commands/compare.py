@@ -26,7 +26,7 @@ _PARAMETERS = 8  # rows of parameters that differ
 
 @dataclass(frozen=True)
 class Shown:
-    """What of a comparison is shown: patterns of methods and scores, an order, all of it."""
+    """Settings of a comparison's output: patterns of methods and scores, order, full tables."""
 
     methods: tuple[str, ...] = ()
     scores: tuple[str, ...] = ()

@@ -12,7 +12,7 @@ from validate.study.coverage.study import Coverage
 def covering(
     name: str, common: StudyOptions, *, draws: int | None, noise: float, values: tuple[str, ...]
 ) -> int:
-    """Judges drawn recordings of a perfect model; 0 where every check holds."""
+    """Compute verdicts on drawn recordings of a perfect model; 0 where every check holds."""
     with noted():
         done = studies.coverage_of_verdicts(
             common.experiment(name), common.settings, draws=draws, noise=noise,

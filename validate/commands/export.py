@@ -13,7 +13,7 @@ from validate.study.stored_runs.score_comparison import read_table
 
 
 def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:
-    """Write what was asked for; raises `UsageError` where nothing was."""
+    """Write the requested exports; raises `UsageError` where none is requested."""
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted:

@@ -29,7 +29,7 @@ Clock = Callable[[], float]
 
 
 class Watch:
-    """Told by the work what it does, asked from elsewhere how far it is."""
+    """Progress of a work: current step, share done, elapsed and remaining time."""
 
     def __init__(self, title: str, clock: Clock = monotonic) -> None:
         self.title, self._clock = title, clock
@@ -90,7 +90,7 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Yield what the work reports to: done, total, what comes next."""
+    """Yield the callback of the work: done, total, text of the next step."""
     watch, screen = Watch(title), console(error=True)
     if _QUIET.get():
         yield watch.report

@@ -76,7 +76,7 @@ def called(experiment: Experiment) -> str:
 
 
 def headline(result: Result) -> str:
-    """Return the verdict in one sentence: both answers, and over how many checks."""
+    """Return the verdict in one sentence: both answers, and the number of checks."""
     found = result.overall
     doubt = ", with warnings" if result.warnings and found.passed else ""
     required = len(found.met) + len(found.failed) + len(found.undecided)

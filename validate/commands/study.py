@@ -145,7 +145,7 @@ def listed(text: str) -> tuple[str, ...]:
 
 
 def printed(page: Path, common: StudyOptions) -> bool:
-    """Return whether results.json was asked for, which is then printed."""
+    """Print results.json where it is requested, and return whether it is."""
     if common.as_json:
         print((page.parent / MARK).read_text(encoding="utf-8"))
     return common.as_json

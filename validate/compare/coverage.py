@@ -56,7 +56,7 @@ class Share:
 
     @property
     def by_chance(self) -> bool:
-        """Whether the interval reaches into what is allowed."""
+        """Whether the interval overlaps the allowed range."""
         return self.low <= MOST and self.high >= LEAST
 
 
@@ -122,7 +122,7 @@ def term(
 
 @dataclass(frozen=True)
 class Finding:
-    """What the share of a quantity says, and which term is at fault."""
+    """Finding on the share of one quantity, and the term of u_val that causes it."""
 
     word: Word
     fault: Term | None

@@ -20,7 +20,7 @@ TELLS_APART = 2.0
 
 @dataclass(frozen=True)
 class Change:
-    """How far an effect moves one quantity: rms and largest, in `unit`, and its separation."""
+    """Change of one quantity by an effect: rms and largest, in `unit`, and its separation."""
 
     name: str
     rms: float
@@ -31,7 +31,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor that could be added: what it reads, its noise (SI) and its name."""
+    """A sensor that could be added: its quantity, its noise (SI) and its name."""
 
     name: str
     quantity: str
@@ -40,7 +40,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the error budget: what was changed, what moved, who sees it, who would."""
+    """One row of the error budget: cause, changed quantities, sensors that detect it or would."""
 
     name: str
     doc: str

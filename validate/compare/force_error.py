@@ -161,7 +161,7 @@ def relative_rms_error(force: ForcePair) -> float:
 
 
 def phase_error(force: ForcePair) -> float:
-    """How much later (s) the run comes than the reference: the lag of best correlation.
+    """Return the lag (s) of the run behind the reference, at the best correlation.
 
     Refined between the samples; independent of scale and offset. Raises `ComparisonError` where
     the two are not alike or one lag does not stand out; of a periodic force, search within less

@@ -102,7 +102,7 @@ PASSES: tuple[Word, ...] = ("good enough", "not distinguishable", "no evidence")
 
 @dataclass(frozen=True)
 class Overall:
-    """What all checks say together.
+    """Overall verdict over all checks.
 
     Of the requirements: checks that are `failed` (not good enough), `undecided`, and `met`. Of the
     differences: `differs` after Holm's correction, and `alone` by themselves only. `absent`
@@ -150,7 +150,7 @@ class Overall:
 
     @property
     def corrections(self) -> str:
-        """How many checks are taken into account, in a sentence."""
+        """Number of checks in the correction, in a sentence."""
         return (
             "Each requirement must be met, so no correction is needed (intersection-union "
             f"test, Berger 1982). Corrected for {self.total} checks (Holm 1979), "

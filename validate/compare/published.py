@@ -68,7 +68,7 @@ class Published:
 
     @property
     def why(self) -> str:
-        """What stands beside the verdict."""
+        """Text beside the verdict."""
         return "; ".join(part for part in (self.fault, self.other or self.reason) if part)
 
     @property

@@ -92,7 +92,7 @@ def residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
 
 
 def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
-    """Residuals of the undeformed state: what registration and geometry leave before any load."""
+    """Return residuals of the undeformed state: errors of registration and geometry."""
     rest = registered.rest
     if rest is None or not run.finished:
         return ()

@@ -46,7 +46,7 @@ _ROLES = {
 
 @dataclass(frozen=True)
 class StreamUse:
-    """A stream of a recording: whether the experiment uses it, and what for or why not."""
+    """Use of a recording's stream by the experiment: its purpose, or the reason for none."""
 
     recording: str
     topic: str

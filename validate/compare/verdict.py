@@ -175,7 +175,7 @@ def nothing_compared(accept: Accept, name: str, unit: str, why: str) -> Check:
 
 
 def as_fitted(check: Check, by: str) -> Check:
-    """Return a check on data that calibrated the model counts for nothing, whatever its error."""
+    """Return the check as fitted: its data calibrated the model, so that it is no evidence."""
     if not check.count:
         return check
     acceptance = check.acceptance if check.limit is None else "fitted"
@@ -184,7 +184,7 @@ def as_fitted(check: Check, by: str) -> Check:
 
 
 def as_same_model(check: Check, why: str) -> Check:
-    """Return a model judged by its own recording cannot be confirmed; an error that it shows
+    """Return the check as of the same model: its own recording cannot confirm it; its error
     stays."""
     known = check.verdict in ("good enough", "not distinguishable")
     if not known:
@@ -198,7 +198,7 @@ def as_same_model(check: Check, why: str) -> Check:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one standard uncertainty of an input does to a residual."""
+    """Change of a residual by one standard uncertainty of an input."""
 
     name: str
     change: Residual

@@ -100,5 +100,5 @@ def texts(one: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def view_faults(part: Any) -> str:
-    """What keeps an object from being a view; "" for nothing."""
+    """Return the reason why an object is no view; "" for none."""
     return "" if isinstance(part, View) else f"{part!r:.60}: expected a validate.report.View"

@@ -71,7 +71,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Inspection:
-    """A whole file: counts, topics in order of their channels, defects in one line each."""
+    """Inspection of a file: counts, topics in order of their channels, defects in one line each."""
 
     source: Source
     profile: str

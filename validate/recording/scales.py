@@ -40,7 +40,7 @@ def odd_scales(recording: Recording) -> tuple[str, ...]:
 
 
 def odd_stream(stream: object) -> str:
-    """What is odd about the scale of one stream; "" for nothing, and for other streams."""
+    """Return the fault of one stream's scale; "" for none, and for other streams."""
     if isinstance(stream, Frames):
         height, width = stream.images[0].shape
         return odd_pixel(stream.m_per_px, (height, width))

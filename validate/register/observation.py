@@ -31,7 +31,7 @@ class Traced(Protocol):
 
 
 class Simulated(Protocol):
-    """What an observation reads of a run: fields u (no, n, d) m at the steps `at`, traces."""
+    """Data of a run for observations: fields u (no, n, d) m at the steps `at`, traces."""
 
     @property
     def method(self) -> str: ...
@@ -151,7 +151,7 @@ class Observation(Protocol):
 
 @dataclass(frozen=True)
 class History:
-    """What was measured over time, and what an exact sensor would have read of a run.
+    """Measured history, and the reading of an exact sensor in a run.
 
     `measured` and `simulated` (nt, k, d) in `unit` at t (nt,) s are of the named quantities since
     rest; NaN = not seen. `sd` is the measurement's standard deviation per component. `each`: every
@@ -176,7 +176,7 @@ class History:
 
 @runtime_checkable
 class Drawable(Observation, Protocol):
-    """An observation that can be made anew, as a perfect model would have it."""
+    """An observation that can be drawn again, as a perfect model would produce it."""
 
     def left(self, run: Simulated) -> Floats:
         """What an exact sensor would have read of a run, less what was measured: flat (m,)."""

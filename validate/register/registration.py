@@ -16,7 +16,7 @@ O = TypeVar("O")
 
 @dataclass(frozen=True)
 class Registered:
-    """All observations of a recording in the scene's frame, and what of them is compared.
+    """All observations of a recording in the scene's frame, and the compared ones.
 
     `rest` is the unloaded instant, where registration and geometry can be looked at alone.
     `outside` counts samples left out because they lie beyond the law's validity. `time_scale` are

@@ -35,11 +35,11 @@ class Sensing:
 
     @property
     def offset(self) -> float:
-        """What it reads of nothing, in its own unit."""
+        """Reading at zero, in its own unit."""
         return 0.0
 
     def of(self, seen: SignalObservation) -> SignalObservation:
-        """What was there at the times of the samples: (y(t + delay) - offset) / gain.
+        """Return the true values at the times of the samples: (y(t + delay) - offset) / gain.
 
         Linear between samples, and held before the first and after the last, so that as many are
         compared whatever the delay.

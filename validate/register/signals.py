@@ -166,7 +166,7 @@ def holds_at(
 
 
 def instant(hold: Selection) -> float:
-    """Return the time s of a hold."""
+    """Return the time s of a load step."""
     assert hold.t is not None
     return float(hold.t[0])
 

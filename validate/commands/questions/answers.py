@@ -134,7 +134,7 @@ def _beside(question: Question, answer: str, folder: Path | None) -> str:
 
 
 def on_a_terminal() -> bool:
-    """Return whether somebody is there to be asked."""
+    """Return whether standard input is a terminal."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 

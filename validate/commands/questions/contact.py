@@ -32,7 +32,7 @@ _ENDS = 3.0  # a parabola is as much less certain at its end than in the mean
 
 
 def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
-    """Return the questions about what presses on the place that a displacement moves."""
+    """Return the questions about the indenter at the place that a displacement moves."""
     asked = [Question("indenter.shape", "rigid body that presses on the place; none: the place is "
                       "glued or gripped", "none", "the place itself is moved",
                       choices=_SHAPES)]  # fmt: skip

@@ -98,7 +98,7 @@ def _path(path: str) -> Callable[[str], Any]:
 
 
 def used(recording: Recording, found: Answers) -> set[str]:
-    """Return the outlines that are judged, and the images that they were found in."""
+    """Return the compared outlines, and the images that they were extracted from."""
     if not whole(found):
         return set()
     topic = found["outline.topic"]

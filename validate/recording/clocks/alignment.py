@@ -31,7 +31,7 @@ MIN_COVERAGE = 0.5  # share of the stream's samples that must meet the reference
 
 @dataclass(frozen=True)
 class Offset:
-    """What to add to a stream's times: `seconds` s, `sd` s (one standard uncertainty).
+    """Offset to add to a stream's times: `seconds` s, `sd` s (one standard uncertainty).
 
     `count` samples of the stream meet the reference then, a share `coverage` of them all.
     """

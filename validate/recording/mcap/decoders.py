@@ -23,7 +23,7 @@ _TIMES = ("google.protobuf.Timestamp", "google.protobuf.Duration")
 
 
 def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
-    """What reads the messages of a channel, or why nothing does."""
+    """Return the decoder of a channel's messages, or the reason for none."""
     encodings = (schema.encoding if schema else "", channel.encoding)
     try:
         if encodings == ("ros2msg", "cdr") and schema is not None:

@@ -120,7 +120,7 @@ _IN_DATA = {Op.HEADER, Op.MESSAGE, Op.CHUNK, Op.ATTACHMENT, Op.METADATA}
 
 
 class MessageTaker(Protocol):
-    """Who looks at messages while the file is checked."""
+    """Receiver of messages while the file is checked."""
 
     def wants(self, channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
         """Asked at a channel's first message, with the names of the metadata before it."""
@@ -136,7 +136,7 @@ class _ShortError(RecordingError):
 def verify(
     stream: BinaryIO, path: Path, taker: MessageTaker | None = None, *, cut: bool = False
 ) -> Verified:
-    """Check the whole open file; `RecordingError` names the byte and counts what precedes it.
+    """Check the complete open file; `RecordingError` names the byte and counts what precedes it.
 
     `cut` takes a file that only stops short as far as it is whole, and says so in `Verified.cut`.
     """

@@ -60,7 +60,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """How many float64 would take the memory that the sample takes."""
+        """Memory of the sample in numbers of float64."""
         return self.values.size + (0 if self.image is None else -(-self.image.size // 8))
 
 

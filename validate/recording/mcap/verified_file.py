@@ -47,7 +47,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class Verified:
-    """What the check found in a file; times are int64 ns, in file order, by channel id."""
+    """Result of the check of a file; times are int64 ns, in file order, by channel id."""
 
     source: Source
     header: Header

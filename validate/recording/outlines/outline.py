@@ -52,7 +52,7 @@ class Quality:
 
 
 def quality(grey: Grey, wall: Wall) -> Quality:
-    """How well a path parts dark from bright.
+    """Return the contrast of a path between dark and bright.
 
     gcnr is 1 - overlap of the two grey level distributions (generalised contrast-to-noise ratio,
     Rodriguez-Molares et al. 2020): 0 for alike, 1 for apart, whatever the grey scale. `closed` is

@@ -78,7 +78,7 @@ def number(cell: str, decimal: str) -> float | None:
 
 
 def decimals(cell: str) -> int:
-    """How many digits follow the last decimal or thousands sign; 0 for whole numbers."""
+    """Return the number of digits after the last decimal or thousands sign; 0 for integers."""
     found = re.search(r"[.,]([0-9]*)[^.,]*$", cell)
     return len(found[1]) if found else 0
 

@@ -63,7 +63,7 @@ def relabellings(source: Floats, target: Floats, fit: Fit, noise: float) -> tupl
 def label_fault(
     names: Sequence[str], source: Floats, target: Floats, fit: Fit, noise: float
 ) -> str | None:
-    """What is wrong with the labels, in one line, or None.
+    """Return the fault of the labels in one line, or None.
 
     A labelling explains an excess when it lowers the rms residual of the markers it moves
     `CLEARLY` times, down to the declared noise or below `NEAR` of the marker spacing (unrelated

@@ -105,7 +105,7 @@ class ReplayView:
 
 
 def over_time(view: ReplayView) -> bool:
-    """Return the run's fields are output frames at their own times, not those at loads."""
+    """Return whether fields are output frames at their own times, not at load steps."""
     return view.run is not None and not holds(view.registered)
 
 
