@@ -195,7 +195,7 @@ def care_of(
 
 
 def gate_numbers(care: Care | None, seen: Innovation) -> Mapping[str, float]:
-    """What the gate of a step has to tell; nothing without one."""
+    """Return the numbers of a step's gate; nothing without one."""
     return {} if care is None else care.numbers(seen.gated)
 
 

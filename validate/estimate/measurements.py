@@ -107,7 +107,7 @@ class Timetable:
     missing: int = 0
 
     def at(self, step: int) -> Floats | None:
-        """What was measured at a step, NaN = missing; None where nothing was: predict only."""
+        """Return the measurement of a step, NaN = missing; None without one: predict only."""
         return self.z.get(step)
 
     def unheard(self, steps: int, numbers: Sequence[Mapping[str, float]]) -> str:
@@ -237,7 +237,8 @@ def _of_markers(seen: MarkerObservation, registered: Registered, mesh: Mesh) -> 
 
 
 def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, Floats, Floats]:
-    """Looks z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and `steps` (n,).
+    """Return measurements z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and
+    `steps` (n,).
 
     Only of times that jitter: those that a smaller step meets are left as they are, for the filter
     says which. What that adds to sd: `interpolated`. Steps beyond the looks get none.

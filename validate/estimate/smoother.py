@@ -39,7 +39,7 @@ def smooth_setting() -> Any:
 
 
 class Transition(Protocol):
-    """How errors (n,) of a state go on; Q and P0 (n, n) as of the filter, H (m, n)."""
+    """Transition of errors (n,) of a state; Q and P0 (n, n) as of the filter, H (m, n)."""
 
     @property
     def Q(self) -> Floats: ...

@@ -30,7 +30,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What inputs do to the free unknowns: columns of loads (m, l) and of drives (m, k).
+    """Effect of inputs on the free unknowns: columns of loads (m, l) and of drives (m, k).
 
     Prescribed unknowns are coupled by K, C and M. Their `rates`: "rule" by the rule's formulas
     (which average acceleration makes ring, growing, on a ramp), "difference" by backward

@@ -45,7 +45,7 @@ class Handles:
 
 
 def handles_faults(part: Any) -> str:
-    """What keeps a class from declaring what it handles; "" for nothing."""
+    """Return the fault of a class's declared capabilities; "" for none."""
     handles = getattr(part, "handles", None)
     return "" if isinstance(handles, Handles) else f"{part.__name__}.handles: expected Handles(...)"
 

@@ -17,7 +17,7 @@ Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: at which step and why."""
+    """Outcome of a run: its state, last step and reason."""
 
     state: Ending
     step: int

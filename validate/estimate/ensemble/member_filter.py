@@ -52,7 +52,7 @@ HANDLES = Handles(("linear", *LARGE), inertia=True, cavities=False, drives=False
 
 @dataclass(frozen=True)
 class MemberModel:
-    """What members are: the parameters they differ in (`doubtful`), and how they step.
+    """Model of the members: their uncertain parameters (`doubtful`) and their step.
 
     A linear scene steps implicitly by Newmark's rule, in few shapes or in all nodes; one at large
     strain explicitly, in all nodes, with a step that the stiffest member must bear.

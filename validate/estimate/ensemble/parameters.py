@@ -87,7 +87,8 @@ class Doubts:
 
 @dataclass(frozen=True)
 class StiffnessPart:
-    """What a few coordinates scale together: cells of one body, or a foundation's springs.
+    """Part of the stiffness that a few coordinates scale: cells of one body, or a foundation's
+    springs.
 
     `mask` (p,) are the coordinates whose sum is the logarithm of its factor; `scene` has the part
     alone (springs: none, but `foundation`).

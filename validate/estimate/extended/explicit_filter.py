@@ -19,7 +19,7 @@ from validate.solve.types import Ending, State
 
 
 class Memory(Protocol):
-    """What a core carries: displacements (N,) m, and what else it needs."""
+    """State of a core: displacements (N,) m, and its further data."""
 
     @property
     def u(self) -> Floats: ...

@@ -29,7 +29,7 @@ class Claim:
 
 
 class Recursion(Protocol):
-    """What gains come from; H (m, n) reads measured components from the coordinates."""
+    """Recursion that gains follow from; H (m, n) reads measured components from the coordinates."""
 
     @property
     def H(self) -> Floats: ...
@@ -40,11 +40,11 @@ class Recursion(Protocol):
         ...
 
     def start(self) -> Claim:
-        """What is claimed before the first step."""
+        """Return the covariance before the first step."""
         ...
 
     def predict(self, claim: Claim, steps: int = 1) -> Claim:
-        """What is claimed so many steps >= 1 later, nothing measured."""
+        """Return the covariance so many steps >= 1 later, without a measurement."""
         ...
 
     def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:

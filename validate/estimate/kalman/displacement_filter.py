@@ -47,7 +47,7 @@ Structure = Literal["white", "load"]
 
 @dataclass(frozen=True)
 class Sensed:
-    """What is measured and where it lands; rows H (m, n) of the coordinates, `driven` (m, k) of
+    """Measurements and their time steps; rows H (m, n) of the coordinates, `driven` (m, k) of
     drives."""
 
     offered: Measurements

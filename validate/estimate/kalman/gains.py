@@ -106,7 +106,7 @@ def gain_sequence(
 
 
 class Claims:
-    """What is claimed at the end of any step, recomputed in one walk while steps rise.
+    """Covariance at the end of any step, recomputed in one pass while steps rise.
 
     A whole covariance per step would not fit in memory; only the walk's place is kept.
     """

@@ -150,7 +150,7 @@ def modal_covariance(
 def noise_shape(
     settings: DisplacementNoise, system: System, coordinates: Coordinates, H: Floats
 ) -> Floats:
-    """What one m^2 of Q or P0 means in the coordinates (n, n)."""
+    """Return the covariance (n, n) in the coordinates for one m^2 of Q or P0."""
     if settings.structure == "white":
         return coordinates.white if isinstance(coordinates, InModes) else np.eye(len(system.free))
     roots = coordinates.amplitudes(load_shapes(system, H))

@@ -23,7 +23,7 @@ from validate.solve.dynamic.modal import exact_walk, left_out
 
 @dataclass(frozen=True)
 class LoadDoubt:
-    """How unsure the loads are: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
+    """Uncertainty of the loads: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
 
     `jitter` N (sd) is force noise of each step on its own.
     """

@@ -81,7 +81,7 @@ def pressing(scene: Scene) -> Indenter | None:
 
 
 def drive_kind(recording: Recording, p: Tree) -> Kind:
-    """What the load is; raises `UsageError` where no signal of its name has its unit."""
+    """Return the kind of the load; raises `UsageError` where no signal of its name has its unit."""
     part, motion = mover(p.scene), p.settings.motion
     kind: Kind = _KINDS[type(part)]
     released = motion.held_force is not None or motion.held_displacement is not None

@@ -53,7 +53,7 @@ _NEWTON = 1e-4  # relative: equilibrium is found to less than this
 
 
 def model_name(model: Changes) -> str:
-    """What parameters call a model: its law and element, where it has its own."""
+    """Return the name of a model in parameters: its law and element, where it has its own."""
     return ", ".join(str(value) for value in (model or {}).values())
 
 

@@ -162,7 +162,8 @@ def here(number: int, problem: Problem) -> Identification:
 
 
 def open_free(experiment: Experiment, parameters: Any) -> tuple[tuple[Free, ...], ...]:
-    """What of every calibration stands open; raises `UsageError` for a path that is none."""
+    """Return the open parameters of every calibration; raises `UsageError` for a path that is
+    none."""
     values = {p.path: p.default for p in describe(parameters)}
     for free in (f for c in experiment.calibrations for f in c.free):
         with_values(parameters, {free.path: repr(free.low)})

@@ -40,7 +40,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is `free` of a calibration, on its recordings, by its method."""
+    """Least-squares problem of a calibration: its `free` parameters, recordings and method."""
 
     experiment: Experiment
     calibration: Calibration

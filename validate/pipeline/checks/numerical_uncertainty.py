@@ -31,7 +31,7 @@ def variants(uncertainty: Uncertainty, name: str) -> dict[str, list[Variant]]:
 
 
 class Refined:
-    """How a method's residuals converge, by part of u_num; of the meshes and steps that ran."""
+    """Convergence of a method's residuals, by part of u_num; of the meshes and steps that ran."""
 
     def __init__(self, road: Road, uncertainty: Uncertainty, name: str) -> None:
         self._uncertainty = uncertainty

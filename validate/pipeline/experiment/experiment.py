@@ -140,7 +140,7 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How u_num and u_input are found: meshes and steps, the inputs, and a cheap method for them.
+    """Settings for u_num and u_input: meshes and steps, the inputs, and a cheap surrogate method.
 
     None for `mesh` or `steps`: the truth is the model's own there, or there is none. `stand_in`
     names, for a method too slow on every mesh, a faster one of the same element that takes its
@@ -216,7 +216,7 @@ def free(
 
 @dataclass(frozen=True)
 class Identified:
-    """What was identified from the recordings: parameters to use, scores, and sentences to show.
+    """Result of an identification: parameters to use, scores, and sentences of the report.
 
     `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
     whose data served: checks on them are fitted, and no evidence. `doubts` of what was given are
@@ -284,7 +284,7 @@ def _as_read(recording: Recording, parameters: Any) -> Recording:
 
 @dataclass(frozen=True)
 class Twin:
-    """How a synthetic recording is made, and what its truth was.
+    """Twin: function of the synthetic recording, and its truth.
 
     `truth` repeats the twin: it scores the runs, and no method sees it. `remake` are prefixes of
     parameters that the twin reads: changing one makes the recording anew. `read` is what `load`

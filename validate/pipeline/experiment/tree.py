@@ -50,7 +50,7 @@ class Meshes:
 
 @dataclass(frozen=True)
 class TrackedTwin:
-    """What made a tracked recording; the models do not know it."""
+    """Settings of the twin behind a tracked recording; the models do not use them."""
 
     seed: int = quantity(1, "1", "seed of the noise")
     noise: float = quantity(1e-9, "m2", "variance of the white noise per component (.001 mm2)")

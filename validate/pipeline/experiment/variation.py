@@ -96,7 +96,7 @@ def change_of(given: Mapping[str, Any] | Change) -> Change:
 
 @dataclass(frozen=True)
 class Shift:
-    """How an uncertain input moves: `paths` by z standard uncertainties, as `rule` says."""
+    """Change of an uncertain input: `paths` by z standard uncertainties, as `rule` says."""
 
     paths: tuple[str, ...]
     rule: str

@@ -52,13 +52,13 @@ def position_of(data: bytes, d: int) -> Position | str:
 
 
 def position_bytes(position: Position) -> bytes:
-    """What a device sends."""
+    """Return the packet of a device."""
     d = len(position.x)
     return struct.pack(f"<4sIq{d}d", PLACE, position.sequence, position.ns, *position.x.tolist())
 
 
 def force_bytes(sequence: int, force: Floats, flags: int) -> bytes:
-    """What the loop answers with force (d,) N."""
+    """Return the packet of the loop with force (d,) N."""
     return struct.pack(f"<4sI{len(force)}dI", FORCE, sequence, *force.tolist(), flags)
 
 

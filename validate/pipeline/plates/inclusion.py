@@ -102,7 +102,7 @@ class InclusionRegistration(MarkerFit):
 
 @dataclass(frozen=True)
 class InclusionTest:
-    """What no scene holds of such a test."""
+    """Settings of an inclusion test besides its scene."""
 
     streams: Streams = Streams()
     registration: InclusionRegistration = InclusionRegistration()

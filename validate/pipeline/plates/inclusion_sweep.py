@@ -54,7 +54,7 @@ def swept(stack: Stack, free: float = 0.0, wider: float = 0.0, longer: float = 0
 
 
 def off_circles(stack: Stack) -> str:
-    """How far the outlines lie from their circles, in a sentence."""
+    """Return the distance of the outlines from their circles, in a sentence."""
     worst = int(stack.off_round.argmax())
     every = float(np.sqrt((stack.off_round**2).mean()))
     return (

@@ -81,7 +81,7 @@ LOWER, UPPER = PLATES
 
 
 def between(ends: Ends, tree: Tree) -> Mapping[str, Any]:
-    """What a method changes for plates that slip or hold the body."""
+    """Return a method's changes for plates that slip or stick."""
     if ends == "bonded":
         return BONDED_PLATES
     whole = not getattr(tree.scene.body, "held", ())
@@ -120,7 +120,7 @@ def pressed_size(tree: Tree, folder: Path) -> CylinderSize:
 
 
 def model_name(law: str, ends: str, order: int) -> str:
-    """What parameters call a model."""
+    """Return the name of a model in parameters."""
     return f"{law}, {ends}, order {order}"
 
 

@@ -67,7 +67,7 @@ def _top(module: str) -> str:
 
 
 def rests_on(experiment: Experiment, options: Options, command: Sequence[str] = ()) -> Made:
-    """What makes a run, taken before it: files may be edited while it computes."""
+    """Return the inputs of a run, read before it: files may be edited while it computes."""
     path = experiment.path
     parameters, methods = configure(experiment, options)
     read = mesh_files(parameters, path.parent if path else Path())

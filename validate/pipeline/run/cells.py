@@ -60,7 +60,7 @@ class RunCell:
 
 @dataclass(frozen=True)
 class ToldCell:
-    """What an experiment adds to its runs."""
+    """Cell of the report items and rows that an experiment adds to its runs."""
 
     key: str
     label: str = "what the experiment adds"
@@ -69,7 +69,7 @@ class ToldCell:
 
 @dataclass(frozen=True)
 class CellFound:
-    """What a cell gives."""
+    """Result of a cell."""
 
     solved: RunFound | None = None
     truth: Truth | None = None

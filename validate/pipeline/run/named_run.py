@@ -39,7 +39,7 @@ def run_name(experiment: Experiment, options: Options) -> str:
 
 
 def differences(experiment: Experiment, options: Options) -> tuple[list[str], list[Any]]:
-    """What the user changed: its words, and its content with every value.
+    """Return the user's changes: in words, and as content with every value.
 
     Raises `UsageError` for unknown methods, paths and values.
     """

@@ -121,7 +121,7 @@ class RunFound:
 
 
 class Solves(Protocol):
-    """Who solves what a road wants."""
+    """Solver of the runs that a `Road` requests."""
 
     def ahead(self, road: "Road", wanted: Sequence[RunWanted]) -> None:
         """Told of all that will be asked for, in order; may solve it side by side."""
@@ -130,7 +130,7 @@ class Solves(Protocol):
     def solved(self, road: "Road", wanted: RunWanted) -> RunFound: ...
 
     def truth(self, road: "Road", wanted: RunWanted) -> Truth:
-        """What the twin really did, on the case and in the scene of that run."""
+        """Return the true motion of the twin, on the case and in the scene of that run."""
         ...
 
     def told(self, road: "Road", cases: Cases, make: Callable[[], Told]) -> Told:
@@ -393,7 +393,7 @@ class Road:
 def solves_here(
     experiment: Experiment, recordings: tuple[Recording, ...], parameters: Any
 ) -> SolvesVariants:
-    """What solves variants of these parameters, one after the other in this process."""
+    """Return the solver of variants of these parameters, one after the other in this process."""
     road = Road(experiment, experiment.methods, parameters, None, quick=False)
     road.start(recordings, remake=False)
     return road.residuals

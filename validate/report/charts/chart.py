@@ -76,7 +76,7 @@ def _floor(chart: Chart) -> str:
 
 
 def drawing(result: HasMethods, chart: Chart) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     labels = panel_labels(chart)
     if labels:
         return _one_each(result, chart, labels)

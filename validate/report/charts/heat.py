@@ -35,7 +35,7 @@ def picture(heat: Heat) -> Picture:
 
 
 def drawing(heat: Heat) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     rows, columns = heat.values.shape
     width = min(max(columns * _CELL[0], 3.0), _LARGEST[0])
     height = min(max(rows * _CELL[1], 1.6), _LARGEST[1])

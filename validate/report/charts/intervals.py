@@ -35,7 +35,7 @@ def picture(shown: Intervals) -> Picture:
 
 
 def drawing(shown: Intervals) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     high = _ROOM + _LINE * max(1, len(_order(shown)))
     return lambda f: _fill(f, shown), WIDTH, high
 

@@ -62,7 +62,7 @@ class Style:
 
 
 class NamedMethod(Protocol):
-    """What figures ask of a method."""
+    """Attributes of a method that figures use."""
 
     @property
     def name(self) -> str: ...
@@ -168,7 +168,7 @@ def legend_below(figure: Figure, ax: Axes, width: float = WIDTH) -> Legend:
 
 
 def legend_columns(labels: Sequence[str], width: float = WIDTH) -> int:
-    """How many columns of a legend of these labels fit below a figure."""
+    """Return the number of legend columns that fit below a figure."""
     widest = max(len(line) for label in labels for line in label.splitlines())
     return max(1, min(len(labels), int(width / (_HANDLE + _LETTER * widest))))
 

@@ -89,5 +89,5 @@ def one_in(count: int, most: int) -> int:
 
 
 def thinned(every: int, count: int, what: str) -> str:
-    """What a step left out, in words; empty when nothing."""
+    """Return the share of kept samples in words, "one in 3"; empty for all of them."""
     return f"one in {every} of {count} {what}" if every > 1 else ""

@@ -429,7 +429,7 @@ class NeedleStepper:
         return np.asarray(-forces @ touch.axes)
 
     def energy(self, tick: Tick) -> float:
-        """What the body has stored, J (per metre in 2-D)."""
+        """Stored energy of the body, J (per metre in 2-D)."""
         if tick.touch is None:
             swelling = 3 * float(self._apart[0, 0, 1]) * tick.P if self.scene.cavities else 0.0
             return tick.P * swelling / 2

@@ -40,7 +40,8 @@ class UnsettledError(SceneError):
 
 
 class Response(Protocol):
-    """What the cells add to the linear body at an instant: forces (w,) N and tangent (w, w)."""
+    """Contribution of the cells to the linear body at an instant: forces (w,) N and tangent (w,
+    w)."""
 
     def force(self, u: Floats) -> Floats: ...
 

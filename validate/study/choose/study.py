@@ -60,7 +60,7 @@ class Climbed:
 
 @dataclass(frozen=True)
 class Choice:
-    """What was found; `pick` is None where nothing meets both, `nearest` is what comes nearest.
+    """Result; `pick` is None where no method meets both, `nearest` is the nearest one.
 
     `by`: "total" counts what the declared law costs, "error" does not. `confirmed` is the pick with
     a state at every tick of the rate, where its own step is longer.
@@ -287,7 +287,7 @@ def _bounded(climbed: Climbed, excluded: Sequence[Excluded]) -> Climbed:
 
 
 def evidence(trade: Trade, row: TradeRow, by: str) -> str:
-    """What a rung's best row reached, and what its error is made of."""
+    """Return the best result of a candidate method, and the parts of its error."""
     error, time = error_of(row, by) or 0.0, row.time_s or np.nan
     words = f"{row.label}: {trade.shown(error)} at {1 / time:.3g} Hz"
     if row.solver_error is not None and row.mesh_error is not None:

@@ -81,7 +81,7 @@ class Given:
         return DrawBench(self, bench.road, bench.followed(self.method))
 
     def truth(self, draw: int) -> ExactReading:
-        """What exact sensors would read with that draw's inputs."""
+        """Return the readings of exact sensors with that draw's inputs."""
         return self.full[draw] if draw in self.full else self.linear(draw)
 
     def linear(self, draw: int) -> ExactReading:

@@ -27,7 +27,7 @@ def told(study: Coverage) -> Findings:
 
 
 def sentence(study: Coverage) -> str:
-    """How often a perfect model differs, in one sentence."""
+    """Return the share of rejected perfect models, in one sentence."""
     words = Counter(q.finding.word for q in study.quantities)
     found = ", ".join(f"{n} {word}" for word, n in words.items())
     joint = ", ".join(f"{100 * t.share.value:.1f} % ({t.method})" for t in study.together)

@@ -51,7 +51,7 @@ class World:
 
 @dataclass(frozen=True)
 class ReadingCell:
-    """What exact sensors would read of `method` in a world."""
+    """Cell of the readings of exact sensors of `method` in a world."""
 
     method: str
     world: World
@@ -65,7 +65,7 @@ class ReadingCell:
 
 @dataclass(frozen=True)
 class TermsCell:
-    """What every check of a method is judged with."""
+    """Cell of the terms of every check of a method."""
 
     method: str
     key: str = ""

@@ -358,7 +358,7 @@ def _ranking_words(study: FilterStudy) -> Iterator[str]:
 
 
 def over(study: FilterStudy) -> str:
-    """What a score is taken over."""
+    """Return the samples that a score is taken over, in words."""
     seeds, blocks = len(study.plan.seeds), study.rankings[0].blocks
     if seeds > 1:
         return seeds_text(seeds)

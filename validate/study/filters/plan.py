@@ -44,7 +44,7 @@ class FilterCell:
 
     @property
     def name(self) -> str:
-        """What a ranking calls it."""
+        """Name in a ranking."""
         if self.baseline == "persistence":
             return "last measurement, held"
         return f"{self.method}, given nothing" if self.baseline else self.method

@@ -49,7 +49,7 @@ class FilterChange:
 
 @dataclass(frozen=True)
 class FilterEnding:
-    """How a run ended, after so many of its steps, and why."""
+    """Outcome of a run, with its number of steps and the reason."""
 
     state: str
     step: int
@@ -186,7 +186,7 @@ def endings_exhibit(endings: FilterEndings) -> Exhibit:
 
 
 def sentence(endings: FilterEndings) -> str:
-    """How many runs ended how, in one sentence."""
+    """Return the number of runs by outcome, in one sentence."""
     states = [e.state for _, e in endings.rows]
     counted = ", ".join(f"{states.count(s)} {s}" for s in dict.fromkeys(sorted(states)))
     bugs = f"; {len(endings.bugs)} ended in an error: {endings.bugs[0]}" if endings.bugs else ""

@@ -25,7 +25,7 @@ def told(study: Stability) -> Findings:
 
 
 def sentence(study: Stability) -> str:
-    """What was computed and whether the predictions hold, in one sentence."""
+    """Return the computed cells and the validity of the predictions, in one sentence."""
     regimes = Counter(p.regime for p in study.all_points)
     found = ", ".join(f"{n} {name}" for name, n in sorted(regimes.items()))
     failed = [p.name for p in study.predictions if not p.holds]

@@ -29,7 +29,7 @@ class Covered:
 
 @dataclass(frozen=True)
 class OfKind:
-    """What predictions of one kind of quantity say together.
+    """Bias and scatter of predictions of one kind of quantity.
 
     `stated` is None where a prediction has the wrong sign: then there is no ratio; `why` says so,
     and why an interval is missing.

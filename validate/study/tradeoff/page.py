@@ -34,7 +34,7 @@ def told_choice(choice: Choice) -> Findings:
 
 
 def sentence(trade: Trade) -> str:
-    """What ran and what lies on the front, in one sentence."""
+    """Return the number of cells and the ends of the Pareto front, in one sentence."""
     scored = sum(r.error is not None for r in trade.rows)
     on = trade.front()
     ends = ""
