@@ -1,4 +1,4 @@
-"""Validation and experiment replay for real-time soft-tissue simulation.
+"""Validation of real-time soft-tissue simulation against recordings of experiments.
 
     import validate
 

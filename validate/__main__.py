@@ -1,4 +1,4 @@
-"""`python -P -m validate`: the command, without the current folder on Python's path.
+"""Entry point of `python -P -m validate`, without the current folder on Python's path.
 
 `python -m validate` puts the current folder first on the path, so that a `json.py` that lies beside
 a recording would be run. It is refused where a file of the current folder would be imported.

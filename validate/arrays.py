@@ -1,4 +1,4 @@
-"""The door through which arrays enter, checked once for shape and finiteness; and their rms."""
+"""Array checks (shape, finite values) and root mean square."""
 
 import copyreg
 from collections.abc import Sequence

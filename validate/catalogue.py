@@ -1,4 +1,4 @@
-"""Which experiments there are: their files, and what those call themselves, without running any.
+"""Catalogue of experiments: names and titles, read without running their files.
 
 An experiment file is code and loads every library that it needs; a list of all of them is to
 appear at once and must not fail with one that is being edited.

@@ -1,4 +1,4 @@
-"""Checksums in stored JSON documents: an edited number is refused.
+"""Checksums of stored JSON documents; an edited number is refused.
 
 A seal is the SHA-256 of the document's canonical text (keys sorted, no blanks) without the seal.
 """

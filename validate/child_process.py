@@ -1,4 +1,4 @@
-"""Child processes in isolated mode: nothing that lies in the current folder is imported by them.
+"""Child processes in Python's isolated mode, without imports from the current folder.
 
 Python puts the current folder, or that of a script, first on its path, so that a `json.py` beside
 a recording would be run. Every interpreter that this package starts gets a clean environment

@@ -1,4 +1,4 @@
-"""Objects on one screen and as a short page, for the prompt and for notebooks."""
+"""Display of objects in one screen and as a short page, for the prompt and notebooks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields

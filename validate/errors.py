@@ -1,4 +1,4 @@
-"""Errors a user can cause. One base class; everything else that escapes is a bug.
+"""Errors that a user can cause, with one base class; any other exception is a bug.
 
 The command line prints a `ValidateError` as one line and exits with 2. Messages hold the numbers
 that were found and a next step.

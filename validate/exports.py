@@ -1,4 +1,4 @@
-"""Public names of a package, loaded when they are first asked for (PEP 562).
+"""Public names of a package, loaded at first access (PEP 562).
 
 A package that imported all of its modules would load compiled kernels, image libraries and the
 scheduler for whoever wants one type of it: the list of experiments is to appear at once.

@@ -1,4 +1,4 @@
-"""Reading of files that somebody else made: regular files only, within a limit, inside a folder.
+"""Safe reading of untrusted files: regular files only, within a size limit, inside a folder.
 
 A pipe would wait for ever, a device never end, and a name inside a file may lead anywhere on the
 machine. Whatever reads a file that a user names, or that such a file names, opens it here.

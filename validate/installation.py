@@ -1,4 +1,4 @@
-"""How this package was installed, and the command that adds what is missing."""
+"""Installation of the package, and the command that installs missing dependencies."""
 
 import json
 import shlex

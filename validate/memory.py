@@ -1,4 +1,4 @@
-"""Memory: what is free, and a refusal before more is taken than there is.
+"""Free memory, and a refusal before more is allocated than there is.
 
 A process that takes too much is killed without a word, minutes later; with an estimate it ends in
 one line at once.

@@ -1,4 +1,4 @@
-"""Parameters of an experiment: nested frozen dataclasses whose fields carry a unit and a sentence.
+"""Parameters of an experiment: nested frozen dataclasses whose fields have unit and description.
 
 One grammar of paths reaches them all: `material.E`, `methods.p2_fluid.tolerance`; of several parts
 of one kind each goes by its name, `contacts.plate.friction`, or by its number. Values given as text

@@ -1,4 +1,4 @@
-"""Where results go: tried before any work, and what to say when writing fails all the same.
+"""Output folders: tested before any work, and messages when writing fails.
 
 A place is tried by doing there what will be done: folders made, a file written and removed. Rights
 alone say nothing for the superuser, for a mounted or a full disk.

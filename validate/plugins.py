@@ -1,4 +1,4 @@
-"""Plug-ins: parts that other packages add by entry points, and the registry of each kind of part.
+"""Plug-ins: entry points of other packages, and the registry of each kind of part.
 
 A package declares `[project.entry-points."validate.readers"] gauge = "my_package:GAUGE"`. The
 package's own parts, those of plug-ins and those that a script adds are in one `Registry` a kind.

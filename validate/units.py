@@ -1,4 +1,4 @@
-"""Units as files and users write them, turned into SI. The only file that imports pint.
+"""Conversion of units, as files and users write them, to SI. The only file that imports pint.
 
 Pint is imported when the first unit is read: the import costs more than reading a small file.
 """

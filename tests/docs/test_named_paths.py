@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 from pkgutil import resolve_name
+from types import ModuleType
 
 import pytest
 
@@ -23,6 +24,39 @@ def test_names_of_the_code_exist(project_root: Path) -> None:
         assert resolve_name(name) is not None
 
 
+def of_layers(root: Path, text: str) -> list[str]:
+    """Names in backticks that begin with a layer, as the architecture page writes them."""
+    parts = (root / "validate").iterdir()
+    layers = {p.stem for p in parts if p.suffix in ("", ".py") and p.stem[0] != "_"}
+    named = re.findall(r"`(\w+(?:\.\w+)+)`", text)
+    return [n for n in named if n.split(".")[0] in layers]
+
+
+def test_names_of_the_architecture_page_exist(project_root: Path) -> None:
+    text = (project_root / "docs" / "architecture.md").read_text("utf-8")
+    named = set(of_layers(project_root, text))
+    assert len(named) >= 120
+    for name in sorted(named):
+        assert resolve_name(f"validate.{name}") is not None
+
+
+def test_walks_count_their_files(project_root: Path) -> None:
+    text = (project_root / "docs" / "architecture.md").read_text("utf-8")
+    walks = re.findall(r"\n### [^\n]*\((\d+) files\)\n\n(.*?)(?=\n##)", text, flags=re.DOTALL)
+    assert len(walks) == 5
+    for count, steps in walks:
+        named = [of_layers(project_root, line)[0] for line in steps.splitlines() if line.strip()]
+        assert len({module_of(n) for n in named}) == int(count)
+
+
+def module_of(name: str) -> str:
+    """The module that defines a name."""
+    part = f"validate.{name}"
+    while not isinstance(resolve_name(part), ModuleType):
+        part = part.rpartition(".")[0]
+    return part
+
+
 def test_files_exist(project_root: Path) -> None:
     named = {n for page in pages(project_root) for n in FILES.findall(page.read_text("utf-8"))}
 
@@ -30,6 +64,7 @@ def test_files_exist(project_root: Path) -> None:
         "experiments/my_gel.py",
         "experiments/gel.py",
         "experiments/NAME/experiment.py",
+        "validate/commands/NAME.py",
     }  # the reader writes them
     missing = [n for n in named if not (project_root / n).is_file()]
     assert missing == []

@@ -1,4 +1,4 @@
-"""`validate align`: files of one test, whose clocks know nothing of each other."""
+"""`validate align`: clock offset between recordings of one test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ from validate.report.charts.encode import png
 
 @dataclass(frozen=True)
 class HowAligned:
-    """How files are aligned: by an `event` or by correlation `within` s (None: whatever they last).
+    """Settings of an alignment: by an `event`, or by correlation `within` s (None: full length).
 
     At least `correlation` (-1..1), and the share `coverage` of samples that meet, are needed;
     `straighten` takes a drift out.

@@ -1,4 +1,4 @@
-"""What the commands share: exit codes, kinds of options, and texts of the form PATH=VALUE."""
+"""Arguments that commands share: exit codes, option types and PATH=VALUE texts."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -70,7 +70,7 @@ def complain_of_former_name(former: str, now: str) -> None:
 
 
 def command_line() -> tuple[str, ...]:
-    """The arguments of the running command; empty where there is none."""
+    """Return the arguments of the running command; empty where there is none."""
     context = click.get_current_context(silent=True)
     return tuple(context.find_root().obj or ()) if context else ()
 
@@ -94,7 +94,7 @@ def pairs(texts: tuple[str, ...], option: str) -> dict[str, str]:
 
 
 def output(text: str, *, required: bool = True) -> Callable[[Callable[..., Any]], Any]:
-    """The options `-o` and `--force` of a command that writes one file, `out`.
+    """Return the options `-o` and `--force` of a command that writes one file, `out`.
 
     The command is called where `require_new` lets it be; all other paths that it is given are its
     inputs.
@@ -121,7 +121,7 @@ def _paths(values: Iterable[Any]) -> Iterator[Path]:
 
 
 def require_new(outputs: Iterable[Path], inputs: Iterable[Path] = (), *, force: bool) -> None:
-    """Raises `UsageError` for an output that exists, unless it may be replaced by `force`, and for
+    """Raise `UsageError` for an output that exists, unless it may be replaced by `force`, and for
     one that is an input in any case."""
     sources = [path for path in inputs if path.exists()]
     for out in outputs:

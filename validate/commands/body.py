@@ -1,4 +1,4 @@
-"""`validate body`: a body of another program, checked, filled and kept as npz."""
+"""`validate body`: import a third-party mesh, check it and store it as npz."""
 
 from collections.abc import Mapping
 from dataclasses import replace

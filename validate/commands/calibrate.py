@@ -1,4 +1,4 @@
-"""`validate calibrate`: the image plane of a tracked probe, from targets marked in its images."""
+"""`validate calibrate`: image plane of a tracked probe from targets in its images."""
 
 from dataclasses import replace
 from pathlib import Path

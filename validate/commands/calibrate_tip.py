@@ -1,4 +1,4 @@
-"""`validate calibrate --pivot`: the tip of a tracked tool, from turns about points it stands on."""
+"""`validate calibrate --pivot`: tip of a tracked tool by pivot calibration."""
 
 from dataclasses import replace
 from pathlib import Path

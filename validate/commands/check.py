@@ -1,4 +1,4 @@
-"""`validate check`: published figures and declared verdicts, today."""
+"""`validate check`: published figures and declared verdicts against current results."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,7 @@ def check(
     as_json: bool,
     detail: Detail = "screen",
 ) -> int:
-    """Holds every figure and verdict of stored runs that match, else of new ones, which leave no
+    """Check every figure and verdict of matching stored runs, else of new ones, which leave no
     report; `fresh`: nothing that is stored is used. 0 when no figure moved and every verdict is the
     declared one."""
     found: list[Json] = []

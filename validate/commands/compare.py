@@ -1,4 +1,4 @@
-"""`validate compare`: stored runs side by side, on one screen."""
+"""`validate compare`: stored runs side by side."""
 
 import json
 import sys
@@ -26,7 +26,7 @@ _PARAMETERS = 8  # rows of parameters that differ
 
 @dataclass(frozen=True)
 class Shown:
-    """What of a comparison is shown: patterns of methods and scores, an order, all of it."""
+    """Settings of a comparison's output: patterns of methods and scores, order, full tables."""
 
     methods: tuple[str, ...] = ()
     scores: tuple[str, ...] = ()
@@ -160,7 +160,7 @@ def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[st
 
 
 def document(found: SideBySide) -> dict[str, Any]:
-    """The comparison as one JSON document, SI."""
+    """Return the comparison as one JSON document, SI."""
     return {
         "runs": [
             {"name": r.name, "experiment": r.experiment, "created": r.created,

@@ -1,4 +1,4 @@
-"""`validate study coverage`: how often our own verdicts are wrong; runs, writes, prints."""
+"""`validate study coverage`: error rates of verdicts on a known truth."""
 
 from validate.commands.arguments import FAILED, OK, pairs
 from validate.commands.screen import Passage, rows, sentences
@@ -12,7 +12,7 @@ from validate.study.coverage.study import Coverage
 def covering(
     name: str, common: StudyOptions, *, draws: int | None, noise: float, values: tuple[str, ...]
 ) -> int:
-    """Judges drawn recordings of a perfect model; 0 where every check holds."""
+    """Compute verdicts on drawn recordings of a perfect model; 0 where every check holds."""
     with noted():
         done = studies.coverage_of_verdicts(
             common.experiment(name), common.settings, draws=draws, noise=noise,

@@ -1,4 +1,4 @@
-"""`validate data`: recordings made by others by name, and how they come here."""
+"""`validate data`: list and download third-party data sets."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from validate.errors import RecordingError
 
 
 def show(as_json: bool) -> None:
-    """Prints every data set, and where it is here."""
+    """Print every data set, and where it is here."""
     if as_json:
         print(json.dumps([_document(s) for s in data_sets()], ensure_ascii=False, indent=2))
         return

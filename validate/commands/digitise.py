@@ -1,4 +1,4 @@
-"""`validate digitise`: the landmarks that the tip of a tracked tool was held on."""
+"""`validate digitise`: landmarks of a body, touched with the tip of a tracked tool."""
 
 import csv
 import io
@@ -34,9 +34,9 @@ _MAX_TABLE = 16 * 2**20  # bytes
 
 
 def known_places(file: Path, unit: str | None) -> tuple[KnownTarget, ...]:
-    """Places m of a table (target, x, y, z; a wire x2, y2, z2, too) in `unit`, or of landmarks:
-    FCSV and markups in their own unit (or `unit`), a device set of PLUS, a recording's points at
-    one instant.
+    """Return the places m of a table (target, x, y, z; a wire x2, y2, z2, too) in `unit`, or of
+    landmarks: FCSV and markups in their own unit (or `unit`), a device set of PLUS, a recording's
+    points at one instant.
 
     Raises `UsageError` for a table without a unit, `RecordingError` for a file that is damaged.
     """
@@ -110,7 +110,7 @@ def _along(file: Path, row: dict[str, str], factor: float, place: Floats) -> Flo
 
 
 def rows_of(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
-    """The rows of a table with commas that has the `wanted` columns, among others."""
+    """Return the rows of a table with commas that has the `wanted` columns, among others."""
     rows = csv.DictReader(
         io.StringIO(read_text(file, _MAX_TABLE, "utf-8-sig"), newline=""), restval=""
     )
@@ -128,7 +128,7 @@ def rows_of(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
 
 
 def number(file: Path, row: dict[str, str], name: str) -> float:
-    """A finite number of a row's column."""
+    """Return a finite number of a row's column."""
     said = row.get(name, "")
     try:
         value = float(said)

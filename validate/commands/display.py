@@ -1,4 +1,4 @@
-"""Tables and sentences on the terminal; plain lines when it is not one."""
+"""Tables and sentences on the terminal; plain lines in a pipe or file."""
 
 import os
 import sys
@@ -53,7 +53,8 @@ def print_views(found: "LongTable", *names: str) -> None:
 
 
 def shown(value: float | None, unit: str) -> str:
-    """A value with its unit as people read it, four significant digits: a small one is no zero."""
+    """Return a value with its unit as people read it, four significant digits: a small one is no
+    zero."""
     if value is None:
         return "-"
     if unit == "Pa" and abs(value) >= 1000:
@@ -62,12 +63,12 @@ def shown(value: float | None, unit: str) -> str:
 
 
 def error_shown(check: Mapping[str, Any]) -> str:
-    """The error of a check, as in results.json; that noise explains all of it is no zero."""
+    """Return the error of a check, as in results.json; that noise explains all of it is no zero."""
     value, raw = check["value"], check["raw"]
     return "below noise" if value == 0 < raw else shown(value, check["unit"])
 
 
 def relative(path: Path) -> str:
-    """The path from here when it lies below, else whole."""
+    """Return the path from here when it lies below, else whole."""
     text = os.path.relpath(path)
     return str(path.resolve()) if text.startswith("..") else text

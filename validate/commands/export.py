@@ -1,4 +1,4 @@
-"""`validate export`: a stored run for other programs."""
+"""`validate export`: export a stored run as JUnit XML or LaTeX."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from validate.study.stored_runs.score_comparison import read_table
 
 
 def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:
-    """Writes what was asked for; raises `UsageError` where nothing was."""
+    """Write the requested exports; raises `UsageError` where none is requested."""
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted:
@@ -32,7 +32,7 @@ def _junit(table: LongTable) -> str:
 
 
 def checks_in_latex(table: LongTable) -> str:
-    """The checks of all methods as a `tabular`."""
+    """Return the checks of all methods as a `tabular`."""
     head = table.head
     (checks,) = filled(view_of("checks"), table).tables
     return tabular(checks, f"{head['experiment']}, {head['created']}: {head['sentence']}")

@@ -1,4 +1,4 @@
-"""The commands on external simulators."""
+"""`validate external`: commands on external simulators."""
 
 from pathlib import Path
 from typing import Any

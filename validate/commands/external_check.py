@@ -1,4 +1,4 @@
-"""Commands `validate external check` and `validate external job`.
+"""`validate external check` and `validate external job`.
 
 `check` tests capabilities and accuracy of an external simulator. `job` writes its input files.
 """

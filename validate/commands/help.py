@@ -1,4 +1,4 @@
-"""Help pages: commands in groups by what they are for, each page with an example."""
+"""Help pages: commands in groups by purpose, each page with an example."""
 
 import io
 from collections.abc import Iterator
@@ -42,7 +42,8 @@ class _Pipe(io.RawIOBase):
 
 
 def outlives_reader(stream: TextIO) -> TextIO:
-    """The stream, with a reader that may end early: the command goes on, its exit code stays."""
+    """Return the stream, with a reader that may end early: the command goes on, its exit code
+    stays."""
     buffer = getattr(stream, "buffer", None)
     raw = getattr(buffer, "raw", buffer)  # an unbuffered stream has its raw one there
     if not isinstance(raw, io.RawIOBase):
@@ -108,7 +109,7 @@ def _facts(reader: "Reader") -> list[str]:
 
 
 def command_at(group: click.Group, name: str) -> click.Command:
-    """The command of a name such as "study filters"."""
+    """Return the command of a name such as "study filters"."""
     found: click.Command = group
     for word in name.split():
         assert isinstance(found, click.Group)

@@ -1,4 +1,4 @@
-"""`validate history`: the runs of an experiment and what changed from one to the next."""
+"""`validate history`: past runs of an experiment and the changes between them."""
 
 import json
 import math
@@ -27,7 +27,7 @@ _DIGITS = 10  # of a hash
 
 
 def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
-    """Prints every run of an experiment below its reports; raises `UsageError` for none.
+    """Print every run of an experiment below its reports; raises `UsageError` for none.
 
     No experiment is executed: one whose file is gone has its history all the same.
     """

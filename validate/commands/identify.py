@@ -1,4 +1,4 @@
-"""`validate identify`: parameters with profile intervals, or why they are not identifiable."""
+"""`validate identify`: parameters with profile intervals, and their identifiability."""
 
 from validate.commands.arguments import FAILED, OK, Detail, pairs
 from validate.commands.display import shown
@@ -15,7 +15,7 @@ _HEAD = ("", "value", "95 % from", "to", "identified")
 def identifying(
     name: str, common: StudyOptions, *, parameters: str, seeds: int | None, values: tuple[str, ...]
 ) -> int:
-    """Identifies; 0 where everything that was asked for is identified, else 1."""
+    """Identify parameters; 0 where every requested one is identified, else 1."""
     with noted():
         done = studies.identified(
             common.experiment(name), common.settings, parameters=listed(parameters),

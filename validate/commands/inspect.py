@@ -1,4 +1,4 @@
-"""`validate inspect`: what a recording holds, and how it moves."""
+"""`validate inspect`: content of a recording and summary of its motion."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ def _motion(file: Path, kind: str | None, options: Mapping[str, str]) -> tuple[s
 
 
 def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
-    """Prints messages of a topic of an MCAP file, decoded, a line each or as one document."""
+    """Print messages of a topic of an MCAP file, decoded, a line each or as one document."""
     found = list(messages_in(file, topic, most))
     if as_json:
         print(json.dumps(found, ensure_ascii=False, indent=2, allow_nan=False))

@@ -1,4 +1,4 @@
-"""`validate list NAME`: one experiment with every parameter."""
+"""`validate list NAME`: one experiment with all its parameters."""
 
 import json
 from collections.abc import Sequence

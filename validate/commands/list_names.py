@@ -1,4 +1,4 @@
-"""`validate list`: every experiment by name, without running its file."""
+"""`validate list`: names and titles of all experiments, without running their files."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""`validate list --plugins`: parts that other packages add, with package and version."""
+"""`validate list --plugins`: parts of installed plug-ins, with package and version."""
 
 import json
 from collections.abc import Mapping

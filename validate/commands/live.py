@@ -1,4 +1,4 @@
-"""`validate live`: a model under a hand's tool against the clock."""
+"""`validate live`: a model in real time, driven by a tool."""
 
 import json
 import shlex

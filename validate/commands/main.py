@@ -1,4 +1,4 @@
-"""Commands and exit codes: 0 all checks hold, 1 a check failed, 2 usage or bad input, 70 a bug."""
+"""Declaration of all commands, and exit codes (0 passed, 1 failed, 2 usage, 70 bug)."""
 
 import gc
 import logging

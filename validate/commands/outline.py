@@ -1,4 +1,4 @@
-"""`validate outline`: outlines found in a recording's images, or drawn by others, as a stream."""
+"""`validate outline`: outlines in a recording's images, or third-party ones, as a stream."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ _SURE = 0.75  # confidence below which it is said
 def outline(
     file: Path, out: Path | None, topic: str, name: str, drawn: Path | None, given: dict[str, Any]
 ) -> None:
-    """Adds the outlines of the images `topic` to the recording in `file` as the stream `name`."""
+    """Add the outlines of the images `topic` to the recording in `file` as the stream `name`."""
     recording = read_recording(file)
     out = out or _same(file, recording)
     try_file(out)

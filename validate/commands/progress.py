@@ -1,4 +1,4 @@
-"""What runs, for how long, and how long it will still take: on standard error.
+"""Progress on standard error: current work, elapsed and remaining time.
 
 On a terminal something moves and the seconds count, whatever is being computed. In a pipe a line
 is written now and then.
@@ -29,7 +29,7 @@ Clock = Callable[[], float]
 
 
 class Watch:
-    """Told by the work what it does, asked from elsewhere how far it is."""
+    """Progress of a work: current step, share done, elapsed and remaining time."""
 
     def __init__(self, title: str, clock: Clock = monotonic) -> None:
         self.title, self._clock = title, clock
@@ -90,7 +90,7 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Yields what the work reports to: done, total, what comes next."""
+    """Yield the callback of the work: done, total, text of the next step."""
     watch, screen = Watch(title), console(error=True)
     if _QUIET.get():
         yield watch.report
@@ -113,7 +113,7 @@ def _bar(watch: Watch, screen: Console) -> Iterator[None]:
 
 
 def drawn(watch: Watch, spinner: Spinner, width: int) -> RenderableType:
-    """A line with what is known of the time, and below it what is being done."""
+    """Return a line with what is known of the time, and below it what is being done."""
     head = Table.grid(padding=(0, 1))
     times = f"{watch.elapsed}, {watch.left}" if watch.left else watch.elapsed
     head.add_row(spinner, watch.title, ProgressBar(1.0, watch.share, width=_BAR), times)

@@ -1,4 +1,4 @@
-"""`validate record`: the synthetic recording of an experiment."""
+"""`validate record`: synthetic recording of an experiment."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from validate.recording.readers import read_recording
 
 
 def record(name: str, out: Path, values: tuple[str, ...], named: tuple[Path, ...] = ()) -> None:
-    """Makes an experiment's twin recording, with a JSON beside it of what must be read."""
+    """Make an experiment's twin recording, with a JSON beside it of what must be read."""
     experiment = find(name, Path.cwd(), named)
     twin = experiment.twin
     if twin is None:

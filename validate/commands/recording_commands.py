@@ -1,4 +1,4 @@
-"""Commands on recordings: inspect, import, merge, and those that make or transfer recordings."""
+"""Click commands on recordings, from inspect and import to new and record."""
 
 from pathlib import Path
 from typing import Any

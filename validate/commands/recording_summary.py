@@ -1,4 +1,4 @@
-"""Summary of a recording in lines that fit a comment of a Python file."""
+"""Summary of a recording as comment lines of a Python file."""
 
 import os
 from pathlib import Path
@@ -48,5 +48,5 @@ def plain(text: str) -> str:
 
 
 def beside(source: Path, path: Path) -> str:
-    """A file's path from the folder of the experiment's file."""
+    """Return a file's path from the folder of the experiment's file."""
     return Path(os.path.relpath(source.resolve(), path.resolve().parent)).as_posix()

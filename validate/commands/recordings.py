@@ -1,4 +1,4 @@
-"""`validate import` and `merge`."""
+"""`validate import` and `validate merge`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -40,8 +40,8 @@ def import_files(
     specimens: str | None,
     given: Mapping[str, Any],
 ) -> None:
-    """Reads foreign files, of the `kind` that they show where none is said, as a recording;
-    several are repeats of one test of a testing machine."""
+    """Read foreign files, of the `kind` that they show where none is said, as a recording; several
+    are repeats of one test of a testing machine."""
     try_file(out)
     said = pairs(mapping, "--map") | {k: str(v) for k, v in given.items() if v is not None}
     found = _logs(files, kind)
@@ -98,7 +98,7 @@ def recover_file(
     mapping: tuple[str, ...],
     given: Mapping[str, Any],
 ) -> None:
-    """Saves what of an MCAP file without an end is whole, and says what is missing."""
+    """Save what of an MCAP file without an end is whole, and says what is missing."""
     more = mapping or any(v is not None for v in given.values())
     if kind not in (None, "mcap") or more or len(files) > 1:
         raise UsageError("--recover copies messages unchanged: it takes only one FILE and -o")
@@ -120,7 +120,7 @@ def _besides(recording: Recording) -> list[str]:
 
 
 def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> None:
-    """Writes one recording with all streams, moved where the user says so."""
+    """Write one recording with all streams, moved where the user says so."""
     try_file(out)
     merged = merge([read_recording(f) for f in files], out.stem)
     require_chain(merged)

@@ -1,4 +1,4 @@
-"""`validate run`."""
+"""`validate run`: run experiments and write their reports."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -31,7 +31,8 @@ def each(
     do: Callable[[Experiment], bool],
     failed: Failed | None = None,
 ) -> int:
-    """The exit code of what is done to the experiments of these names, or to all without names.
+    """Return the exit code of what is done to the experiments of these names, or to all without
+    names.
 
     Names are looked up before anything is done. Of several, one that cannot be done is one line and
     exit code 2, and hides no other; `failed` is told of it.

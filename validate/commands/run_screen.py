@@ -1,4 +1,4 @@
-"""What a run prints: verdict, deciding checks, identified values, ranking, next steps, report."""
+"""Terminal output of a run: verdict, checks, identified values, ranking, next steps."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -76,7 +76,7 @@ def called(experiment: Experiment) -> str:
 
 
 def headline(result: Result) -> str:
-    """The verdict in one sentence: both answers, and over how many checks."""
+    """Return the verdict in one sentence: both answers, and the number of checks."""
     found = result.overall
     doubt = ", with warnings" if result.warnings and found.passed else ""
     required = len(found.met) + len(found.failed) + len(found.undecided)

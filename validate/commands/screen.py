@@ -1,4 +1,4 @@
-"""One screen of text: passages of lines that share a number of lines.
+"""One screen of text: passages that share a limited number of lines.
 
 show([Passage("Checks", rows, keep=2, most=8)])  # on at most 25 lines
 """
@@ -36,7 +36,7 @@ class Passage:
     each: int | None = None
 
     def laid(self, *, whole: bool) -> "Passage":
-        """The passage in lines of the screen's width; sentences are cut unless `whole`."""
+        """Return the passage in lines of the screen's width; sentences are cut unless `whole`."""
         if not self.wrap:
             return self
         each = None if whole else self.each
@@ -49,7 +49,7 @@ class Passage:
 
 
 def fitted(passages: Sequence[Passage], most: float = LINES) -> list[Passage]:
-    """The passages that have lines, the longest shortened until all have room."""
+    """Return the passages that have lines, the longest shortened until all have room."""
     found = [b for b in passages if b.lines]
     counts = [min(len(b.lines), b.most or len(b.lines)) for b in found]
     least = [n if b.keep is None else min(n, b.keep) for b, n in zip(found, counts, strict=True)]
@@ -91,7 +91,8 @@ def width() -> int:
 def sentences(
     texts: Iterable[str], each: int | None = 2, keep: int | None = None, most: int | None = None
 ) -> Passage:
-    """A passage of sentences, each of at most `each` lines on a screen and whole with --verbose."""
+    """Return a passage of sentences, each of at most `each` lines on a screen and whole with
+    --verbose."""
     return Passage("", tuple(texts), keep, most, wrap=True, each=each)
 
 
@@ -104,8 +105,8 @@ def _wrapped(text: str, most: int | None) -> tuple[str, ...]:
 
 
 def rows(head: Sequence[str], cells: Sequence[Sequence[str]], soft: int = 0) -> tuple[str, ...]:
-    """A table with one line a row, indented; the texts of column `soft` are cut where they have no
-    room. None without cells."""
+    """Return a table with one line a row, indented; the texts of column `soft` are cut where they
+    have no room. None without cells."""
     every = [*([head] if any(head) else []), *cells] if cells else []
     widths = [max(map(len, column)) for column in zip(*every, strict=True)]
     room = width() - sum(w + 2 for i, w in enumerate(widths) if i != soft) - 2
@@ -119,7 +120,7 @@ def rows(head: Sequence[str], cells: Sequence[Sequence[str]], soft: int = 0) -> 
 
 
 def cut(text: str, room: int) -> str:
-    """A text of at most `room` characters."""
+    """Return a text of at most `room` characters."""
     return text if len(text) <= room else f"{text[: room - 1]}…"
 
 

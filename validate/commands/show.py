@@ -1,4 +1,4 @@
-"""`validate show`: tables and charts of a stored run on the terminal, or one of them as a file."""
+"""`validate show`: tables and charts of a stored run, on the terminal or as a file."""
 
 from collections.abc import Iterator
 from pathlib import Path

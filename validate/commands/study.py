@@ -1,4 +1,4 @@
-"""`validate study filters|stability|tradeoff|choose`: runs, writes the folder, prints."""
+"""`validate study filters|stability|tradeoff|choose`: run a study and print its result."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -69,7 +69,7 @@ def filters(
     by: str,
     hold_out: str,
 ) -> int:
-    """Ranks filters; 0."""
+    """Rank filters; 0."""
     with noted():
         done = studies.filters(
             common.experiment(name), common.settings, sweeps=sweeps, seeds=seeds,
@@ -86,7 +86,7 @@ def filters(
 
 
 def stability_map(name: str, common: StudyOptions) -> int:
-    """Maps where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
+    """Map where schemes are stable; 0 where all claims hold, or where nothing steps in time."""
     with noted():
         done = studies.stability_map(common.experiment(name), common.settings)
     found, page = done.found, done.page
@@ -102,7 +102,7 @@ def stability_map(name: str, common: StudyOptions) -> int:
 
 
 def tradeoff(name: str, common: StudyOptions, simulators: tuple[str, ...] = ()) -> int:
-    """Measures error against time; 0."""
+    """Measure error against time; 0."""
     with noted():
         done = studies.tradeoff(common.experiment(name), common.settings, simulators)
     if not printed(done.page, common):
@@ -111,7 +111,7 @@ def tradeoff(name: str, common: StudyOptions, simulators: tuple[str, ...] = ()) 
 
 
 def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared_law: bool) -> int:
-    """Runs the pilots of all candidates; 0 when a method meets both, else 1."""
+    """Run the pilots of all candidates; 0 when a method meets both, else 1."""
     with noted():
         done = studies.choice(
             common.experiment(name), common.settings, error=error, rate=rate,
@@ -140,12 +140,12 @@ def noted() -> Iterator[None]:
 
 
 def listed(text: str) -> tuple[str, ...]:
-    """The parts of `A,B`."""
+    """Return the parts of `A,B`."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def printed(page: Path, common: StudyOptions) -> bool:
-    """Whether results.json was asked for, which is then printed."""
+    """Print results.json where it is requested, and return whether it is."""
     if common.as_json:
         print((page.parent / MARK).read_text(encoding="utf-8"))
     return common.as_json

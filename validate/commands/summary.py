@@ -1,4 +1,4 @@
-"""`validate summary`: a statement over all stored runs."""
+"""`validate summary`: bias and scatter over all stored runs."""
 
 import json
 from pathlib import Path

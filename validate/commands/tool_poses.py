@@ -1,4 +1,4 @@
-"""Poses of a tracked tool in a recording, as commands name it."""
+"""Poses of a tracked tool in a recording, by the names that commands use."""
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def in_reference(
 
 
 def tip_offset(text: str) -> Floats:
-    """A tip (3,) m in its tool's frame, of a text as 108mm,-8mm,3mm."""
+    """Return a tip (3,) m in its tool's frame, of a text as 108mm,-8mm,3mm."""
     words = text.split(",")
     if len(words) != 3:
         raise UsageError(f"--tip {text}: expected three lengths, as 108mm,8mm,3mm")

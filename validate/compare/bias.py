@@ -1,4 +1,4 @@
-"""Relative bias and scatter of predictions over many experiments, as fire models are validated.
+"""Relative bias and scatter of predictions over many experiments, as in validation of fire models.
 
 McGrattan and Toman (2011), "Quantifying the predictive uncertainty of complex numerical models",
 Metrologia 48, 173-180; NUREG-1824, supplement 1 (2016). Measured E and predicted M scatter about
@@ -54,7 +54,7 @@ class Size:
 
 
 def kind_of(quantity: str, unit: str) -> str:
-    """What was measured, in a word; "" where none fits."""
+    """Return the measured quantity in a word; "" where none fits."""
     words = re.split(r"[._]", quantity)
     if named := [word for word in words if word in _BY_WORD and _fits(word, unit)]:
         return named[0]
@@ -69,7 +69,7 @@ def _fits(word: str, unit: str) -> bool:
 
 
 def size_of(residual: Residual) -> Size | None:
-    """The size of what was compared; None without a measured one, or with noise alone.
+    """Return the size of the compared quantity; None without a measured one, or with noise alone.
 
     Of many points: simulated = b measured, b the least-squares factor of the simulated values on
     the measured ones through zero, <s, m>/<m, m>, with the noise's share c sd^2 out of <m, m>.

@@ -1,4 +1,4 @@
-"""Numerical uncertainty of an answer on one mesh or time step (u_num), by grid refinement.
+"""Numerical uncertainty u_num of a result by refinement of mesh or time step.
 
 Two sizes have no observed order: the error follows from the formal one, with F = 3 (Roache 1994).
 

@@ -1,4 +1,4 @@
-"""How often a verdict is wrong: shares with their intervals, and which term of u_val is at fault.
+"""Error rates of verdicts with intervals, and the term of u_val that causes them.
 
 A perfect model is called different in 4.6 % of comparisons where E is normal with the standard
 uncertainty u_val. More than `MOST` says that a term is too narrow, fewer than `LEAST` that one is
@@ -56,7 +56,7 @@ class Share:
 
     @property
     def by_chance(self) -> bool:
-        """Whether the interval reaches into what is allowed."""
+        """Whether the interval overlaps the allowed range."""
         return self.low <= MOST and self.high >= LEAST
 
 
@@ -116,13 +116,13 @@ def reach(errors: Floats) -> float:
 def term(
     name: str, part: float, errors: Floats, kind: Literal["measurement", "input"] = "input"
 ) -> Term:
-    """A term by what E (n,) of it alone was over the draws."""
+    """Return a term by what E (n,) of it alone was over the draws."""
     return Term(name, part, reach(errors), rms(errors) if len(errors) else 0.0, kind)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What the share of a quantity says, and which term is at fault."""
+    """Finding on the share of one quantity, and the term of u_val that causes it."""
 
     word: Word
     fault: Term | None

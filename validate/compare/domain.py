@@ -1,4 +1,4 @@
-"""What a run covered: the strain and rate that its body reached, and its size."""
+"""Validation domain of a run: strain, strain rate and size of its body."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a recording can tell apart: the size of an effect against the noise of every sensor.
+"""Separability of effects: size of an effect against the noise of every sensor.
 
 An effect is the difference between two models against the same measurement. Over k points with
 noise sd it is seen with separation rms(difference) / sqrt(sd^2/k + shared^2), where `shared` is
@@ -20,7 +20,7 @@ TELLS_APART = 2.0
 
 @dataclass(frozen=True)
 class Change:
-    """How far an effect moves one quantity: rms and largest, in `unit`, and its separation."""
+    """Change of one quantity by an effect: rms and largest, in `unit`, and its separation."""
 
     name: str
     rms: float
@@ -31,7 +31,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor that could be added: what it reads, its noise (SI) and its name."""
+    """A sensor that could be added: its quantity, its noise (SI) and its name."""
 
     name: str
     quantity: str
@@ -40,7 +40,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the error budget: what was changed, what moved, who sees it, who would."""
+    """One row of the error budget: cause, changed quantities, sensors that detect it or would."""
 
     name: str
     doc: str
@@ -57,7 +57,7 @@ def effect(
     shared: Mapping[str, float],
     sensors: Sequence[Sensor],
 ) -> Effect:
-    """The effect of going from one model to the other; `shared` (SI) per quantity's name."""
+    """Return the effect of going from one model to the other; `shared` (SI) per quantity's name."""
     names = [n for n in one if n in other and one[n].values.shape == other[n].values.shape]
     recorded = [n for n in names if one[n].sd > 0]
     changes = tuple(_change(one[n], other[n], one[n].sd, shared.get(n, 0.0)) for n in names)

@@ -1,4 +1,4 @@
-"""What a report shows, as plain data: sentences, tables, charts, maps on the mesh, pictures."""
+"""Report items as plain data: sentences, tables, charts, maps on the mesh, images."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ Pixels = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class TableCell:
-    """An entry that says more: its SI unit ("": the number is as shown) and how it stands out.
+    """A table entry with its SI unit ("": the number is as shown) and its emphasis.
 
     `text` is how it reads, where that is not the rule; an emphasis never replaces words. A number
     that is not finite is none.
@@ -36,7 +36,7 @@ class TableCell:
 
 
 def plain(entry: Entry | TableCell) -> Entry:
-    """The entry itself, whatever else a cell says of it."""
+    """Return the entry itself, without its unit and emphasis."""
     return entry.value if isinstance(entry, TableCell) else entry
 
 
@@ -99,7 +99,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """One picture: axes with units, series, and named levels (horizontal lines).
+    """One chart: axes with units, series, and named levels (horizontal lines).
 
     `linear`: y is linear between -linear and linear and logarithmic beyond (0: `log` alone counts).
     `scale` is the size, in y's unit, of what y is a difference of: on a logarithmic axis a y far
@@ -192,7 +192,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class RegimeMap:
-    """What happens over logarithmic x (columns,) and the texts of rows, one panel a method."""
+    """Regimes over logarithmic x (columns,) and the texts of rows, one panel a method."""
 
     name: str
     title: str
@@ -241,7 +241,7 @@ class Intervals:
 
 @dataclass(frozen=True)
 class Picture:
-    """pixels (h, w, 3) sRGB with what it shows (caption) and the same in words (alt).
+    """Image: pixels (h, w, 3) sRGB with a caption and a text alternative (alt).
 
     `photo` pictures are shaded renders, which a lossy code may touch; the others are line art.
     """
@@ -268,7 +268,7 @@ class Animation:
 
     @property
     def still(self) -> Picture:
-        """The first frame as a picture."""
+        """The first frame as an image."""
         return Picture(self.name, self.caption, self.alt, self.frames[0])
 
 
@@ -293,6 +293,6 @@ class Exhibit:
 
 
 def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:
-    """The exhibit with a sentence under each of its charts that is named."""
+    """Return the exhibit with a sentence under each of its charts that is named."""
     charts = (replace(c, caption=captions.get(c.name, c.caption)) for c in exhibit.charts)
     return replace(exhibit, charts=tuple(charts))

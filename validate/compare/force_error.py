@@ -1,4 +1,4 @@
-"""Errors of a force over time: of its peak, on the whole, and in phase."""
+"""Errors of a force over time: peak error, relative error and phase."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -119,7 +119,7 @@ class ForcePair:
 def force_pair(
     name: str, run: Signal, reference: Signal, lag_within: float, against: str
 ) -> ForcePair:
-    """The run interpolated at the reference's times that it meets, gaps excluded.
+    """Return the run interpolated at the reference's times that it meets, gaps excluded.
 
     Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
     """
@@ -161,7 +161,7 @@ def relative_rms_error(force: ForcePair) -> float:
 
 
 def phase_error(force: ForcePair) -> float:
-    """How much later (s) the run comes than the reference: the lag of best correlation.
+    """Return the lag (s) of the run behind the reference, at the best correlation.
 
     Refined between the samples; independent of scale and offset. Raises `ComparisonError` where
     the two are not alike or one lag does not stand out; of a periodic force, search within less

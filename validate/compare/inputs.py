@@ -1,4 +1,4 @@
-"""Uncertain inputs: where their ranges come from, and whether their effects add up.
+"""Uncertain inputs: source of their ranges, and additivity of their effects.
 
 u_input adds first-order effects of one input at a time (GUM 5.1.2). Draws of all inputs at once
 (JCGM 101: propagation of distributions by Monte Carlo) see what that leaves out: curvature, and

@@ -1,4 +1,4 @@
-"""The overall verdict of an experiment: acceptance and validation over all its checks.
+"""Overall verdict of an experiment: acceptance and validation over all its checks.
 
 *Good enough*: every requirement is met. Each check is a test of its own and all must pass, so that
 their number needs no correction: an intersection-union test, Berger (1982), "Multiparameter
@@ -78,8 +78,8 @@ class MovedVerdict:
 def moved(
     checks: Iterable[tuple[str, Check]], expected: Sequence[Expected]
 ) -> tuple[MovedVerdict, ...]:
-    """The checks, each with its method's name, whose verdict is not the one that the last fitting
-    declaration expects; where none fits, those that are adverse."""
+    """Return the checks, each with its method's name, whose verdict is not the one that the last
+    fitting declaration expects; where none fits, those that are adverse."""
     found = []
     for method, check in checks:
         fitting = [e for e in expected if e.fits(method, check.name)]
@@ -102,7 +102,7 @@ PASSES: tuple[Word, ...] = ("good enough", "not distinguishable", "no evidence")
 
 @dataclass(frozen=True)
 class Overall:
-    """What all checks say together.
+    """Overall verdict over all checks.
 
     Of the requirements: checks that are `failed` (not good enough), `undecided`, and `met`. Of the
     differences: `differs` after Holm's correction, and `alone` by themselves only. `absent`
@@ -150,7 +150,7 @@ class Overall:
 
     @property
     def corrections(self) -> str:
-        """How many checks are taken into account, in a sentence."""
+        """Number of checks in the correction, in a sentence."""
         return (
             "Each requirement must be met, so no correction is needed (intersection-union "
             f"test, Berger 1982). Corrected for {self.total} checks (Holm 1979), "
@@ -160,7 +160,7 @@ class Overall:
 
 
 def judge_all(checks: Sequence[Check]) -> Overall:
-    """The verdict over all checks, in their order."""
+    """Return the verdict over all checks, in their order."""
     undecided = [c for c in checks if c.acceptance == "undecided"]
     tested = [
         c for c in [*(c for c in checks if c.evidence), *undecided]

@@ -1,4 +1,4 @@
-"""Printed figures: declared before anything runs, judged by today's value wherever they are shown.
+"""Published figures, declared before a run and checked against its values.
 
 A figure belongs to the data it was printed for: beside other data it is not compared at all.
 """
@@ -68,7 +68,7 @@ class Published:
 
     @property
     def why(self) -> str:
-        """What stands beside the verdict."""
+        """Text beside the verdict."""
         return "; ".join(part for part in (self.fault, self.other or self.reason) if part)
 
     @property
@@ -162,7 +162,7 @@ class Figure:
             )
 
     def beside(self, values: Values) -> Published:
-        """The figure with our value; one that cannot be computed says what it lacks."""
+        """Return the figure with our value; one that cannot be computed says what it lacks."""
         ours, reason, missing = None, "", ""
         try:
             if not self.other:

@@ -92,7 +92,7 @@ def residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
 
 
 def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
-    """Residuals of the undeformed state: what registration and geometry leave before any load."""
+    """Return residuals of the undeformed state: errors of registration and geometry."""
     rest = registered.rest
     if rest is None or not run.finished:
         return ()
@@ -106,7 +106,7 @@ def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
 
 
 def reached_end(registered: Registered, run: Run) -> bool:
-    """Whether a run finished at the last recorded input."""
+    """Return whether a run finished at the last recorded input."""
     return run.finished and bool(run.t[-1] >= registered.t[-1] - 1e-9)
 
 

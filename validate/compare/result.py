@@ -1,4 +1,4 @@
-"""The whole comparison of an experiment: what the report shows and the exit code rests on."""
+"""Result of a comparison: all data of a report and of the exit code."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _ROLES = {
 
 @dataclass(frozen=True)
 class StreamUse:
-    """A stream of a recording: whether the experiment uses it, and what for or why not."""
+    """Use of a recording's stream by the experiment: its purpose, or the reason for none."""
 
     recording: str
     topic: str

@@ -1,4 +1,4 @@
-"""A row of the long table: one number with its labels; and many rows that share them, as arrays."""
+"""Rows of the long table: one labelled number, or many with common labels as arrays."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ class LongRow(NamedTuple):
 
 
 def named(one: LongRow, name: str, unit: str) -> LongRow:
-    """The row with the labels that a name `<quantity>.<statistic>@<condition>` holds."""
+    """Return the row with the labels that a name `<quantity>.<statistic>@<condition>` holds."""
     whole, _, condition = name.partition("@")
     quantity, _, last = whole.rpartition(".")
     statistic = last if quantity and last in _STATISTICS else VALUE

@@ -1,4 +1,4 @@
-"""Scores: a residual's statistics, each with unit, count and definition; never averaged RMSEs."""
+"""Scores: statistics of a residual with unit, count and definition; RMSEs are never averaged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Score:
-    """A number, its SI unit, how many points it rests on, against what, and what it means."""
+    """A number with its SI unit, number of points, reference and definition."""
 
     name: str
     value: float
@@ -83,7 +83,7 @@ def _scalar_scores(residual: Residual, against: str) -> tuple[Score, ...]:
 
 
 def run_scores(run: Run) -> tuple[Score, ...]:
-    """What a run cost: step times, set-up time and the most pressure updates of any step."""
+    """Return the cost of a run: step times, set-up time, largest number of pressure updates."""
     rows: list[tuple[str, float, str, int, str]] = [
         ("setup", run.setup_s, "s", 1, "mesh, assembly, factorisation and response columns"),
     ]

@@ -1,4 +1,4 @@
-"""Errors of a displacement over time at one point, in the papers' own definitions.
+"""Errors of a displacement over time at one point, by the definitions of the papers.
 
 MAE, RMSE and SD as in paper 003, Tables 1-3: SD is the sample standard deviation (ddof 1) of the
 absolute error, not of the signed one. NRMSE as in paper 001: RMSE over the range (largest less
@@ -35,7 +35,8 @@ class TrackError:
 
 
 def track_error(name: str, component: str, estimate: Floats, reference: Floats) -> TrackError:
-    """The error of traces (nt,) m at equal times; raises `ComparisonError` for other lengths."""
+    """Return the error of traces (nt,) m at equal times; raises `ComparisonError` for other
+    lengths."""
     if estimate.shape != reference.shape:
         raise ComparisonError(
             f"{name}: {len(estimate)} estimated and {len(reference)} reference times; a run that "
@@ -61,7 +62,7 @@ def largest(error: TrackError) -> float:
 
 
 def nrmse(error: TrackError) -> float:
-    """Raises `ComparisonError` where the reference does not move."""
+    """Raise `ComparisonError` where the reference does not move."""
     if error.spread <= 0:
         raise ComparisonError(f"{error.name}: the reference does not move, so NRMSE is not defined")
     return rmse(error) / error.spread

@@ -1,4 +1,4 @@
-"""Two answers per check: does the model differ from what was measured, and is it good enough?
+"""Verdict of a check: does the error differ from zero, and is it good enough?
 
 E = simulation - measurement, u_val^2 = u_D^2 + u_num^2 + u_input^2 (standard uncertainties).
 
@@ -166,7 +166,7 @@ class Check:
 
 
 def nothing_compared(accept: Accept, name: str, unit: str, why: str) -> Check:
-    """The check of a quantity that was compared with nothing: it has failed."""
+    """Return the check of a quantity that was compared with nothing: it has failed."""
     none: Acceptance = "no requirement" if accept.required is None else "nothing compared"
     return Check(
         name, 0.0, accept.required, 0.0, 0.0, 0.0, 0.0, unit, 0, "nothing compared", none,
@@ -175,7 +175,7 @@ def nothing_compared(accept: Accept, name: str, unit: str, why: str) -> Check:
 
 
 def as_fitted(check: Check, by: str) -> Check:
-    """A check on data that calibrated the model counts for nothing, whatever its error."""
+    """Return the check as fitted: its data calibrated the model, so that it is no evidence."""
     if not check.count:
         return check
     acceptance = check.acceptance if check.limit is None else "fitted"
@@ -184,7 +184,8 @@ def as_fitted(check: Check, by: str) -> Check:
 
 
 def as_same_model(check: Check, why: str) -> Check:
-    """A model judged by its own recording cannot be confirmed; an error that it shows stays."""
+    """Return the check as of the same model: its own recording cannot confirm it; its error
+    stays."""
     known = check.verdict in ("good enough", "not distinguishable")
     if not known:
         return check
@@ -197,7 +198,7 @@ def as_same_model(check: Check, why: str) -> Check:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one standard uncertainty of an input does to a residual."""
+    """Change of a residual by one standard uncertainty of an input."""
 
     name: str
     change: Residual
@@ -222,18 +223,19 @@ class PointErrors:
     noise: float
 
     def reach(self, others: Floats) -> Floats:
-        """The |E| (n,) that chance shows somewhere among all in 4.6 % of repetitions, where
+        """Return the |E| (n,) that chance shows somewhere among all in 4.6 % of repetitions, where
         `others` (n,) is the standard uncertainty that a point has besides the measurement's."""
         shared = np.hypot(self.systematic, others)
         return _reach(self.sd, shared, self.components, self.rows)
 
     def worst(self, shared: Floats) -> int:
-        """The index of the largest |E| + 2 u_val, `shared` (n,) being the rest of u_val."""
+        """Return the index of the largest |E| + 2 u_val, `shared` (n,) being the rest of u_val."""
         return int(np.argmax(np.abs(self.E) + 2 * np.hypot(self.u_D, shared)))
 
 
 def errors_of(residual: Residual, statistic: Statistic = "every") -> PointErrors:
-    """The errors that are judged of a residual (k, c): of every row, of their rms, or their mean.
+    """Return the errors that are judged of a residual (k, c): of every row, of their rms, or their
+    mean.
 
     A row of one component is signed; the length of a row of more components is not.
     """
@@ -313,7 +315,7 @@ def judge(
 
 
 def name_of(residual: Residual, statistic: Statistic) -> str:
-    """The name of the check: of many points with what of them is judged."""
+    """Return the name of the check: of many points with what of them is judged."""
     if residual.count == 1:
         return residual.name
     return f"{residual.quantity}.{_STATISTICS[statistic]}@{residual.load}"

@@ -1,4 +1,4 @@
-"""A view: which rows of the long table are shown, how they are arranged, and how it is drawn.
+"""View: declaration of a table, chart or sentence over rows of the long table.
 
 View("late_error", "Error at the last markers", {"part": "score", "quantity": "marker.*",
      "statistic": "rms"}, form="lines", x="at", by="method", unit="mm")
@@ -83,7 +83,8 @@ class View:
 
     @classmethod
     def from_json(cls, found: Mapping[str, Any]) -> "View":
-        """The view that `to_json` wrote; lists are tuples. Raises `UsageError` as `View` does."""
+        """Return the view that `to_json` wrote; lists are tuples. Raises `UsageError` as `View`
+        does."""
         return cls(**{k: _tuples(v) for k, v in found.items()})
 
 
@@ -99,5 +100,5 @@ def texts(one: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def view_faults(part: Any) -> str:
-    """What keeps an object from being a view; "" for nothing."""
+    """Return the reason why an object is no view; "" for none."""
     return "" if isinstance(part, View) else f"{part!r:.60}: expected a validate.report.View"

@@ -1,4 +1,4 @@
-"""Recordings made by others: where their files are here, and how they come here."""
+"""Third-party data sets: registry, local folders and download."""
 
 from validate.exports import lazily, names
 

@@ -1,4 +1,4 @@
-"""Files of a data set brought from their addresses into the cache: whole and checked, or not."""
+"""Download of a data set into the cache, complete and with checked hashes."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Where the files of a data set are here: a shared folder, the project's neighbour, the cache."""
+"""Local folder of a data set: shared folder, neighbour of the project, or cache."""
 
 import os
 from hashlib import sha256

@@ -1,4 +1,4 @@
-"""The table of data sets: addresses by commit, licences, citations, hashes. No file of theirs."""
+"""Registry of data sets: addresses by commit, licences, citations, hashes. It holds no data."""
 
 import tomllib
 from dataclasses import dataclass

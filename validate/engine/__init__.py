@@ -1,4 +1,4 @@
-"""The engine under every run and study: cells with a key, a store on disk, workers.
+"""Engine of runs and studies: cells with a key, a store on disk, workers.
 
 A cell is a small description of one computation; its key names everything its value rests on.
 `execution` looks the keys up in the store, computes what is missing, here or on workers, and keeps

@@ -1,4 +1,4 @@
-"""What flows through the engine: cells, the plan that computes them, and their records."""
+"""Types of the engine: cells, plans and records."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Cells on Dask: a local cluster on loopback, or a scheduler that already runs."""
+"""Cells on Dask: a local cluster on loopback, or an existing scheduler."""
 
 import logging
 import os
@@ -92,7 +92,7 @@ def _local_cluster(count: int) -> Iterator[Any]:
 def side_by_side(
     client: Any, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
 ) -> Callable[[], list[Any]]:
-    """Begins `function(shared, item)` of every item on all workers, each as soon as one is free."""
+    """Begin `function(shared, item)` of every item on all workers, each as soon as one is free."""
     there = client.scatter(shared, broadcast=True, hash=False)
     sent = [client.submit(function, there, item, pure=False, retries=0) for item in items]
 

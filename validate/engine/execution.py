@@ -1,4 +1,4 @@
-"""Execution of cells: compute those that the store does not hold, and keep each as it finishes.
+"""Execution of cells: compute those that are not stored, and store each at once.
 
 Whoever plans cells says how a worker opens the job and runs a cell, and reads the records. Cells
 whose time is measured run with little or nothing beside them.
@@ -53,7 +53,7 @@ def finish(
     report: Report | None = None,
     done: Done | None = None,
 ) -> Finished[R]:
-    """Computes the cells that are not in `folder` yet, keeping each as it is finished; `done` is
+    """Compute the cells that are not in `folder` yet, keeping each as it is finished; `done` is
     told of each, too.
 
     A `Pool` is left open for the next plan. Raises `UsageError` when no scheduler answers, and what

@@ -1,4 +1,4 @@
-"""Identity of the code that makes a cell's numbers: package, libraries, the user's files.
+"""Hash of the code behind a cell's numbers: package, libraries, the user's files.
 
 A worker may be another installation, or one that was changed since it started. It proves by these
 hashes that it computes what the calling process would, before it runs a cell and with each

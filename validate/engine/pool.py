@@ -1,4 +1,4 @@
-"""Where cells run, for as long as a command lasts: this process, local workers or a scheduler."""
+"""Pool of workers of one command: this process, local workers or a scheduler."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -64,7 +64,7 @@ class Pool:
             serve(self._preload)
 
     def begin(self, most: int | None = None) -> None:
-        """Starts the workers in the background, at most so many."""
+        """Start the workers in the background, at most so many."""
         if self._starting or not self.used:
             return
         self._count = self.workers if most is None else min(self.workers, most)
@@ -73,7 +73,7 @@ class Pool:
         self._starting.start()
 
     def client(self, most: int | None = None) -> Any:
-        """The client of the workers, started where they are not; waits for them.
+        """Return the client of the workers, started where they are not; waits for them.
 
         Raises `UsageError` when the scheduler cannot be reached.
         """
@@ -87,7 +87,7 @@ class Pool:
     def beside(
         self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
     ) -> Callable[[], list[Any]]:
-        """Begins to apply a function of a module to `shared` and each item, on local workers where
+        """Begin to apply a function of a module to `shared` and each item, on local workers where
         some have started; what it returns waits for the values, in order.
 
         Without workers, and where one dies, an item is done in this process when it is asked for.

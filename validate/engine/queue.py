@@ -1,4 +1,4 @@
-"""Cells that wait, taken by workers and by the calling process at once."""
+"""Queue of waiting cells, shared by workers and the calling process."""
 
 import threading
 from collections import deque

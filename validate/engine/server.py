@@ -1,4 +1,4 @@
-"""The process that local workers are forked from: what they need is imported there, once.
+"""Fork server of local workers: libraries are imported there once.
 
 It starts in a clean environment (`child_process`), with one thread for numerical libraries, and
 deaf to Ctrl-C, which its parent answers. It has no output: a pipe behind the command would wait for
@@ -26,7 +26,7 @@ _OF_WORKERS = {
 
 
 def serve(preload: Sequence[str]) -> None:
-    """Starts the process where it does not run yet; what it cannot import each worker imports."""
+    """Start the process where it does not run yet; what it cannot import each worker imports."""
     set_forkserver_preload(["distributed", *preload])
     with isolating_environment(), _deaf_to_interrupts(), _without_output():
         os.environ.update(_OF_WORKERS)

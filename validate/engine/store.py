@@ -1,5 +1,4 @@
-"""What is kept of cells: a JSON file each, its arrays in a .npz beside it, under a key of all that
-makes its numbers."""
+"""Store of cells: one JSON file each, arrays in .npz, under a key of all inputs of its numbers."""
 
 import hashlib
 import io
@@ -34,7 +33,7 @@ def key_of(*content: Any) -> str:
 
 
 def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:
-    """Writes <key>.json whole or not at all, sealed, and before it the arrays that it names; `cell`
+    """Write <key>.json whole or not at all, sealed, and before it the arrays that it names; `cell`
     is for whoever reads the file."""
     arrays: Arrays = {}
     content = {"cell": _finite(cell, {}), "record": _finite(record, arrays)}
@@ -49,7 +48,7 @@ def write_record(folder: Path, cell: Any, record: Record[Any]) -> None:
 
 
 def oldest_removed(folder: Path, most: int) -> None:
-    """Removes the oldest files of a folder of records until at most so many bytes are left."""
+    """Remove the oldest files of a folder of records until at most so many bytes are left."""
     files = sorted(folder.glob("*.*"), key=lambda f: f.stat().st_mtime, reverse=True)
     total = 0
     for file in files:
@@ -67,7 +66,7 @@ class StoredRecords(Generic[R]):
 
 
 def read_records(folder: Path, keys: Iterable[str], kind: type[R], code: str) -> StoredRecords[R]:
-    """The records that the code of that hash finished before.
+    """Return the records that the code of that hash finished before.
 
     A file that is not whole, or was changed after it was written, counts as not finished, and so
     does one of another code.

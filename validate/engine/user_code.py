@@ -1,4 +1,4 @@
-"""Code that a user wrote in a script or notebook: its hash, and its way to a worker.
+"""Transfer of a user's code from a script or notebook to workers, and its hash.
 
 Classes and functions of `__main__`, of a cell and of plain modules cannot be imported by a worker,
 so they are sent with their code. The hash is of the code, of what it refers to and of values that

@@ -1,4 +1,4 @@
-"""The values that a worker keeps between cells: the last few by key."""
+"""Cache of a worker between cells: the last few values by key."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Filters: a system and its measurements give an estimate with its uncertainty, never the truth."""
+"""Filters: estimates with uncertainty from a system and its measurements, without the truth."""
 
 from validate.exports import lazily, names
 

@@ -1,4 +1,4 @@
-"""Does a filter know how wrong it is? Innovations, NIS and NEES against chi-square.
+"""Filter consistency: innovations, NIS and NEES against chi-square.
 
 For a consistent filter NIS = y^T S_yy^-1 y is chi-square with as many degrees of freedom as
 components were measured, and innovations are white; NEES = e^T P^-1 e likewise over the states

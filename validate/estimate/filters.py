@@ -1,4 +1,4 @@
-"""Every filter: the package's own, those of plug-ins and those that a script adds.
+"""Registry of filters: built-in ones, plug-ins and those of scripts.
 
 A new one of the package is one file beside this and its name here.
 """

@@ -59,14 +59,14 @@ class NoiseSettings:
 
 
 def gate_setting() -> Any:
-    """The field of every filter for its gate."""
+    """Return the field of every filter for its gate."""
     return quantity(
         None, "1", "share of a marker's good samples that pass, e.g. .999; none: no gate"
     )
 
 
 def clock_setting() -> Any:
-    """The field of every filter for the clock of its measurements."""
+    """Return the field of every filter for the clock of its measurements."""
     return quantity(None, "s", "sd of a sample's time stamp; none: that of the recording's clock")
 
 
@@ -161,8 +161,8 @@ class Care:
 def gated_out(
     found: Innovation, offered: Floats, predicted: Floats, gated: Gated | None
 ) -> Innovation:
-    """The innovation with the differences y of rejected samples too: they were measured; their sd
-    stays zero."""
+    """Return the innovation with the differences y of rejected samples too: they were measured;
+    their sd stays zero."""
     y = np.where(np.isfinite(offered), offered - predicted, 0.0)
     return replace(found, y=y, gated=gated)
 
@@ -174,7 +174,8 @@ def _squared(y: Floats, S: Floats) -> float:
 def care_of(
     measurements: Measurements, gate: float | None, clock: float | None, dt: float
 ) -> Care | None:
-    """The care that settings ask for, steps of dt s; None where there is neither gate nor doubt.
+    """Return the care that settings ask for, steps of dt s; None where there is neither gate nor
+    doubt.
 
     Raises `UsageError` for a gate that is no share, and for a time that is none.
     """
@@ -194,7 +195,7 @@ def care_of(
 
 
 def gate_numbers(care: Care | None, seen: Innovation) -> Mapping[str, float]:
-    """What the gate of a step has to tell; nothing without one."""
+    """Return the numbers of a step's gate; nothing without one."""
     return {} if care is None else care.numbers(seen.gated)
 
 

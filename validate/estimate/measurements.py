@@ -1,4 +1,4 @@
-"""What a filter is given: measurements of displacements, and the steps on which they land."""
+"""Measurements of a filter: displacements, and the time steps that they belong to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -69,8 +69,8 @@ class Measurements:
         return self._only(np.array([i for i, owner in enumerate(owners) if owner in markers]))
 
     def moving(self, free: Ints) -> "Measurements":
-        """The components that any free unknown moves: what is held or driven teaches a filter
-        nothing, and its noise would count as degrees of freedom.
+        """Return the components that any free unknown moves: what is held or driven teaches a
+        filter nothing, and its noise would count as degrees of freedom.
 
         Raises `ComparisonError` when nothing is left.
         """
@@ -107,7 +107,7 @@ class Timetable:
     missing: int = 0
 
     def at(self, step: int) -> Floats | None:
-        """What was measured at a step, NaN = missing; None where nothing was: predict only."""
+        """Return the measurement of a step, NaN = missing; None without one: predict only."""
         return self.z.get(step)
 
     def unheard(self, steps: int, numbers: Sequence[Mapping[str, float]]) -> str:
@@ -134,7 +134,7 @@ class Timetable:
 
 
 def timetable(measurements: Measurements, dt: float) -> Timetable:
-    """Lands every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
+    """Land every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
 
     Raises `ComparisonError` when one lies further off than a hundredth of a step (here a
     measurement is not interpolated) or two share a step.
@@ -237,7 +237,8 @@ def _of_markers(seen: MarkerObservation, registered: Registered, mesh: Mesh) -> 
 
 
 def on_steps(t: Floats, z: Floats, sd: Floats, steps: Floats) -> tuple[Floats, Floats, Floats]:
-    """Looks z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and `steps` (n,).
+    """Return measurements z (nt, m) at t (nt,) s of sd (m,), interpolated onto the nearest of 0 and
+    `steps` (n,).
 
     Only of times that jitter: those that a smaller step meets are left as they are, for the filter
     says which. What that adds to sd: `interpolated`. Steps beyond the looks get none.

@@ -1,4 +1,4 @@
-"""Smoothing of a recorded run: every step estimated from all looks, the later ones too.
+"""Smoothing of a recorded run: every step estimated from all measurements, later ones too.
 
 Rauch, Tung & Striebel (1965), in the form of Bryson & Frazier (1963), whose results are the same
 and which inverts no P: ours is singular wherever the start is known or noise acts along few shapes.
@@ -32,14 +32,14 @@ _LEFT = 1e-12  # singular values of W, of the largest, that are left out of more
 
 
 def smooth_setting() -> Any:
-    """The field of every filter that can smooth."""
+    """Return the field of every filter that can smooth."""
     return quantity(
         False, "1", "estimate each step from all measurements, also later ones; not in real time"
     )
 
 
 class Transition(Protocol):
-    """How errors (n,) of a state go on; Q and P0 (n, n) as of the filter, H (m, n)."""
+    """Transition of errors (n,) of a state; Q and P0 (n, n) as of the filter, H (m, n)."""
 
     @property
     def Q(self) -> Floats: ...
@@ -51,7 +51,7 @@ class Transition(Protocol):
     def H(self) -> Floats: ...
 
     def ahead(self, x: Floats) -> Floats:
-        """A x."""
+        """Return a x."""
         ...
 
     def back(self, x: Floats) -> Floats:
@@ -89,7 +89,7 @@ class Smoothed:
     roots: Mapping[int, Floats]
 
     def after(self, step: int) -> Floats:
-        """The correction (n,) of the state after a step 1, 2, ..."""
+        """Return the correction (n,) of the state after a step 1, 2, ..."""
         return np.asarray(self.corrections[step - 1])
 
 
@@ -143,6 +143,6 @@ def _forward(model: Transition, notes: Sequence[Note], away: Floats, kept: Float
 
 
 def require_exact(smooth: bool, gains: str) -> None:
-    """Raises `UsageError` for smoothing by gains that are not those of the filter's own P."""
+    """Raise `UsageError` for smoothing by gains that are not those of the filter's own P."""
     if smooth and gains == "steady":
         raise UsageError("smooth needs the exact gains: take gains='sequence'")

@@ -1,4 +1,4 @@
-"""Scene -> matrices. scikit-fem assembles; unknowns are node-major (x0 y0 z0 x1 ...)."""
+"""Finite elements: matrices of a scene by scikit-fem; unknowns are node-major (x0 y0 z0 x1 ...)."""
 
 from validate.exports import lazily, names
 

@@ -32,12 +32,13 @@ class CavitySurface:
     nodes: Ints
 
     def local(self) -> Ints:
-        """The facets (f, m) in positions of `nodes`."""
+        """Return the facets (f, m) in positions of `nodes`."""
         return np.searchsorted(self.nodes, self.facets)
 
 
 def cavity_surface(mesh: Mesh, name: str, facets: str) -> CavitySurface:
-    """The named facet set as a cavity; raises `SceneError` when open, flipped or inside out."""
+    """Return the named facet set as a cavity; raises `SceneError` when open, flipped or inside
+    out."""
     surface = CavitySurface(name, mesh.facets[facets], mesh.facet_nodes(facets))
     (_require_closed_line if mesh.dimension == 2 else _require_closed)(surface)
     volume = volume_of(surface, mesh.nodes)

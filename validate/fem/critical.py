@@ -1,4 +1,4 @@
-"""How large a step central difference may take: 2/omega_max, and what bounds it.
+"""Critical time step of central difference, 2/omega_max, and bounds of it.
 
 Sources: Lanczos (1950) on M^-1/2 K M^-1/2; paper 003, eq 16; Gershgorin's circles; the largest
 element frequency (Irons & Treharne 1971), which bounds omega_max where masses add up by cells.
@@ -136,7 +136,7 @@ def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float,
 
 
 def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
-    """A safe step s: omega_max^2 <= max_i sum_j |K_ij| / m_i."""
+    """Return a safe step s: omega_max^2 <= max_i sum_j |K_ij| / m_i."""
     sums = np.asarray(abs(K).sum(axis=1)).ravel()
     return 2 / float(np.sqrt((sums / masses).max()))
 

@@ -1,4 +1,4 @@
-"""The warnings that linear elements lock: near incompressibility, and in bending."""
+"""Warnings of locking of linear elements: near incompressibility, and in bending."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

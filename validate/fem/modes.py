@@ -1,4 +1,4 @@
-"""Mode shapes, frequencies and dampings of a system: K phi = w^2 M phi."""
+"""Mode shapes, frequencies and damping ratios of a system: K phi = w^2 M phi."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Modes:
 
 
 def modes_of(system: System, count: int | None = None) -> Modes:
-    """The lowest modes, with the whole of the last cluster of equal frequencies.
+    """Return the lowest modes, with the whole of the last cluster of equal frequencies.
 
     They are kept with the system. Raises `SceneError` for more modes than unknowns or a C that they
     do not make diagonal.

@@ -1,4 +1,4 @@
-"""Whether anything lets a body move rigidly: the rank of its rigid motions on what is held."""
+"""Rigid-body motions of a supported body: rank of its constraints."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _SHOWN = 0.3  # share of a motion's largest component from which it is named
 
 
 def require_held(scene: Scene, held: Ints, more: Floats | None = None, hint: str = "") -> None:
-    """Raises `SceneError` that names the rigid motions that the unknowns `held` (h,), foundations
+    """Raise `SceneError` that names the rigid motions that the unknowns `held` (h,), foundations
     and the rows `more` (m, N) leave free."""
     mesh = scene.mesh
     modes, words = rigid_motions(mesh)

@@ -1,4 +1,4 @@
-"""The system of a scene: stiffness, held unknowns, factorisation, and its response columns.
+"""System of a scene: stiffness, constrained unknowns, factorisation, response columns.
 
 A linear scene with drives and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
 + sum_i P_i u_i. They are solved for once; every later step is a short product (the columns of the
@@ -115,7 +115,7 @@ class Responses:
 
 
 def build(scene: Scene) -> System:
-    """Assembles the scene; raises `SceneError` for elements, supports or cavities that fail."""
+    """Assemble the scene; raises `SceneError` for elements, supports or cavities that fail."""
     mesh = scene.mesh
     N = mesh.nodes.size
     held = np.zeros(N, dtype=bool)
@@ -152,7 +152,7 @@ def build(scene: Scene) -> System:
 
 
 def responses(system: System) -> Responses:
-    """Solves for every response column: one factorisation, one solve per input.
+    """Solve for every response column: one factorisation, one solve per input.
 
     Raises `SceneError` for a law at large strain: its fields are no sums of columns.
     """

@@ -1,4 +1,4 @@
-"""Parameters from recordings, each with its uncertainty and the samples it came from."""
+"""Identification of parameters from recordings, each with its uncertainty and samples."""
 
 from validate.exports import lazily, names
 

@@ -1,4 +1,4 @@
-"""Uncertainty budget of an identified value, after GUM (JCGM 100): terms, factor, interval.
+"""Uncertainty budget of an identified value after GUM (JCGM 100): terms, factor, interval.
 
 from validate.identify.budget import IdentifiedValue
 E = IdentifiedValue("material.E", 25e3, "Pa", "neo_hooke", "force@fit", {"noise": 90.0}, 200)

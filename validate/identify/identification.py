@@ -1,4 +1,4 @@
-"""What a recording says of parameters: values, 95 % intervals, correlations, and what it does not.
+"""Identification result: values, 95 % intervals, correlations, unidentifiable parameters.
 
 `identify` asks for fits from seeded starts, then for both sides of every parameter's profile;
 whoever evaluates them may do so side by side. "Not identifiable" is a result: an interval wider
@@ -182,8 +182,8 @@ class Identification:
 
 
 def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1) -> Identification:
-    """The identification from so many seeded starts, with a profile of every parameter; in closed
-    form where the residual is linear in the only one.
+    """Return the identification from so many seeded starts, with a profile of every parameter; in
+    closed form where the residual is linear in the only one.
 
     Raises `ComparisonError` when no start converges, or fewer residuals than parameters are there.
     """
@@ -213,7 +213,7 @@ def misfit(best: Fit) -> float:
 
 
 def best_of(fits: Sequence[Fit], space: Space) -> Fit:
-    """The lowest of those that converged; raises `ComparisonError` where none has."""
+    """Return the lowest of those that converged; raises `ComparisonError` where none has."""
     ended = [f for f in fits if f.converged]
     if not ended:
         least = min(fits, key=lambda f: (f.count == 0, f.chi_square))

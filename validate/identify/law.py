@@ -1,4 +1,4 @@
-"""A law's modulus over its whole range: the scale of a unit curve that fits the measured force."""
+"""Modulus of a law over its whole range: scale of a unit curve that fits the measured force."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

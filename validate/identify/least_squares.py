@@ -1,4 +1,4 @@
-"""Bounded least squares over a callable residual that is dear: scipy's trust region, few calls.
+"""Bounded least squares of an expensive residual: scipy's trust region with few calls.
 
 The Jacobian is taken by differences once and then follows the steps (Broyden 1965); where the
 optimiser stops it is taken anew, and what that promises decides whether the end is one.
@@ -160,7 +160,7 @@ def followed(r: CalledOnce, at: At, y: Floats, J: Floats | None) -> tuple[Floats
 
 
 def settled(r: Floats, J: Floats, y: Floats) -> bool:
-    """Whether a full step would lower |r|^2 by next to nothing, for its size."""
+    """Return whether a full step would lower |r|^2 by next to nothing, for its size."""
     spread = max(1.0, float(r @ r) / max(1, len(r) - len(y)))
     return promised(r, J, y) <= PROMISE * spread
 
@@ -172,7 +172,8 @@ def promised(r: Floats, J: Floats, y: Floats) -> float:
 
 
 def fit(residual: Residual, start: Floats) -> Fit:
-    """The minimum that one start (p,) leads to; a start where nothing can be simulated is none."""
+    """Return the minimum that one start (p,) leads to; a start where nothing can be simulated is
+    none."""
     r = CalledOnce(residual)
     try:
         x, J, converged = minimised(r, lambda y: y, np.asarray(start, dtype=np.float64))

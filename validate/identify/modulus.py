@@ -1,4 +1,4 @@
-"""The apparent compressive modulus of a cylinder from force-displacement logs.
+"""Apparent compressive modulus of a cylinder from force-displacement logs.
 
 Definition. Stress is F / A0 and strain (d - d_contact) / h0 (engineering, on the undeformed
 cylinder). E_apparent is the least-squares slope of stress over strain, with free intercept, over
@@ -86,7 +86,7 @@ class ModulusSummary:
 
 
 def cylinder_of(recording: Recording) -> CylinderSize:
-    """The cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
+    """Return the cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
 
     Raises `RecordingError` when one of them is absent or not a number.
     """
@@ -224,7 +224,7 @@ def stated_test(recording: Recording) -> str:
 
 
 def require_test(recording: Recording, test: TestKind) -> None:
-    """Raises `RecordingError` for a recording that says of itself that it is the other test."""
+    """Raise `RecordingError` for a recording that says of itself that it is the other test."""
     said = stated_test(recording)
     if said and said != test:
         presses = "presses" if test == "compression" else "pulls"

@@ -1,4 +1,4 @@
-"""Profiles: how chi-square rises when one parameter is moved and all others are fitted again.
+"""Profile likelihood: chi-square with one parameter fixed and all others refitted.
 
 Where it has risen by the 95 % point of chi-square with one degree of freedom (3.84, times the
 misfit where the model does not fit) lies the end of the interval: the likelihood ratio's. It is

@@ -1,4 +1,4 @@
-"""What a recording's motion is: its size, direction and frequencies, where it rests, its gaps.
+"""Motion of a recording: amplitude, direction, frequencies, rest intervals, gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
 first principal axis of its displacements); of outlines that of places at every 10 degrees about the
@@ -90,8 +90,8 @@ class RecordedMotion:
         return float(np.sqrt(max(power[kept].sum() - _ABOVE_NOISE**2 * noise, 0.0)))
 
     def inertia_matters(self, first: float | None) -> bool:
-        """Whether statics misses a part of this motion of a body with its first natural frequency
-        at `first` Hz; unknown: whether it rings down."""
+        """Return whether statics misses a part of this motion of a body with its first natural
+        frequency at `first` Hz; unknown: whether it rings down."""
         if first is None:
             found = self.ringing
             return found is not None and 0.002 < found.damping < 0.5 and (
@@ -101,7 +101,7 @@ class RecordedMotion:
 
 
 def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
-    """The motion of a topic; none: of the first markers, else signal in m, else outlines.
+    """Return the motion of a topic; none: of the first markers, else signal in m, else outlines.
 
     Raises `ComparisonError` where there are none, or nothing moves.
     """
@@ -120,7 +120,8 @@ def motion_of(recording: Recording, topic: str | None) -> RecordedMotion:
 
 
 def motion_in(topic: str, stream: object) -> RecordedMotion:
-    """The motion of one stream; raises `ComparisonError` for images, and where nothing moves."""
+    """Return the motion of one stream; raises `ComparisonError` for images, and where nothing
+    moves."""
     if isinstance(stream, Markers):
         named = {name: stream.x[:, j] for j, name in enumerate(stream.names)}
         return recorded_motion(stream.t, named, stream.sd)

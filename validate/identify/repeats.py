@@ -1,4 +1,4 @@
-"""Several logs of one test, of one specimen or several, as one recording: their mean and scatter.
+"""Repeated tests of one or several specimens as one recording: mean and scatter.
 
 Each log is counted from contact, its cell's offset taken off, and its first loading is read at
 displacements that all share. Every specimen has one vote. The logs themselves stay beside.
@@ -36,8 +36,8 @@ class Loading:
 
 
 def labels_of(said: str | None, logs: Sequence[Recording]) -> tuple[str, ...]:
-    """The specimen of each log, as the user says; raises `UsageError` where nobody says it, and for
-    recordings that are no logs of a testing machine."""
+    """Return the specimen of each log, as the user says; raises `UsageError` where nobody says it,
+    and for recordings that are no logs of a testing machine."""
     names = [log.name for log in logs]
     for log in logs:
         if not {"displacement", "force"} <= set(log.signals) or "specimen" not in log.metadata:

@@ -1,4 +1,4 @@
-"""Whether what a fitted curve leaves of a force is noise or has a shape: an F test.
+"""Lack-of-fit F test: is the residual of a fitted curve noise or a systematic shape?
 
 A wrong law leaves a residual that bends smoothly with the load. Legendre polynomials of degree 2
 to 4, freed of what the fit itself can follow, are fitted to the residual; their mean square over

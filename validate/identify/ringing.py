@@ -1,4 +1,4 @@
-"""The frequency and damping at which something rings down, by separable least squares.
+"""Frequency and damping of a free decay, by separable least squares.
 
 y = a + b t + c t^2 + exp(-d t) (p cos w t + s sin w t): the five factors are linear and solved for
 at every w and d (variable projection, Golub & Pereyra 1973), so that only two are searched, from

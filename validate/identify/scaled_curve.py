@@ -1,4 +1,4 @@
-"""Closed-form fit of a modulus: the scale of a law's unit curve, and where its load begins.
+"""Closed-form fit of a modulus: scale of a law's unit curve, and the start of its load.
 
 A law whose force is proportional to its modulus needs one solution with a unit modulus: the modulus
 is the scale that fits the measured force, a linear least-squares problem. Where the load begins is
@@ -34,7 +34,7 @@ _POINTS = 8  # of a side that charts show
 
 
 def linear_fit(residual: Residual, space: Space) -> Fit:
-    """The minimum of a residual that is linear in the one parameter of a space.
+    """Return the minimum of a residual that is linear in the one parameter of a space.
 
     One that is not linear, that cannot be evaluated across the range, or whose minimum lies outside
     of it has not converged, and `why` says so.
@@ -114,7 +114,7 @@ class UnitCurve:
         return np.where(d > 0, self._spline(d, 1), 0.0)
 
     def scaled(self, force: float = 1.0, displacement: float = 1.0) -> "UnitCurve":
-        """The curve with both axes stretched."""
+        """Return the curve with both axes stretched."""
         return replace(self, d=displacement * self.d, force=force * self.force)
 
     @property
@@ -169,8 +169,8 @@ def fit_scaled(
     shifted: bool = False,
     start: float = 0.0,
 ) -> ScaledFit:
-    """The scale, and where `shifted` the shift, by least squares over n samples; `start` m is where
-    the search for the shift begins.
+    """Return the scale, and where `shifted` the shift, by least squares over n samples; `start` m
+    is where the search for the shift begins.
 
     The sd of a sample is what the residuals show, or `sd` (N, of the sensor) where that is larger.
     Raises `ComparisonError` for fewer samples than parameters and one, for a curve that is zero,
@@ -237,7 +237,7 @@ def _shifted(curve: UnitCurve, d: Floats, force: Floats, shift: float) -> tuple[
 
 
 def fit_proportional(f: Floats, force: Floats, *, sd: float = 0.0) -> ScaledFit:
-    """The scale of f (n,), the force of a unit modulus, that fits `force` (n,) N.
+    """Return the scale of f (n,), the force of a unit modulus, that fits `force` (n,) N.
 
     Raises what `fit_scaled` does.
     """
@@ -268,7 +268,7 @@ def fit_modulus_of(
     fit: Callable[[UnitCurve], ScaledFit],
     E: float,
 ) -> tuple[UnitCurve, ScaledFit, int]:
-    """The curve, its fit, and the number of solutions, from a first modulus `E`.
+    """Return the curve, its fit, and the number of solutions, from a first modulus `E`.
 
     A second solution at the modulus found checks whether force is proportional to it: then the
     closed form stands. Otherwise the fit is repeated at each modulus found. Raises

@@ -1,4 +1,4 @@
-"""The box that is searched: every parameter between its bounds, as a number from 0 to 1."""
+"""Search box of an identification: every parameter between its bounds, mapped to [0, 1]."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Residuals as independent numbers of variance one: r -> C^(-1/2) r, C = sd^2 I + s^2 1 1^T.
+"""Whitening of residuals: r -> C^(-1/2) r, C = sd^2 I + s^2 1 1^T.
 
 What all points of one component share (registration, a clock) is one number of covariance s^2
 between any two of them: many points do not average it out.

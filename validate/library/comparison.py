@@ -1,4 +1,4 @@
-"""Stored runs compared, score by score."""
+"""Comparison of stored runs, score by score."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""One run with its report: what the command `validate run` and the function `run` share."""
+"""One run with its report: common part of `validate run` and the function `run`."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -28,7 +28,7 @@ Progress = Callable[[str], AbstractContextManager[Report]]  # of a title: what w
 
 @contextmanager
 def no_progress(title: str) -> Iterator[Report]:
-    """Show nothing of what the work reports."""
+    """Yield a callback that ignores all progress."""
     yield lambda done, total, what: None
 
 
@@ -85,7 +85,7 @@ def reported_run(
 
 
 def warn_of_units(experiment: Experiment, options: Options) -> None:
-    """Warn of each value that looks like one whose unit was forgotten."""
+    """Warn of each value that probably lacks a unit."""
     for line in doubtful(experiment, options.values):
         LOG.warning(line)
 

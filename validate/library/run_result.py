@@ -1,4 +1,4 @@
-"""A stored run as an object: verdict, checks, table, fields, figures."""
+"""Result of a stored run: verdict, checks, table, fields, figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -50,7 +50,7 @@ class RunCheck:
 
 @dataclass(frozen=True, repr=False)
 class RunResult:
-    """One stored run: what `run` returns, and `open_run` for a run of earlier.
+    """One stored run, as `run` and `open_run` return it.
 
     It holds verdict, checks and parameters; tables, fields and figures are read from `folder` when
     they are asked for. It can be pickled; the folder has to be there where it is used again. A

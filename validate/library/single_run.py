@@ -61,5 +61,5 @@ def as_texts(values: Mapping[str, Value] | None) -> dict[str, str]:
 
 
 def set_words(texts: Mapping[str, str]) -> tuple[str, ...]:
-    """The words of a command that sets these values."""
+    """Return the words of a command that sets these values."""
     return tuple(word for path, v in texts.items() for word in ("--set", f"{path}={v}"))

@@ -1,4 +1,4 @@
-"""The studies: what `validate study`, `validate identify` and the function `study` share.
+"""Studies: common part of `validate study`, `validate identify` and the function `study`.
 
 Each returns what it found and the page that it wrote; an interruption keeps finished cells.
 """
@@ -55,7 +55,7 @@ class StudySettings:
 
 @dataclass(frozen=True)
 class Studied(Generic[F]):
-    """What a study found, and the path of its report.html."""
+    """Result of a study, and the path of its report.html."""
 
     found: F
     page: Path
@@ -171,7 +171,7 @@ def coverage_of_verdicts(
     noise: float = 1.0,
     values: Mapping[str, str] | None = None,
 ) -> Studied[Coverage]:
-    """Measure how often verdicts are right on `draws` simulated recordings; `noise` is the ratio
+    """Measure the share of right verdicts on `draws` simulated recordings; `noise` is the ratio
     of real to declared noise."""
     options = Options(dict(values or {}), (), settings.quick)
     warn_of_units(experiment, options)

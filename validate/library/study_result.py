@@ -1,4 +1,4 @@
-"""A stored study as an object: answer, table of cells, figures."""
+"""Result of a stored study: answer, table of cells, figures."""
 
 import csv
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class StudyResult:
-    """One finished study: its answer, and what `folder` holds of it.
+    """One finished study: its answer, and the content of its `folder`.
 
     `found` is the answer in SI as `results.json` has it under "study". It can be pickled.
     """

@@ -1,4 +1,4 @@
-"""A view of a stored run: text, a part of a notebook's page, figures, or a file."""
+"""View of a stored run as text, part of a notebook's page, figures, or a file."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""An experiment and the pipeline from its recording to a comparison.
+"""Experiment and pipeline: from a recording to a comparison.
 
 from validate.pipeline import load, run_in_memory
 result = run_in_memory(load("fluid_phantom"), {"material.E": "14000"})
@@ -49,7 +49,8 @@ __all__ = [
 
 
 def load(name: str) -> Experiment:
-    """The experiment of that name, or of that file; raises `UsageError` naming the nearest."""
+    """Return the experiment of that name, or of that file; raises `UsageError` naming the
+    nearest."""
     return find(name, Path.cwd())
 
 

@@ -1,4 +1,4 @@
-"""Trial solvers of a block that swings, held at one end and compared at the other."""
+"""Trial solvers of a swinging block, clamped at one end and compared at the other."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,7 +28,7 @@ def swinging_trial(
     quick: bool,
     noise: tuple[float, str] | None = None,
 ) -> Trial:
-    """A block of the scene `base` on meshes of `per` x level cells, held where it is there.
+    """Return a block of the scene `base` on meshes of `per` x level cells, held where it is there.
 
     `per` is 1 but along the longest edge, at whose free end points are compared.
     """

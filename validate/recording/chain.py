@@ -1,5 +1,4 @@
-"""Frames along a chain of transforms: whether they turn as bodies do, and whether two ways from one
-frame to another say the same.
+"""Chains of coordinate transforms: proper rotations, and consistency of two paths.
 
 A pose `<X>To<Y>/rotation`, `/translation`, or `<X>/...` in the frame Y, is T_Y_from_X. One pose
 alone stands for all times. Poses that link frames anew make a tree; each other one closes a way,
@@ -77,7 +76,7 @@ def chain_faults(recording: Recording) -> Iterator[str]:
 
 
 def require_chain(recording: Recording) -> None:
-    """Raises `RecordingError` with the first fault of the recording's frames."""
+    """Raise `RecordingError` with the first fault of the recording's frames."""
     for fault in chain_faults(recording):
         raise RecordingError(f"{recording.name}: {fault}")
 

@@ -1,4 +1,4 @@
-"""What must be read from a recording, in short: the JSON that lies beside a twin's file.
+"""Digest of a twin's recording: short JSON beside its file.
 
 Every array is held by shape, first and last row, sum and a SHA-256 of its little-endian bytes. The
 hash is what must be equal; the rest tells a reader of a failed comparison what has changed.
@@ -33,7 +33,7 @@ def digest(recording: Recording) -> Json:
 
 
 def to_text(found: Json) -> str:
-    """The digest as JSON, a line for each array and each metadata record."""
+    """Return the digest as JSON, a line for each array and each metadata record."""
     return "\n".join(_lines(found, 0)) + "\n"
 
 

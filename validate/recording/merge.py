@@ -1,4 +1,4 @@
-"""Files of one test with clocks of their own become one recording on the clock of the first.
+"""Merge of recordings of one test onto the clock of the first.
 
 The streams of a further file share one clock, so one offset moves all of them. Whether that clock
 also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1),
@@ -121,7 +121,8 @@ def _left(reference: Signal, stream: Signal, start: float, middle: float) -> tup
 
 
 def with_drift(offset: Offset, drift: ClockDrift | None) -> Offset:
-    """The offset with what an uncorrected drift makes of it: a ramp of that height, root 12."""
+    """Return the offset with what an uncorrected drift makes of it: a ramp of that height, root
+    12."""
     if drift is None or not drift.seen:
         return offset
     return replace(offset, sd=float(np.hypot(offset.sd, drift.apart / np.sqrt(12))))
@@ -132,7 +133,7 @@ def stretched_signal(signal: Signal, drift: ClockDrift) -> Signal:
 
 
 def stretched(recording: Recording, drift: ClockDrift) -> Recording:
-    """The recording with its times t + rate (t - middle)."""
+    """Return the recording with its times t + rate (t - middle)."""
     streams = {
         topic: replace(s, t=s.t + drift.rate * (s.t - drift.middle))
         for topic, s in recording.streams.items()
@@ -172,7 +173,7 @@ def _drift_records(others: Sequence[Moved]) -> dict[str, dict[str, str]]:
 
 
 def require_other_topics(recordings: Sequence[Recording]) -> None:
-    """Raises `RecordingError` for topics that two of the recordings have."""
+    """Raise `RecordingError` for topics that two of the recordings have."""
     counts = Counter(topic for r in recordings for topic in r.streams)
     both = sorted(topic for topic, n in counts.items() if n > 1)
     if both:

@@ -1,4 +1,4 @@
-"""What a file holds and what is wrong with it, whoever wrote it: the pre-flight check.
+"""Pre-flight check of a file of any format: its content and its faults.
 
 An MCAP file is inspected as it is; one of another format by what its reader makes of it.
 
@@ -71,7 +71,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Inspection:
-    """A whole file: counts, topics in order of their channels, defects in one line each."""
+    """Inspection of a file: counts, topics in order of their channels, defects in one line each."""
 
     source: Source
     profile: str

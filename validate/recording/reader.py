@@ -1,4 +1,4 @@
-"""What a reader of one format is, and what all of them need.
+"""Type of a reader of one format, and helpers of all readers.
 
 A new format of the package is one file with its `Reader`, and a line in `readers`.
 """
@@ -88,8 +88,8 @@ def _guarded(
 
 
 def require_readable(path: Path, largest: int) -> None:
-    """Raises `RecordingError` for what cannot be looked at, is neither file nor folder, or is a
-    file of over `largest` bytes."""
+    """Raise `RecordingError` for what cannot be looked at, is neither file nor folder, or is a file
+    of over `largest` bytes."""
     try:
         found = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a NUL in its name
@@ -102,12 +102,12 @@ def require_readable(path: Path, largest: int) -> None:
 
 
 def head(path: Path, count: int = 4096) -> bytes:
-    """The first bytes of a file; none of what is no readable file."""
+    """Return the first bytes of a file; none of what is no readable file."""
     return first_bytes(path, count)
 
 
 def source_of(path: Path, integrity: str) -> Source:
-    """A file's name, hash and size; `integrity` says what its bytes prove."""
+    """Return a file's name, hash and size; `integrity` says what its bytes prove."""
     with open_file(path, ANY_SIZE) as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         size = stream.tell()
@@ -115,7 +115,7 @@ def source_of(path: Path, integrity: str) -> Source:
 
 
 def require_known(options: Iterable[str], known: Collection[MapOption]) -> None:
-    """Raises `UsageError` naming the nearest known key for an option that is not `known`."""
+    """Raise `UsageError` naming the nearest known key for an option that is not `known`."""
     names = [option.name for option in known]
     for key in options:
         if not any(option.accepts(key) for option in known):
@@ -124,6 +124,6 @@ def require_known(options: Iterable[str], known: Collection[MapOption]) -> None:
 
 
 def did_you_mean(text: str, known: Collection[str]) -> str:
-    """A question with the nearest of the known texts; empty where none is near."""
+    """Return a question with the nearest of the known texts; empty where none is near."""
     near = difflib.get_close_matches(text, known, n=1, cutoff=0.3)
     return f"did you mean '{near[0]}'? " if near else ""

@@ -1,4 +1,4 @@
-"""Readers of recordings: the package's own, those of plug-ins and those that a script adds."""
+"""Registry of readers: built-in ones, plug-ins and those of scripts."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -51,7 +51,8 @@ def in_order() -> tuple[Reader, ...]:
 
 
 def recognises(reader: Reader, path: Path) -> bool:
-    """Whether a reader recognises a file; a plug-in that fails there does not, with a warning."""
+    """Return whether a reader recognises a file; a plug-in that fails there does not, with a
+    warning."""
     return READERS.answer(reader, lambda r: bool(r.recognises(path)), False)
 
 
@@ -66,8 +67,9 @@ def told_apart(path: Path) -> str:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """The recording in an MCAP file (`mcap.read.read_recording`), its frames without contradiction;
-    a file of another format is called by its name in the error, with the command that takes it."""
+    """Return the recording in an MCAP file (`mcap.read.read_recording`), its frames without
+    contradiction; a file of another format is called by its name in the error, with the command
+    that takes it."""
     file = Path(path)
     try:
         recording = mcap.read_recording(file)
@@ -78,7 +80,7 @@ def read_recording(path: Path | str) -> Recording:
 
 
 def no_mcap(path: Path, error: RecordingError) -> RecordingError:
-    """The error about a file that was expected to be MCAP, with what it is instead."""
+    """Return the error about a file that was expected to be MCAP, with what it is instead."""
     if MCAP.recognises(path):
         return error
     if said := told_apart(path):
@@ -90,7 +92,7 @@ def no_mcap(path: Path, error: RecordingError) -> RecordingError:
 
 
 def named(kind: str) -> Reader:
-    """The reader of that name; raises `UsageError` naming the nearest."""
+    """Return the reader of that name; raises `UsageError` naming the nearest."""
     found = {r.name: r for r in READERS}
     if kind not in found:
         raise UsageError(f"unknown kind '{kind}'; {nearest_names(kind, set(found))}")
@@ -123,8 +125,8 @@ def _stamped(recording: Recording, reader: Reader) -> Recording:
 
 
 def recognised(path: Path) -> Reader:
-    """The first reader that recognises the path; raises `UsageError` where none does, with what to
-    do where it is of a kind that is known but not read, and where there is no such file."""
+    """Return the first reader that recognises the path; raises `UsageError` where none does, with
+    what to do where it is of a kind that is known but not read, and where there is no such file."""
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
     for reader in in_order():

@@ -1,4 +1,4 @@
-"""Scales of images, outlines and markers beyond reason: by how much, and which unit may be meant.
+"""Implausible scales of images, outlines and markers, and the unit that may be meant.
 
 A recording whose metres are millimetres agrees with itself as well as any other, so it is asked
 back where images enter.
@@ -34,12 +34,13 @@ def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = Non
 
 
 def odd_scales(recording: Recording) -> tuple[str, ...]:
-    """A line for every stream of images, outlines or markers whose metres may be something else."""
+    """Return a line for every stream of images, outlines or markers whose metres may be something
+    else."""
     return tuple(f"'{topic}': {text}" for topic, text in _odd(recording) if text)
 
 
 def odd_stream(stream: object) -> str:
-    """What is odd about the scale of one stream; "" for nothing, and for other streams."""
+    """Return the fault of one stream's scale; "" for none, and for other streams."""
     if isinstance(stream, Frames):
         height, width = stream.images[0].shape
         return odd_pixel(stream.m_per_px, (height, width))
@@ -71,7 +72,7 @@ def another_unit(stream: object, size: float) -> str:
 
 
 def in_unit(recording: Recording, unit: str, factor: float) -> Recording:
-    """The recording with markers and outlines that were declared in m taken as in `unit`, of
+    """Return the recording with markers and outlines that were declared in m taken as in `unit`, of
     `factor` m; the record "taken_as" says so."""
     markers = {
         n: replace(m, x=factor * m.x, sd=factor * m.sd) for n, m in recording.markers.items()

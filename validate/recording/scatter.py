@@ -1,4 +1,4 @@
-"""What repeats of a test say of a recording that is their mean: how far it may be off."""
+"""Scatter of repeated tests as uncertainty of their mean recording."""
 
 import math
 
@@ -10,7 +10,7 @@ SHARE = "share"  # its key: sd of the mean over the mean, one relative standard 
 
 
 def repeats_share(recording: Recording) -> float:
-    """The relative standard uncertainty of a mean of repeats; 0 for a recording of one log.
+    """Return the relative standard uncertainty of a mean of repeats; 0 for a recording of one log.
 
     Raises `RecordingError` for a record whose share is not a number of at least 0.
     """

@@ -31,7 +31,7 @@ def options_table(readers: Sequence[Reader]) -> str:
 
 
 def with_tables(page: str) -> str:
-    """A page with the tables of the package's own readers between its marks.
+    """Return a page with the tables of the package's own readers between its marks.
 
     Raises `ValueError` for a page without them.
     """

@@ -1,4 +1,4 @@
-"""What a recording holds. Every type is frozen and checks itself once, when it is made.
+"""Types of a recording: markers, signals, outlines, images. All are frozen and checked once.
 
 Times are float seconds from the recording's first message; the int64 nanoseconds of that moment
 are kept in `Recording.t0_ns`. Positions are metres, one named frame per stream.
@@ -355,26 +355,27 @@ class Recording:
         return {**self.markers, **self.signals, **self.contours, **self.frames}
 
     def signal(self, topic: str, unit: str) -> Signal:
-        """The signal of that topic; raises `RecordingError` when absent or in another unit."""
+        """Return the signal of that topic; raises `RecordingError` when absent or in another
+        unit."""
         found = _present(self.signals, topic, f"{self.name}: no signal")
         if found.unit != unit:
             raise RecordingError(f"{self.name}: '{topic}' is in {found.unit}, expected {unit}")
         return found
 
     def marker(self, topic: str) -> Markers:
-        """The markers of that topic; raises `RecordingError` when absent."""
+        """Return the markers of that topic; raises `RecordingError` when absent."""
         return _present(self.markers, topic, f"{self.name}: no markers")
 
     def contour(self, topic: str) -> Contours:
-        """The contours of that topic; raises `RecordingError` when absent."""
+        """Return the contours of that topic; raises `RecordingError` when absent."""
         return _present(self.contours, topic, f"{self.name}: no outlines")
 
     def frame(self, topic: str) -> Frames:
-        """The images of that topic; raises `RecordingError` when absent."""
+        """Return the images of that topic; raises `RecordingError` when absent."""
         return _present(self.frames, topic, f"{self.name}: no images")
 
     def record(self, name: str) -> Record:
-        """The metadata record of that name; raises `RecordingError` when absent."""
+        """Return the metadata record of that name; raises `RecordingError` when absent."""
         return _present(self.metadata, name, f"{self.name}: no record")
 
 

@@ -1,4 +1,4 @@
-"""Registration: where measured points lie in the model's frame, and how sure that is.
+"""Registration: measured points in the model's frame, with their uncertainty.
 
 Transforms are named T_target_from_source; residuals are mapped source minus target; metres inside,
 millimetres in messages. Fit on the rest state once, then freeze.

@@ -1,5 +1,4 @@
-"""What clocks do to a measurement that moves: u = sd_t |dy/dt| where one is uncertain, in u_D; and
-samples at other times than the ones that are wanted.
+"""Time-stamp uncertainty of a moving measurement, u = sd_t |dy/dt|, and interpolation in time.
 
 All samples of a stream lie off together by an uncertain clock, so this is a systematic part, which
 averaging leaves.
@@ -39,7 +38,8 @@ def clock_sd(recording: Recording, topic: str) -> float:
 
 
 def with_clock(found: Deviation, sd_t: float, speed: Floats) -> Deviation:
-    """The deviation with sd_t s times the rms `speed` (any, c) unit/s among what points share."""
+    """Return the deviation with sd_t s times the rms `speed` (any, c) unit/s among what points
+    share."""
     seen = speed[np.isfinite(speed)]
     if len(seen) == 0:
         raise ComparisonError(
@@ -85,7 +85,7 @@ def slopes(t: Floats, y: Floats, at: Ints, sd_t: float) -> Floats:
 
 
 def around(t: Floats, i: int, sd_t: float) -> slice:
-    """The samples within `sd_t` s of t[i], at least the next ones at another time."""
+    """Return the samples within `sd_t` s of t[i], at least the next ones at another time."""
     first = np.searchsorted(t, min(t[i] - sd_t, t[np.searchsorted(t, t[i]) - 1]))
     after = min(int(np.searchsorted(t, t[i], "right")), len(t) - 1)
     last = np.searchsorted(t, max(t[i] + sd_t, t[after]), "right")

@@ -1,5 +1,4 @@
-"""A measurement made anew: what a sensor would have read of a run, with noise, registration and
-clock drawn as they are declared.
+"""Synthetic draws of a measurement from a run, with noise, registration and clock errors.
 
 Every observation says what it `left` of a run, exact reading less measured sample (m,); these add
 up: what an uncertain input does to a reading is a difference of two. `anew` takes such numbers to

@@ -1,4 +1,4 @@
-"""What was measured, in the scene's frame, and how a run is read where it was measured.
+"""Observations in the scene's frame, and their simulated counterpart in a run.
 
 Every kind of sensor is one file beside this one: its class keeps the measured samples and says how
 a run deviates from them. Comparison, filters and reports know nothing of a sensor but this.
@@ -31,7 +31,7 @@ class Traced(Protocol):
 
 
 class Simulated(Protocol):
-    """What an observation reads of a run: fields u (no, n, d) m at the steps `at`, traces."""
+    """Data of a run for observations: fields u (no, n, d) m at the steps `at`, traces."""
 
     @property
     def method(self) -> str: ...
@@ -78,12 +78,13 @@ class Selection:
         return nearest_samples(t, self.t, name)
 
     def steps(self, run_t: Floats) -> Ints:
-        """The run's steps nearest to the instants."""
+        """Return the run's steps nearest to the instants."""
         assert self.t is not None
         return nearest_samples(run_t, self.t, "the run")
 
     def read(self, run_t: Floats, y: Floats, t: Floats) -> Floats:
-        """A trace y (nt,) at the instants (its nearest steps), or interpolated at times t s."""
+        """Return a trace y (nt,) at the instants (its nearest steps), or interpolated at times t
+        s."""
         return np.interp(t, run_t, y) if self.t is None else y[self.steps(run_t)]
 
 
@@ -150,7 +151,7 @@ class Observation(Protocol):
 
 @dataclass(frozen=True)
 class History:
-    """What was measured over time, and what an exact sensor would have read of a run.
+    """Measured history, and the reading of an exact sensor in a run.
 
     `measured` and `simulated` (nt, k, d) in `unit` at t (nt,) s are of the named quantities since
     rest; NaN = not seen. `sd` is the measurement's standard deviation per component. `each`: every
@@ -175,7 +176,7 @@ class History:
 
 @runtime_checkable
 class Drawable(Observation, Protocol):
-    """An observation that can be made anew, as a perfect model would have it."""
+    """An observation that can be drawn again, as a perfect model would produce it."""
 
     def left(self, run: Simulated) -> Floats:
         """What an exact sensor would have read of a run, less what was measured: flat (m,)."""
@@ -216,12 +217,12 @@ def nearest_samples(times: Floats, t: Floats, name: str) -> Ints:
 
 
 def nearest_sample(times: Floats, t: float, name: str) -> int:
-    """The one of `nearest_samples`."""
+    """Return the one of `nearest_samples`."""
     return int(nearest_samples(times, np.array([t]), name)[0])
 
 
 def frame_at(run: Simulated, selection: Selection) -> Floats:
-    """The fields (m, n, d) m at the instants; `ComparisonError` where the run kept none."""
+    """Return the fields (m, n, d) m at the instants; `ComparisonError` where the run kept none."""
     kept = {int(step): i for i, step in enumerate(run.at)}
     steps = selection.steps(run.t)
     if any(int(s) not in kept for s in steps):
@@ -232,7 +233,7 @@ def frame_at(run: Simulated, selection: Selection) -> Floats:
 
 
 def field_at(run: Simulated, t: float) -> Floats:
-    """The field (n, d) m at t s between those that the run kept."""
+    """Return the field (n, d) m at t s between those that the run kept."""
     kept = run.t[run.at]
     i = int(np.clip(np.searchsorted(kept, t), 0, len(kept) - 1))
     before, start = (run.u[i - 1], kept[i - 1]) if i else (np.zeros_like(run.u[0]), 0.0)

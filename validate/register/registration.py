@@ -1,4 +1,4 @@
-"""A recording in the scene's frame: its observations, and which of them are compared."""
+"""Registered recording: its observations in the scene's frame, and the compared ones."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -16,7 +16,7 @@ O = TypeVar("O")
 
 @dataclass(frozen=True)
 class Registered:
-    """All observations of a recording in the scene's frame, and what of them is compared.
+    """All observations of a recording in the scene's frame, and the compared ones.
 
     `rest` is the unloaded instant, where registration and geometry can be looked at alone.
     `outside` counts samples left out because they lie beyond the law's validity. `time_scale` are
@@ -87,7 +87,7 @@ class Registered:
         return tuple(o for o in self.observations if o.role != "drives")
 
     def of(self, kind: type[O]) -> tuple[O, ...]:
-        """The observations of one kind that do not drive."""
+        """Return the observations of one kind that do not drive."""
         return tuple(o for o in self.compared if isinstance(o, kind))
 
     def frames(self, t: Floats, most: int) -> Ints:
@@ -101,5 +101,5 @@ class Registered:
         return np.unique(np.concatenate([*rest, *(single or [even]), *film]))
 
     def stage(self, t: float) -> float:
-        """The first input at the step nearest to t s, in its own unit."""
+        """Return the first input at the step nearest to t s, in its own unit."""
         return float(self.inputs[nearest_sample(self.t, t, "the drive"), 0])

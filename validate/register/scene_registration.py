@@ -1,4 +1,4 @@
-"""Registration after the declaration of a scene: streams by name drive it or are compared.
+"""Registration by names: streams drive the declared inputs of a scene or are compared.
 
 A signal with the name of an input (a drive, a load, a rigid body that moves) drives it; an input
 with a value is constant. `<drive>.force` in N is predicted by the force of that drive or rigid
@@ -28,7 +28,7 @@ from validate.scene.scene import Drive, Load, Pressure, Scene, Weight
 def follow_signal(
     recording: Recording, mesh: Mesh, signal: str, unit: str, how: MarkerFit = MarkerFit()
 ) -> Registered:
-    """Steps through `signal` after t = 0, where everything is at rest, with the tracked markers
+    """Step through `signal` after t = 0, where everything is at rest, with the tracked markers
     placed by the recording's own records."""
     drive = driving(recording, signal, unit, after_rest=True)
     return Registered((drive, placed_markers(recording, mesh, how=how)))
@@ -42,7 +42,7 @@ _UNITS: Mapping[type, str] = {
 
 
 def as_declared(recording: Recording, scene: Scene, how: MarkerFit = MarkerFit()) -> Registered:
-    """Raises `RegistrationError` for an input that has no value and no signal, and where nothing of
+    """Raise `RegistrationError` for an input that has no value and no signal, and where nothing of
     the recording is predicted."""
     parts: tuple[Any, ...] = (*scene.drives, *scene.loads, *scene.movers)
     recorded = {

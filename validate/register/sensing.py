@@ -1,4 +1,4 @@
-"""What a sensor may be off by, as small parameters that any experiment can hold and identify.
+"""Sensor errors (gain, delay, bias, pose) as small parameters that can be identified.
 
 An experiment takes one into its parameters and applies it where it registers a recording:
 `cell = parameters.cell.of(cell)`. Their defaults change nothing; one that is None stands open.
@@ -35,11 +35,11 @@ class Sensing:
 
     @property
     def offset(self) -> float:
-        """What it reads of nothing, in its own unit."""
+        """Reading at zero, in its own unit."""
         return 0.0
 
     def of(self, seen: SignalObservation) -> SignalObservation:
-        """What was there at the times of the samples: (y(t + delay) - offset) / gain.
+        """Return the true values at the times of the samples: (y(t + delay) - offset) / gain.
 
         Linear between samples, and held before the first and after the last, so that as many are
         compared whatever the delay.
@@ -98,8 +98,8 @@ class PoseShift:
     delay: float | None = quantity(0.0, "s", "delay of its clock relative to the drive's clock")
 
     def of(self, seen: MarkerObservation) -> MarkerObservation:
-        """The markers where they were, at the times of the samples; between samples linear, and a
-        marker that is not seen at one of them is not seen.
+        """Return the markers where they were, at the times of the samples; between samples linear,
+        and a marker that is not seen at one of them is not seen.
 
         A motion of the rest with the rest leaves displacements as they are but for their direction.
         Raises `UsageError` for markers in a plane.

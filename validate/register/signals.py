@@ -1,4 +1,4 @@
-"""Signals: a number or several over time, driving a simulation or predicted by a trace of it."""
+"""Signals over time that drive a simulation or that one of its traces predicts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -42,7 +42,8 @@ class SignalObservation:
     share: float = 0.0
 
     def at(self, t: float) -> float:
-        """The sample nearest in time; raises `ComparisonError` when none is within a second."""
+        """Return the sample nearest in time; raises `ComparisonError` when none is within a
+        second."""
         return float(self.y[nearest_sample(self.t, t, f"signal '{self.quantity}'"), 0])
 
     @property
@@ -95,7 +96,8 @@ class SignalObservation:
         return History(self.name, self.t, (self.name,), y, simulated, self.unit, self.sd)
 
     def anew(self, left: Floats, draw: AnyDraw) -> "SignalObservation":
-        """The signal as measured samples with `left` (nt,) would be, clock and noise drawn."""
+        """Return the signal as measured samples with `left` (nt,) would be, clock and noise
+        drawn."""
         exact = shifted(self.t, (self.y[:, 0] + left)[:, None], draw.lateness(self.sd_t))
         noisy = exact + draw.white(self.sd, exact.shape)
         return replace(self, y=np.hstack([noisy, self.y[:, 1:]]))
@@ -107,7 +109,8 @@ class SignalObservation:
 def driving(
     recording: Recording, name: str, unit: str, *, after_rest: bool = False
 ) -> SignalObservation:
-    """The signal that drives, in `unit`; `after_rest` begins after t = 0, where all is at rest."""
+    """Return the signal that drives, in `unit`; `after_rest` begins after t = 0, where all is at
+    rest."""
     s = recording.signal(name, unit)
     kept = s.t > 0 if after_rest else np.ones(len(s.t), bool)
     sd_t = clock_sd(recording, name)
@@ -117,15 +120,15 @@ def driving(
 def validating(
     recording: Recording, name: str, unit: str, *, quantity: str, trace: str
 ) -> SignalObservation:
-    """The signal that a run's `trace` must predict, scored as `quantity`; a mean of repeats is
-    uncertain by their scatter."""
+    """Return the signal that a run's `trace` must predict, scored as `quantity`; a mean of repeats
+    is uncertain by their scatter."""
     s = recording.signal(name, unit)
     sd_t, share = clock_sd(recording, name), repeats_share(recording)
     return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t, share)
 
 
 def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:
-    """Raises `RegistrationError` when a signal falls as the drive closes."""
+    """Raise `RegistrationError` when a signal falls as the drive closes."""
     most = int(np.argmax(drive.y[:, 0]))
     least = int(np.argmin(drive.y[:, 0]))
     change = seen.at(float(drive.t[most])) - seen.at(float(drive.t[least]))
@@ -140,7 +143,7 @@ def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:
 def holds_at(
     drive: SignalObservation, t: Floats, loads: tuple[float, ...], within: float
 ) -> tuple[Selection, ...]:
-    """The measurement times t (nt,) s at which the drive stood at a load m, rest first.
+    """Return the measurement times t (nt,) s at which the drive stood at a load m, rest first.
 
     Raises `ComparisonError` when a load has no measurement within `within` m of it.
     """
@@ -163,7 +166,7 @@ def holds_at(
 
 
 def instant(hold: Selection) -> float:
-    """The time s of a hold."""
+    """Return the time s of a load step."""
     assert hold.t is not None
     return float(hold.t[0])
 
@@ -171,7 +174,7 @@ def instant(hold: Selection) -> float:
 def windows_of(
     drive: SignalObservation, windows: dict[str, tuple[float, float]]
 ) -> tuple[Selection, ...]:
-    """The samples with the drive in (from, to] m, by label.
+    """Return the samples with the drive in (from, to] m, by label.
 
     Raises `ComparisonError` when a window holds no sample.
     """

@@ -1,4 +1,4 @@
-"""Nominal stresses of a material point, compared relative to what was measured.
+"""Nominal stresses of a material point, compared relative to the measurement.
 
 Curves that were read off a printed figure are as uncertain as the stress is large, and stresses of
 one curve differ a hundredfold: an absolute error would be that of the last few rows alone.
@@ -90,7 +90,7 @@ class StressObservation:
         return np.asarray((from_rest(run.t, exact, self.t) - self.y).ravel())
 
     def anew(self, left: Floats, draw: AnyDraw) -> "StressObservation":
-        """The rows with `left` (nt c,) Pa; readings and the figure's axis drawn.
+        """Return the rows with `left` (nt c,) Pa; readings and the figure's axis drawn.
 
         Noise and errors stay relative to what was measured: the terms of u_val are.
         """

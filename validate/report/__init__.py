@@ -1,4 +1,4 @@
-"""The report of a result: one HTML page, results.json, tables, figures and the runs' fields.
+"""Report of a result: HTML page, results.json, tables, figures and the runs' fields.
 
 Arrays stay SI; `numbers` alone turns them into what people read (mm, N, Pa). Each section of the
 page is a function of the result that returns None where it does not apply. matplotlib draws in the

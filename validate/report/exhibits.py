@@ -1,4 +1,4 @@
-"""An exhibit drawn: its charts, heats, regimes and maps as pictures; its files.
+"""Drawing of report items: charts, heat maps and regime maps as figures, and their files.
 
 Every part of a report is drawn and encoded by itself, so that workers can draw parts side by side.
 """
@@ -66,8 +66,8 @@ def draw_all(result: HasMethods, found: Iterable[Part]) -> tuple[DrawnExhibit, .
 def drawing(
     result: HasMethods, parts: Iterable[Part], beside: Beside = in_turn
 ) -> Callable[[], tuple[DrawnExhibit, ...]]:
-    """Begins to draw exhibits, or what sections make of the result; what it returns waits for
-    them. Maps of one scale have common colours.
+    """Begin to draw exhibits, or what sections make of the result; what it returns waits for them.
+    Maps of one scale have common colours.
 
     Raises `ComparisonError` naming what stands twice: names become files and anchors.
     """

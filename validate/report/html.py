@@ -1,4 +1,4 @@
-"""The page from drawn exhibits, by jinja2."""
+"""HTML page of a report, by jinja2."""
 
 from collections.abc import Iterable
 from importlib.resources import files
@@ -19,7 +19,7 @@ _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch 
 def page(
     result: Result, exhibits: Iterable[DrawnExhibit], created: str, band: tuple[str, str]
 ) -> str:
-    """The whole report as one HTML text that needs no other file and no script.
+    """Return the whole report as one HTML text that needs no other file and no script.
 
     `band` is the colour class and the word before the result's sentence.
     """

@@ -1,4 +1,4 @@
-"""The long table of a run: every number of its results as one labelled row.
+"""Long table of a run: every number of its results as one labelled row.
 
 1. A run is one document (the content of results.json) and its residuals, point by point.
 2. `long_table` alone makes rows of them: results.json and the table never disagree.

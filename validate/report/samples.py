@@ -1,4 +1,4 @@
-"""What was recorded over time and each method there, as rows of the long table."""
+"""Recorded samples and each method's values there, as rows of the long table."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""The report folder, written beside its place and moved there when complete."""
+"""Writer of the report folder, which replaces the former one when complete."""
 
 import json
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def write_report(
     vtu: bool = False,
     beside: "Beside | None" = None,
 ) -> Path:
-    """Replaces `folder` by the report of `result`; returns the path of its report.html.
+    """Replace `folder` by the report of `result`; returns the path of its report.html.
 
     `created` is a UTC time, ISO-8601; `made` says what made the result; `vtu` adds `paraview/`;
     `beside` draws parts side by side. The old folder stays until the new one is complete; after
@@ -66,7 +66,7 @@ def write_report(
 
 
 def table_of(result: Result, content: Json, run: str) -> LongTable:
-    """The long table of a result and the content of its results.json."""
+    """Return the long table of a result and the content of its results.json."""
     points = {m.name: m.residuals for m in result.methods}
     table = long_table(content, run, points, (*samples(result), *result.rows))
     return replace(table, rows=(*table.rows, *traces_of(content, run)))

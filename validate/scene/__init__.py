@@ -1,4 +1,4 @@
-"""What is simulated, declared: mesh, materials, supports, drives, cavities. No matrices."""
+"""Scene: declared mesh, materials, supports, drives, cavities, without matrices."""
 
 from validate.exports import lazily, names
 

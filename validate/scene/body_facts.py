@@ -1,4 +1,4 @@
-"""Size, shape of the elements and facet sets of a body's mesh. For people, with units."""
+"""Summary of a body's mesh: size, element shape and facet sets, with units."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""A rigid indenter as it is declared: it stands where it touches the body after a gap."""
+"""Rigid indenters: declared gap, and position in touch with the body."""
 
 from dataclasses import MISSING, dataclass, replace
 from typing import Literal, Protocol
@@ -32,7 +32,7 @@ class Shape(Protocol):
         ...
 
     def vectors(self) -> tuple[tuple[float, ...], ...]:
-        """The shape's points and directions, whose length is the scene's dimension."""
+        """Return the shape's points and directions, whose length is the scene's dimension."""
         ...
 
 
@@ -165,7 +165,7 @@ class RigidContact:
 
 
 def require_clear(contacts: tuple[RigidContact, ...], mesh: Mesh) -> None:
-    """Raises `SceneError` for shapes of another dimension, a rigid body that starts inside, nodes
+    """Raise `SceneError` for shapes of another dimension, a rigid body that starts inside, nodes
     that two contacts claim."""
     claimed: dict[int, str] = {}
     for part in contacts:
@@ -247,7 +247,7 @@ class Indenter:
             raise SceneError(f"tip = {self.tip} m: expected three lengths, or none")
 
     def on(self, contact: RigidContact, mesh: Mesh, middle: tuple[float, ...]) -> RigidContact:
-        """The rigid body where it stands at the first instant.
+        """Return the rigid body where it stands at the first instant.
 
         `middle`: x, y (m) of the body's axis, where the mesh is a part of it. Raises `SceneError`
         where no node of the place lies before the indenter.
@@ -302,7 +302,7 @@ class Indenter:
 
 
 def standing(contact: RigidContact, mesh: Mesh, middle: tuple[float, ...] = ()) -> RigidContact:
-    """A declared contact with its rigid body in place."""
+    """Return a declared contact with its rigid body in place."""
     shape = contact.shape
     return shape.on(contact, mesh, middle) if isinstance(shape, Indenter) else contact
 

@@ -1,4 +1,4 @@
-"""The laws at large strain: which there are, what each can handle, and their further coefficients.
+"""Constitutive laws at large strain: names, capabilities and further coefficients.
 
 Every law has the Young's modulus and Poisson ratio of its material at small strain; what is left
 over is given here as the field writes it. C10 of Mooney-Rivlin and Yeoh and mu_1 of Ogden follow:
@@ -113,7 +113,7 @@ class Coefficients:
         return (kind.holds or Coefficients)(**known)
 
     def require_known(self, law: str) -> None:
-        """Raises `SceneError` for a coefficient that the law would not use."""
+        """Raise `SceneError` for a coefficient that the law would not use."""
         unknown = self._unknown_to(law)
         if not unknown:
             return
@@ -134,7 +134,7 @@ class Coefficients:
 
 
 def law_kind(law: str) -> LawKind:
-    """The law of this name; the linear one knows nothing."""
+    """Return the law of this name; the linear one knows nothing."""
     linear = LawKind("linear", "linear", (), (), ranged=False)
     return next((k for k in (linear, *LAWS.own) if k.name == law), None) or next(
         (k for k in LAWS.further if k.name == law), LawKind(law, law, (), (), ranged=False)
@@ -142,7 +142,7 @@ def law_kind(law: str) -> LawKind:
 
 
 def further_laws() -> tuple[str, ...]:
-    """Names of the laws that are not the package's own."""
+    """Return the names of the laws that are not the package's own."""
     return tuple(kind.name for kind in LAWS.further)
 
 
@@ -195,7 +195,7 @@ def lost_stability(law: str, c: Coefficients, mu: float) -> Lost | None:
 
 
 def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
-    """Raises `SceneError` at the stretch nearest to 1 where stiffness is lost, and says in which
+    """Raise `SceneError` at the stretch nearest to 1 where stiffness is lost, and say in which
     stretch; mu, kappa Pa."""
     lost = lost_stability(law, c, mu)
     if lost:

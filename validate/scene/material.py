@@ -1,4 +1,4 @@
-"""What a body is made of: isotropic elasticity, damping, density, and the law at large strain."""
+"""Material: isotropic elasticity, damping, density, and the law at large strain."""
 
 from dataclasses import MISSING, dataclass, field, replace
 from typing import Literal
@@ -108,7 +108,7 @@ class Material:
             self.require_stable()
 
     def require_stable(self) -> None:
-        """Raises `SceneError` for coefficients that lose positive energy, with the stretch."""
+        """Raise `SceneError` for coefficients that lose positive energy, with the stretch."""
         if law_kind(self.law).ranged:
             require_stable(self.law, self.coefficients, self.shear_modulus, self.bulk_modulus)
 

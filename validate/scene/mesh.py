@@ -162,7 +162,7 @@ def cell_volumes(mesh: Mesh) -> Floats:
 def require_positive_cells(
     mesh: Mesh, advice: str = "refine the mesh or move the inclusion"
 ) -> None:
-    """Raises `SceneError` naming the worst cell when any volume is not clearly positive."""
+    """Raise `SceneError` naming the worst cell when any volume is not clearly positive."""
     volumes = _least_volumes(mesh)
     bad = volumes <= 1e-9 * np.abs(volumes).mean()
     if bad.any():
@@ -185,7 +185,7 @@ def _least_volumes(mesh: Mesh) -> Floats:
 
 
 def require_nodes(shape: tuple[int, ...]) -> None:
-    """Raises `MemoryShortError` where a mesh of a grid of `shape` nodes has no room."""
+    """Raise `MemoryShortError` where a mesh of a grid of `shape` nodes has no room."""
     count = math.prod(shape)
     require_memory(_NODE_BYTES[len(shape)] * count, f"mesh of {count:.4g} nodes")
 
@@ -225,7 +225,7 @@ def boundary_facets(corners: Ints, dimension: int) -> Ints:
 
 
 def quadratic(mesh: Mesh) -> Mesh:
-    """The mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10), of
+    """Return the mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10), of
     hexahedra also of every face and cell (hex8 -> hex27). `SceneError` for quadrilaterals."""
     if mesh.order == 2:
         return mesh

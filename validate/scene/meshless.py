@@ -1,4 +1,4 @@
-"""A scene without a mesh: one material point, stretched homogeneously."""
+"""Scene without a mesh: one material point, stretched homogeneously."""
 
 from dataclasses import dataclass
 from typing import Literal

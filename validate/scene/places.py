@@ -1,4 +1,4 @@
-"""Where a part of a scene sits, in a user's words: a label, a side, a plane, a box or a point.
+"""Places of a scene's parts: a label, a side, a plane, a box or a point.
 
     top                            the facet set of that name
     zmax                           the facets on the body's highest plane across z
@@ -282,8 +282,8 @@ _FLAT = 2e-3  # of the body's diagonal: how far the facets of a filled surface l
 
 
 def place_of(text: str, mesh: Mesh) -> Place:
-    """The facets that the words choose of a mesh; raises `SceneError` for words that say nothing,
-    or choose nothing."""
+    """Return the facets that the words choose of a mesh; raises `SceneError` for words that say
+    nothing, or choose nothing."""
     if "&" in text:
         sides = [_plane_of(_site(part.strip(), mesh)) for part in text.split("&")]
         edges = reduce(and_, sides).edges
@@ -298,7 +298,8 @@ def place_of(text: str, mesh: Mesh) -> Place:
 
 
 def axis_of(text: str) -> tuple[float, ...]:
-    """The unit vector of "+x", "-z", or of three numbers; raises `SceneError` for anything else."""
+    """Return the unit vector of "+x", "-z", or of three numbers; raises `SceneError` for anything
+    else."""
     word = text.strip().lower()
     if word.lstrip("+-") in tuple(_AXES) and len(word) <= 2:
         sign = -1.0 if word.startswith("-") else 1.0
@@ -338,7 +339,7 @@ def point_of(text: str) -> tuple[float, ...]:
 
 
 def box_of(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The corners m of "box A to B"; raises `SceneError` for anything else."""
+    """Return the corners m of "box A to B"; raises `SceneError` for anything else."""
     if not (text.startswith("box ") and " to " in text):
         raise SceneError(f"place '{text[:60]}': expected a box, as box 0,0,1mm to 4mm,4mm,2mm")
     low, high = map(point_of, text[4:].split(" to ", 1))
@@ -418,8 +419,8 @@ _FAR = 0.4  # of the farthest: how far from the middle the other node is at leas
 
 
 def resting_points(x: Floats, one: int, other: int, place: str) -> tuple[Floats, Floats]:
-    """The node next to the middle of a place's nodes x (k, 3) m, which stays along the axes `one`
-    and `other`; a second one, beside it along `one`, stays only along `other`.
+    """Return the node next to the middle of a place's nodes x (k, 3) m, which stays along the axes
+    `one` and `other`; a second one, beside it along `one`, stays only along `other`.
 
     A second one that lies aslant would turn a body that widens. Raises `SceneError` without a node
     near the middle: the body would widen about another point.

@@ -1,4 +1,4 @@
-"""Materials of published coefficients: what a paper or a handbook prints, with a Poisson ratio.
+"""Published rubber materials: coefficients of papers and handbooks, with a Poisson ratio.
 
 Young's modulus at small strain follows; incompressible sources are met by nu up to .4999.
 """

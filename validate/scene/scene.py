@@ -1,4 +1,4 @@
-"""The scene: a body, what it is made of, how it is held and driven, and the fluid in it.
+"""Scene: a body, its material, supports, drives, loads and the fluid in it.
 
 Declared, it is the parameter tree of an experiment: its body is a geometry
 (`scene.geometries.specification`), its places are words (`scene.places`). What is simulated is
@@ -334,7 +334,8 @@ class Scene:
         return self.body
 
     def resolved(self, mesh: Mesh) -> "Scene":
-        """The scene on this mesh of its body: words become places, symmetry holds its planes."""
+        """Return the scene on this mesh of its body: words become places, symmetry holds its
+        planes."""
         held, places = tuple(getattr(self.body, "held", ())), getattr(self.body, "places", {})
         sides = tuple(side for f in self.foundations for side in _sides(f))
         bonded = tuple(Support(f.facets, f.components) for f in sides if f.contact == "bonded")
@@ -501,7 +502,7 @@ class Scene:
         return self.material, *(region.material for region in self.regions)
 
     def per_cell(self, value: Callable[[Material], float]) -> Floats:
-        """A number of every cell's material (e,)."""
+        """Return a number of every cell's material (e,)."""
         numbers = np.full(len(self.mesh.cells), value(self.material))
         for region in self.regions:
             numbers[region.cells] = value(region.material)

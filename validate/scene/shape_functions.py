@@ -1,4 +1,4 @@
-"""Shape functions and quadrature of every reference cell and facet: the one home of both.
+"""Shape functions and quadrature of every reference cell and facet.
 
 Simplices in barycentric coordinates L (..., d + 1), L_0 = 1 - sum xi, xi >= 0: vertices first, then
 the middles of `EDGES`. Bricks (quadrilaterals, hexahedra) in 0 <= xi <= 1: corners

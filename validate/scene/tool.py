@@ -1,4 +1,4 @@
-"""A point tool: the tip of a needle whose path is given, and the surface that it may touch."""
+"""Point tool: tip of a needle with a given path, and the surface that it may touch."""
 
 from dataclasses import MISSING, dataclass
 
@@ -42,7 +42,7 @@ class Needle:
 
 
 def require_usable(tools: tuple[Needle, ...], mesh: Mesh) -> None:
-    """Raises `SceneError` for needles of another dimension, more than one, or on no faces."""
+    """Raise `SceneError` for needles of another dimension, more than one, or on no faces."""
     if len(tools) > 1:
         raise SceneError(f"{len(tools)} needles: expected one")
     for tool in tools:

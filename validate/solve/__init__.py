@@ -1,4 +1,4 @@
-"""Schemes: settings, prepared and step apart; `march` walks the steps."""
+"""Schemes: settings, preparation and step; `march` runs the steps."""
 
 from validate.exports import lazily, names
 

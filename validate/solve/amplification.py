@@ -1,4 +1,4 @@
-"""How errors grow per step: the spectral radius of a linear scheme's map of (u, v, a) at rest.
+"""Error growth per step: spectral radius of a linear scheme's map of (u, v, a).
 
 With C = alpha M + beta K the modes of K and M decouple and the map is 3 x 3 for each of them: exact
 and cheap. Radius 1 is the border: an undamped mode of average acceleration lies on it; above it,
@@ -34,7 +34,7 @@ class Amplification:
 
 
 def amplification(system: System, scheme: Newmark | ExplicitLinear) -> Amplification:
-    """The scheme's amplification by modes.
+    """Return the scheme's amplification by modes.
 
     Raises `SceneError` above 2000 free unknowns or where the damping couples the modes.
     """

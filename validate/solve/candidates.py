@@ -1,4 +1,4 @@
-"""Candidates of a ladder: the settings with which a scheme enters studies of error against time.
+"""Candidates of a ladder: settings of a scheme in studies of error against time.
 
 Every scheme declares its own in `candidates`, for a swinging body or one at rest;
 `solve.schemes.candidates` has them all, by their rung.

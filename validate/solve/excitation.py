@@ -1,4 +1,4 @@
-"""What inputs do to the free unknowns: motions of drives, forces of loads, the start from rest."""
+"""Excitation of the free unknowns: motions of drives, forces of loads, start from rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What inputs do to the free unknowns: columns of loads (m, l) and of drives (m, k).
+    """Effect of inputs on the free unknowns: columns of loads (m, l) and of drives (m, k).
 
     Prescribed unknowns are coupled by K, C and M. Their `rates`: "rule" by the rule's formulas
     (which average acceleration makes ring, growing, on a ramp), "difference" by backward

@@ -1,4 +1,4 @@
-"""What a scheme or filter can handle, declared on its settings, and the one refusal of the rest."""
+"""Capabilities of a scheme or filter, declared on its settings, and refusal of other scenes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,13 +39,13 @@ class Handles:
         return not _refused(self, scene)
 
     def solves(self, law: str) -> bool:
-        """Whether it takes the law. What solves every law at large strain solves those of plug-ins,
-        too."""
+        """Return whether it takes the law. What solves every law at large strain solves those of
+        plug-ins, too."""
         return law in self.law or (set(LARGE) <= set(self.law) and law in further_laws())
 
 
 def handles_faults(part: Any) -> str:
-    """What keeps a class from declaring what it handles; "" for nothing."""
+    """Return the fault of a class's declared capabilities; "" for none."""
     handles = getattr(part, "handles", None)
     return "" if isinstance(handles, Handles) else f"{part.__name__}.handles: expected Handles(...)"
 
@@ -80,7 +80,7 @@ INSTEAD: Mapping[str, tuple[str, ...]] = {
 
 
 def require_handled(scene: AnyScene, settings: Handling) -> None:
-    """Raises `SceneError` that names what the settings cannot handle, and what can."""
+    """Raise `SceneError` that names what the settings cannot handle, and what can."""
     refused = _refused(settings.handles, scene)
     if refused:
         what, why = refused

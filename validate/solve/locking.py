@@ -1,4 +1,4 @@
-"""How much too stiff linear cells are: their small displacement over the quadratic one's."""
+"""Locking factor of linear cells: small displacement relative to quadratic cells."""
 
 from dataclasses import replace
 

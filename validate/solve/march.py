@@ -1,4 +1,4 @@
-"""The loop over steps, written once: it steps, times, traces and stops where a step fails."""
+"""Time loop of all schemes: steps, timing, traces, and stop at a failed step."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -51,7 +51,7 @@ def run_scheme(
     tell: Tell = _untold,
     points: Rows | None = None,
 ) -> Run:
-    """A run by what steps through a scene, or by what solves it as a whole.
+    """Return a run by what steps through a scene, or by what solves it as a whole.
 
     Raises `SceneError` for what the settings cannot handle.
     """
@@ -78,8 +78,8 @@ def march(
     tell: Tell = _untold,
     points: Rows | None = None,
 ) -> Run:
-    """Steps through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`, and
-    the displacements of `points` at every step.
+    """Step through inputs (nt, k) at times t (nt,) s; keeps full fields at the steps `at`, and the
+    displacements of `points` at every step.
 
     `tell` is given the step, now and then.
 

@@ -1,4 +1,4 @@
-"""Every scheme: the package's own, those of plug-ins and those that a script adds.
+"""Registry of schemes: built-in ones, plug-ins and those of scripts.
 
 A new one of the package is one file beside this and its name here.
 
@@ -89,12 +89,12 @@ SOLVERS: Registry[type[SceneSolver]] = Registry(
 
 
 def schemes_that(handle: Callable[[Handles], bool]) -> tuple[type[Scheme], ...]:
-    """The schemes whose `handles` pass, in order."""
+    """Return the schemes whose `handles` pass, in order."""
     return tuple(scheme for scheme in SCHEMES if handle(scheme.handles))
 
 
 def steppings() -> tuple[Stepping, ...]:
-    """The step maps that schemes declare, in order: what stability studies map."""
+    """Return the step maps that schemes declare, in order: what stability studies map."""
     none: tuple[Stepping, ...] = ()
 
     def declared(scheme: type[Scheme]) -> tuple[Stepping, ...]:
@@ -109,7 +109,8 @@ def steppings_for(kind: Kind) -> tuple[Stepping, ...]:
 
 
 def candidates(asked: Asked) -> tuple[Rival, ...]:
-    """The candidates that schemes declare for such a body, by their rung: what ladders climb."""
+    """Return the candidates that schemes declare for such a body, by their rung: what ladders
+    climb."""
     none: tuple[Rival, ...] = ()
 
     def declared(scheme: type[Scheme]) -> tuple[Rival, ...]:

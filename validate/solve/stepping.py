@@ -1,4 +1,4 @@
-"""A time-stepping scheme as its step map per mode, and its predicted stability limit.
+"""Step map of a time-stepping scheme per mode, and its predicted stability limit.
 
 A mode is q'' + c q' + w^2 q = 0. Maps are taken in units of the step (w h, c h), which keeps their
 entries of order 1 whatever the step. Linear solvers (direct, CG, Gauss-Seidel) share one map. Every
@@ -22,7 +22,8 @@ UpdateName = Literal["printed", "lagged"]
 
 
 def newmark_maps(rule: Rule, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
-    """Maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2 (r,)."""
+    """Return the maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2
+    (r,)."""
     h, one, zero = rule.h, np.ones_like(c), np.zeros_like(c)
     q = np.stack(per_mode(rule, c, k)[:3], axis=-1)
     v_old = np.stack([zero, one, zero], axis=-1)

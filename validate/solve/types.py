@@ -1,4 +1,4 @@
-"""States, outcomes and runs."""
+"""Types of the solvers: states, outcomes and runs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: at which step and why."""
+    """Outcome of a run: its state, last step and reason."""
 
     state: Ending
     step: int
@@ -122,7 +122,7 @@ class Smoothing(Protocol):
         ...
 
     def smoother(self, notes: Sequence[Any]) -> Callable[[State], State]:
-        """Turns the states of the same steps, in order, into smoothed ones."""
+        """Turn the states of the same steps, in order, into smoothed ones."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""A page without methods and recordings of its own: that of a study, or over stored runs.
+"""Page of a study or of several stored runs, without methods and recordings of its own.
 
 It imports no solver: a summary of a thousand runs needs none.
 """
@@ -18,8 +18,8 @@ def write_loose(
     told: tuple[str, str, str, str], exhibits: tuple[Exhibit, ...], document: dict[str, Any],
     folder: Path, band: str, warnings: tuple[str, ...] = (),
 ) -> Path:  # fmt: skip
-    """Replaces `folder` by a page over stored runs, where nothing was run: page, tables, figures
-    and `document` as its results.json; returns the path of report.html.
+    """Replace `folder` by a page over stored runs, where nothing was run: page, tables, figures and
+    `document` as its results.json; returns the path of report.html.
 
     `told` are name, title, source and sentence, `band` a word before the sentence. Raises what
     `replace_folder` does.

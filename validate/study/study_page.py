@@ -1,4 +1,4 @@
-"""A finished study as its folder: results.json, tables, figures and a page; cells stay."""
+"""Folder of a finished study: results.json, tables, figures and a page; its cells stay."""
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -41,7 +41,7 @@ class Findings:
 def write_study(
     experiment: Experiment, told: Findings, folder: Path, made: Made | None = None
 ) -> Path:
-    """Replaces all of `folder` but its cells; returns the path of report.html.
+    """Replace all of `folder` but its cells; returns the path of report.html.
 
     A study that was there leaves its line, unless all that made it is equal. Raises what
     `replace_folder` and `draw_all` do.

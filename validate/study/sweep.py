@@ -1,4 +1,4 @@
-"""Sweeps as text: `path=log:1e-6:1e-1:7`, `path=lin:1kPa:5kPa:5`, `path=a,b,c`; several a grid."""
+"""Parser of sweeps and their grid: `path=log:1e-6:1e-1:7`, `path=lin:1kPa:5kPa:5`, `path=a,b,c`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

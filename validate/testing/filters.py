@@ -1,4 +1,4 @@
-"""Contract of a filter, on a small pulled cube of which one node is measured."""
+"""Contract of a filter, on a small cube under tension with one measured node."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A pulled cube: that of paper 001 and a smaller one, with measurements of single nodes."""
+"""Cube under tension (paper 001, and a smaller one), with measurements of single nodes."""
 
 from dataclasses import dataclass
 from functools import cache

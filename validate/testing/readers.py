@@ -1,4 +1,4 @@
-"""Contract of a reader: a checked recording, or one error of one line that names the file."""
+"""Contract of a reader: a checked recording, or a one-line error that names the file."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

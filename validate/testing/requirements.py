@@ -1,4 +1,4 @@
-"""What checks of a contract are made of."""
+"""Checks that contracts are made of."""
 
 from collections.abc import Callable
 from dataclasses import fields

@@ -1,4 +1,4 @@
-"""Twins: simulated experiments recorded as if measured; scene + scheme + sensors + seed."""
+"""Twins: synthetic recordings of simulated experiments (scene + scheme + sensors + seed)."""
 
 from validate.exports import lazily, names
 

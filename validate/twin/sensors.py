@@ -1,4 +1,4 @@
-"""Twins: a simulated experiment recorded as if it had been measured.
+"""Simulated sensors of a twin: stage, outline, pen and load cell, each with its noise.
 
 A twin is made by another and finer model than those it is used to judge, then walks the same road
 as a real recording. Each sensor draws from its own random stream, so that changing one leaves the
@@ -92,7 +92,7 @@ class Pen:
         return np.asarray(Rotation.from_euler("xyz", self.turn, degrees=True).as_matrix())
 
     def direction(self, d: tuple[float, float, float]) -> Floats:
-        """A direction (3,) of the scene in the pen's frame."""
+        """Return a direction (3,) of the scene in the pen's frame."""
         return np.asarray(self.rotation @ np.array(d))
 
     def measure(
@@ -124,7 +124,7 @@ class LoadCell:
 def signal(
     t: Floats, y: Floats, unit: str, sd: float, frame: str, rng: np.random.Generator
 ) -> Signal:
-    """A scalar y (nt,) read with white noise of sd in `unit`."""
+    """Return a scalar y (nt,) read with white noise of sd in `unit`."""
     return Signal(t, (y + sd * rng.standard_normal(len(y)))[:, None], unit, sd, frame)
 
 

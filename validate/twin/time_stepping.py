@@ -1,4 +1,4 @@
-"""A twin of a moving body: a scene solved at finer steps than the models', then tracked."""
+"""Twin of a moving body: a scene solved at finer steps than the models', then tracked."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class SteppedTwin:
     finer: int = 1
 
     def run(self, at: Ints) -> Run:
-        """The run at the ends of the models' steps; fields at those numbered `at` (no,)."""
+        """Return the run at the ends of the models' steps; fields at those numbered `at` (no,)."""
         f = self.finer
         dt = self.dt / f
         t: Floats = dt * np.arange(1, self.steps * f + 1, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A tracker's recording of a simulated motion: named points, fixed fiducials, inputs and forces.
+"""Tracker of a twin: named points, fixed fiducials, inputs and forces of a simulated motion.
 
 What a camera sees are positions in its own frame, so such a recording is registered as a measured
 one is (`register.placed`). Fiducials are points of a held face: they do not move, carry the
@@ -121,7 +121,7 @@ class Camera:
 
 
 def require_noise(variance: float) -> None:
-    """Raises `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
+    """Raise `UsageError` unless a tracker's variance m^2 is positive: filters divide by it."""
     if not variance > 0:
         raise UsageError(
             f"twin.noise = {variance:g} m2: expected a variance above 0; for a tracker without "

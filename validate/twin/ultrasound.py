@@ -1,4 +1,4 @@
-"""B-mode images: speckle of many scatterers under a point spread, seen through a scanner.
+"""Synthetic B-mode images: speckle of many scatterers under a point-spread function.
 
 Complex white scatterers, weighted by the echo amplitude of the tissue and blurred by an anisotropic
 Gaussian, give a circular Gaussian field, so the envelope of uniform tissue is Rayleigh distributed
@@ -59,12 +59,12 @@ class Target:
 
 
 def b_mode(scanner: Scanner, target: Target, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """The log-compressed image (height, width), 8 bits."""
+    """Return the log-compressed image (height, width), 8 bits."""
     return compressed(scanner, envelope(scanner, target, rng))
 
 
 def envelope(scanner: Scanner, target: Target, rng: np.random.Generator) -> Floats:
-    """The detected envelope (height, width); tissue without losses has mean power 1."""
+    """Return the detected envelope (height, width); tissue without losses has mean power 1."""
     shape = (scanner.height, scanner.width)
     field = _speckle(scanner, _amplitude(scanner, target, rng), rng)
     if target.plate is not None:

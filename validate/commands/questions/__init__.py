@@ -1,4 +1,4 @@
-"""Questions of `validate new`, and the declaration that the answers make.
+"""Questions of `validate new`, and the declaration made from the answers.
 
 Start with `new`.
 """

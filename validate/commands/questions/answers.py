@@ -1,4 +1,4 @@
-"""Answers to the questions of `validate new`: from a terminal, from TOML, or a list of open ones.
+"""Answers of `validate new`, from a terminal or TOML; list of open questions.
 
 A question is asked where the recording does not tell. One whose default stands is answered by it
 where nobody is there; without a default it is open, and all open ones are named at once.
@@ -46,7 +46,8 @@ class Question:
     words: tuple[str, ...] | None = None
 
     def checked(self, answer: str) -> str:
-        """The answer, stripped; raises `UsageError` that names the question for a wrong one."""
+        """Return the answer, stripped; raises `UsageError` that names the question for a wrong
+        one."""
         answer = answer.strip()
         if self.open and not answer:
             raise UsageError(f"{self.key}: the answer is missing; {self.text}")
@@ -133,13 +134,14 @@ def _beside(question: Question, answer: str, folder: Path | None) -> str:
 
 
 def on_a_terminal() -> bool:
-    """Whether somebody is there to be asked."""
+    """Return whether standard input is a terminal."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def listed(asks: Asks, given: Answers) -> str:
-    """The questions as a file of answers: those known so far, the given ones answered, and which
-    were answers to none. Raises `UsageError` for a wrong answer; an open one may be empty here."""
+    """Return the questions as a file of answers: those known so far, the given ones answered, and
+    which were answers to none. Raises `UsageError` for a wrong answer; an open one may be empty
+    here."""
     found: dict[str, str] = {}
     lines = []
     for _ in range(_MOST):

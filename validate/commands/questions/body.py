@@ -1,4 +1,4 @@
-"""Any body under what a recording says moved it: questions by the paths of its parameters."""
+"""Questions about a measured body of any shape, by the paths of its parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

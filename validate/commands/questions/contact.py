@@ -1,4 +1,4 @@
-"""Questions about a rigid indenter on a measured body, and about the machine that moves it."""
+"""Questions about a rigid indenter and its testing machine."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ _ENDS = 3.0  # a parabola is as much less certain at its end than in the mean
 
 
 def of_the_indenter(recording: Recording, found: Answers) -> list[Question]:
-    """Return the questions about what presses on the place that a displacement moves."""
+    """Return the questions about the indenter at the place that a displacement moves."""
     asked = [Question("indenter.shape", "rigid body that presses on the place; none: the place is "
                       "glued or gripped", "none", "the place itself is moved",
                       choices=_SHAPES)]  # fmt: skip
@@ -101,8 +101,8 @@ def reach_of(recording: Recording, found: Answers) -> float:
 
 
 def indented(found: Answers, sides: tuple[float, ...], reach: float) -> Geometry:
-    """The block or cylinder with cells that are small below the indenter: of a quarter, where that
-    is enough. Raises `UsageError` for a cylinder that is not pressed so."""
+    """Return the block or cylinder with cells that are small below the indenter: of a quarter,
+    where that is enough. Raises `UsageError` for a cylinder that is not pressed so."""
     quarter, round_ = _is_quarter(found, sides), len(sides) == 2
     if round_ and not quarter:
         raise UsageError(

@@ -1,4 +1,4 @@
-"""A block with a fluid-filled inclusion, from outlines, a stage and markers."""
+"""Questions about a block with a fluid-filled inclusion (outlines, stage, markers)."""
 
 from collections.abc import Sequence
 from dataclasses import fields as dataclass_fields

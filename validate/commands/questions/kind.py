@@ -1,4 +1,4 @@
-"""One kind of experiment that `validate new` writes."""
+"""Base type of the kinds of experiments that `validate new` writes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -54,8 +54,8 @@ def reason_question(name: str, default: str = "") -> Question:
 
 
 def accept_line(name: str, unit: str, found: Answers, each: tuple[str, ...] = ()) -> str:
-    """The requirement as an experiment's file declares it; of a motion in time one for `each`
-    marker, as the rms over its samples."""
+    """Return the requirement as an experiment's file declares it; of a motion in time one for
+    `each` marker, as the rms over its samples."""
     answer, many = found[f"accept.{name}"], name == "marker" and bool(each)
     what = "name" if many else f'"{name}"'
     whole = ', statistic="rms"' if many or name in _NOISY else ""
@@ -69,7 +69,7 @@ def accept_line(name: str, unit: str, found: Answers, each: tuple[str, ...] = ()
 
 
 def quantity_in(unit: str) -> Callable[[str], float]:
-    """A check: a positive number in `unit`, or with its own."""
+    """Return a check: a positive number in `unit`, or with its own."""
 
     def check(text: str) -> float:
         found = split(text)
@@ -82,8 +82,8 @@ def quantity_in(unit: str) -> Callable[[str], float]:
 
 
 def quadratic_fits(mesh: Mesh | None) -> bool:
-    """Whether quadratic cells of a mesh file, halved once for u_num, fit into the time of a first
-    answer; hexahedra are taken as they are."""
+    """Return whether quadratic cells of a mesh file, halved once for u_num, fit into the time of a
+    first answer; hexahedra are taken as they are."""
     if mesh is None or mesh.bricks:
         return False
     return linear_seconds(8 * quadratic(mesh).nodes.size) <= MESHES

@@ -1,4 +1,4 @@
-"""Kinds of questions about a measured body: what each takes, checked as it is answered."""
+"""Questions that several kinds of experiments share, with checks of the answers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -45,7 +45,7 @@ _SIDES_OF = {"body.block": 3, "body.cylinder": 2}
 
 
 def by_path(path: str, text: str, default: str = "", why: str = "") -> Question:
-    """A parameter's value as --set takes it."""
+    """Return a parameter's value as --set takes it."""
     return Question(path, text, default, why, open=not default, check=parsed(path))
 
 
@@ -82,7 +82,7 @@ def a_known_modulus(text: str) -> None:
 
 
 def parsed(key: str, skip: str = "") -> Callable[[str], Any]:
-    """A check of the parameter that an answer is of."""
+    """Return a check of the parameter that an answer is of."""
     if key in _SIDES_OF:
         return lambda text: sides(text, _SIDES_OF[key])
     first, _, last = key.partition(".")
@@ -92,7 +92,7 @@ def parsed(key: str, skip: str = "") -> Callable[[str], Any]:
 
 
 def named_place(key: str, text: str, mesh: Mesh | None, *, is_open: bool = False) -> Question:
-    """The first of them says what words there are; it is asked in every interview."""
+    """Return the first of them says what words there are; it is asked in every interview."""
     named = f" ({', '.join(mesh.facets)})" if mesh is not None and len(mesh.facets) < 20 else ""
     words = f": {GRAMMAR}{named}; join several with +" if key == "held.all" else ""
     return Question(

@@ -1,4 +1,4 @@
-"""Questions about the law of a material and its coefficients, for every law that there is."""
+"""Questions about the constitutive law of a material and its coefficients."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields

@@ -1,4 +1,4 @@
-"""Questions about the mesh file of a specimen between plates, and what it holds."""
+"""Questions about the mesh file of a specimen between plates."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Questions about a body that moves in time, and the methods of its experiment."""
+"""Questions about dynamics of a body and the methods of its experiment."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -133,8 +133,8 @@ def element(p: Tree, order: int) -> str:
 def motion_questions(
     recording: Recording, found: Answers, mesh: Mesh | None
 ) -> list[Question]:  # fmt: skip
-    """Whether the motion in time is solved, and what follows; none until the body, its supports,
-    material and load are known, or where nothing moves in time."""
+    """Return whether the motion in time is solved, and what follows; none until the body, its
+    supports, material and load are known, or where nothing moves in time."""
     if mesh is None or not all(found.get(k) for k in ("material.E", "material.nu", "moved.by")):
         return []
     if "held.slides" not in found:
@@ -259,7 +259,8 @@ def moving_methods(recording: Recording, p: Tree, found: Answers, order: int) ->
 
 
 def offered(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
-    """Names of the methods that fit the body and the recording; the cheapest is the last."""
+    """Return the names of the methods that fit the body and the recording; the cheapest is the
+    last."""
     kind = drive_kind(recording, p)
     preloaded = kind == "releases" or weight_beside(p.scene) is not None
     measured = bool(judged_markers(recording, p) or p.settings.seen.outline)
@@ -287,7 +288,7 @@ def _creeps(recording: Recording, p: Tree) -> bool:
 
 
 def proposed_methods(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
-    """The usual ones of those that are offered."""
+    """Return the usual ones of those that are offered."""
     return tuple(n for n in offered(recording, p, found) if n in _USUAL)
 
 
@@ -383,6 +384,6 @@ def judged_markers(recording: Recording, p: Tree) -> tuple[str, ...]:
 
 
 def require_dynamic(found: Answers) -> None:
-    """Raises `UsageError` for a release that is to be solved as statics."""
+    """Raise `UsageError` for a release that is to be solved as statics."""
     if found.get("moved.by") == RELEASE and found.get("motion.how") != DYNAMIC:
         raise UsageError("motion.how = static: a release is a motion in time; answer dynamic")

@@ -1,4 +1,4 @@
-"""`validate new`: an experiment file filled with what a recording holds and a user answers.
+"""`validate new`: write an experiment file from a recording and answers.
 
 Texts of the recording are data: they enter the file as Python literals or in comments without line
 ends, never as code.
@@ -52,7 +52,7 @@ def new(
     questions: bool = False,
     force: bool = False,
 ) -> None:
-    """Writes `out` (default experiments/NAME.py); refuses names that no module may have.
+    """Write `out` (default experiments/NAME.py); refuses names that no module may have.
 
     What the recording does not tell is taken from the file `answers`, asked on a terminal, or left
     open; `questions` only lists it.
@@ -131,7 +131,8 @@ def _checked_path(name: str, out: Path | None) -> Path:
 
 
 def fitting(recording: Recording) -> tuple[NewKind, ...]:
-    """The kinds of experiment that the recording can be; raises `UsageError` where it is none."""
+    """Return the kinds of experiment that the recording can be; raises `UsageError` where it is
+    none."""
     found = tuple(kind for kind in KINDS if kind.fits(recording))
     if found:
         return found
@@ -174,7 +175,8 @@ def written(
     kind: NewKind,
     found: Mapping[str, str],
 ) -> str:
-    """The experiment file's text; `source` is the recording's path from the file's `folder`."""
+    """Return the experiment file's text; `source` is the recording's path from the file's
+    `folder`."""
     template = Template((Path(__file__).parent / kind.template).read_text("utf-8"))
     title = f"{plain(recording.name)}: measured against {kind.against}"
     return template.substitute(

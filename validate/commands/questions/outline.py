@@ -1,4 +1,4 @@
-"""What `validate new` asks of images beside a log: which surface they show, and where they lie."""
+"""Questions about images that accompany a log: visible surface and image plane."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields as attributes
@@ -41,12 +41,12 @@ def shown_questions(recording: Recording) -> list[Question]:
 
 
 def inside(found: Answers) -> bool:
-    """Whether the outlines show an inclusion, which a mesh file has to hold."""
+    """Return whether the outlines show an inclusion, which a mesh file has to hold."""
     return found.get("outline.shows") == _WALL
 
 
 def filled(found: Answers) -> bool:
-    """Whether a fluid fills the inclusion."""
+    """Return whether a fluid fills the inclusion."""
     return inside(found) and found.get("outline.fluid") == "true"
 
 
@@ -98,7 +98,7 @@ def _path(path: str) -> Callable[[str], Any]:
 
 
 def used(recording: Recording, found: Answers) -> set[str]:
-    """The outlines that are judged, and the images that they were found in."""
+    """Return the compared outlines, and the images that they were extracted from."""
     if not whole(found):
         return set()
     topic = found["outline.topic"]
@@ -113,7 +113,7 @@ def assumed(recording: Recording, found: Answers) -> tuple[str, ...]:
 
 
 def whole(found: Answers) -> bool:
-    """Whether images show the body, which is then meshed as a whole."""
+    """Return whether images show the body, which is then meshed as a whole."""
     return found.get("outline.shows", _OTHER) != _OTHER
 
 

@@ -1,4 +1,4 @@
-"""A log of a testing machine: a body pressed between plates, or pulled between grips."""
+"""Questions about compression and tension tests of a testing machine."""
 
 from collections.abc import Sequence
 from dataclasses import fields

@@ -1,4 +1,4 @@
-"""The declaration that answers about a body make: its scene, and what is measured of it."""
+"""Declaration of a measured body's scene and observations from the answers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
@@ -41,15 +41,15 @@ _OPEN = ", identified"  # what stands open
 
 
 def rendered(part: Any, depth: int = 1) -> str:
-    """The part's constructor over several lines, indented `depth` levels; what is inside it stands
-    on one line each where that fits."""
+    """Return the part's constructor over several lines, indented `depth` levels; what is inside it
+    stands on one line each where that fits."""
     inner = _INDENT * depth
     body = "\n".join(f"{inner}{line}" for f in _told(part) for line in _lines(part, f, depth))
     return f"{type(part).__name__}(\n{body}\n{_INDENT * (depth - 1)})"
 
 
 def imports(parts: Iterable[Any], more: Mapping[str, tuple[str, ...]]) -> str:
-    """The import lines of the parts' classes, and of `more` names by module."""
+    """Return the import lines of the parts' classes, and of `more` names by module."""
     found = {module: set(names) for module, names in more.items()}
     for kind in {kind for part in parts for kind in _classes(part)}:
         found.setdefault(kind.__module__, set()).add(kind.__name__)
@@ -147,8 +147,8 @@ _TOPICS = ("seen.markers", "seen.force", "seen.outline")
 def tree_of(
     recording: Recording, found: Answers, cells: int = CELLS, order: int = 2
 ) -> Tree:  # fmt: skip
-    """The parameters that the answers so far make, in cells of that `order`; mesh files are found
-    from the current folder. Raises what the parts of the scene do."""
+    """Return the parameters that the answers so far make, in cells of that `order`; mesh files are
+    found from the current folder. Raises what the parts of the scene do."""
     body = geometry_of(found, cells, order, reach_of(recording, found))
     return Tree("", _scene(recording, found, body), _settings(found))
 
@@ -157,8 +157,8 @@ def tree_of(
 
 
 def geometry_of(found: Answers, cells: int, order: int, reach: float = -1.0) -> Geometry:
-    """The body that is answered; below an indenter of that `reach` m (0: a flat one) with cells
-    that are small there."""
+    """Return the body that is answered; below an indenter of that `reach` m (0: a flat one) with
+    cells that are small there."""
     if found.get("body.shape") == "file":
         element: Any = "quadratic" if order == 2 else "linear"
         halvings = int(found.get("body.halvings", "0"))
@@ -223,7 +223,7 @@ def _across(place: str, mesh: Mesh) -> int:
 
 
 def answered_mesh(found: Answers) -> Mesh | None:
-    """The body without its indenter, once it is known; raises what reading it does."""
+    """Return the body without its indenter, once it is known; raises what reading it does."""
     shape, file = found.get("body.shape", ""), found.get("body.file", "")
     needed = f"body.{shape}" if shape != "file" else "body.unit"
     if shape == "file" and (not file or Path(file).suffix.lower() not in FOREIGN):
@@ -263,7 +263,7 @@ def _scene(recording: Recording, found: Answers, body: Geometry) -> Scene:
 
 
 def material_of(found: Answers) -> Material:
-    """Raises `UsageError` and `SceneError` as its values do."""
+    """Raise `UsageError` and `SceneError` as its values do."""
     law: Any = found.get("law", "linear")
     usual = Material(None, _NU, rho=WATER).of_law(law)  # type: ignore[arg-type]
     skipped = left_open(found)
@@ -333,7 +333,7 @@ def _settings(found: Answers) -> MeasuredBody:
 
 
 def held_of(found: Answers) -> tuple[str, str]:
-    """The parameter that the answer on what was released is of, and its value."""
+    """Return the parameter that the answer on what was released is of, and its value."""
     text = found.get("moved.held", "")
     return held(text) if text else ("", "")
 
@@ -347,7 +347,7 @@ def held(text: str) -> tuple[str, str]:
 
 
 def damping_of(found: Answers) -> tuple[str, str]:
-    """The parameter that the answer on damping is of, and its value."""
+    """Return the parameter that the answer on damping is of, and its value."""
     text = found.get("motion.damping", "")
     return damping(text) if text else ("", "")
 

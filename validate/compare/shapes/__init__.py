@@ -1,4 +1,4 @@
-"""Two deformed bodies or displacement fields side by side: the metrics of paper 002.
+"""Metrics of two deformed bodies or displacement fields (paper 002).
 
 Start with `two_fields`.
 """

@@ -1,4 +1,4 @@
-"""The boundary of a deformed body as flat pieces: segments in the plane, triangles in space.
+"""Boundary of a deformed body: segments in the plane, triangles in space.
 
 Quadratic facets become the pieces between their nodes (2 segments, 4 triangles); a quadrilateral
 facet becomes 4 triangles round its middle, which enclose the volume under its bilinear patch; one
@@ -32,7 +32,7 @@ class Boundary:
 
 
 def deformed_boundary(mesh: Mesh, nodal: Floats) -> Boundary:
-    """The boundary of a mesh whose nodes moved to `nodal` (n, d) m.
+    """Return the boundary of a mesh whose nodes moved to `nodal` (n, d) m.
 
     Point and piece numbers depend on the mesh alone: two skins of one mesh correspond.
     """
@@ -50,7 +50,8 @@ def deformed_boundary(mesh: Mesh, nodal: Floats) -> Boundary:
 
 
 def outline_boundary(outline: Floats) -> Boundary:
-    """A closed curve (k, 2) m, recorded or drawn, as a boundary; its sense is turned outward."""
+    """Return a closed curve (k, 2) m, recorded or drawn, as a boundary; its sense is turned
+    outward."""
     points = checked(outline, "outline [m]", (None, 2), error=ComparisonError)
     if len(points) < 3:
         raise ComparisonError(f"an outline of {len(points)} points encloses nothing; 3 are needed")

@@ -1,4 +1,4 @@
-"""What a metric is: a name, a formula, its unit, what it rests on, a definition."""
+"""Type of a metric: name, formula, unit, inputs and definition."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class Metric(Generic[C_contra]):
         return self.unit.format(**compared.units)
 
     def score(self, compared: C_contra, prefix: str = "") -> Score:
-        """The score `<prefix><name>` against the reference."""
+        """Return the score `<prefix><name>` against the reference."""
         words = f"{self.definition}; {compared.where}; counted: {self.counted.of}"
         value, count = self.value(compared), self.counted.number(compared)
         unit = self.unit_of(compared)

@@ -1,4 +1,4 @@
-"""Two displacement fields side by side on one mesh: what every metric of two runs reads."""
+"""Pair of displacement fields on one mesh, the input of metrics of two runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -162,7 +162,7 @@ def _common(onto: Mesh | Scene | Common | None, other: Field) -> Common:
 
 
 def same_mesh(one: Mesh, other: Mesh) -> bool:
-    """Whether both have the same nodes and cells, so that fields need no interpolation."""
+    """Return whether both have the same nodes and cells, so that fields need no interpolation."""
     return one is other or (
         one.kind == other.kind
         and np.array_equal(one.nodes, other.nodes)

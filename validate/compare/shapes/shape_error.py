@@ -43,7 +43,7 @@ def symmetric_difference(one: Boundary, other: Boundary) -> float:
 
 
 def polygon(boundary: Boundary) -> shapely.MultiPolygon:
-    """The plane body inside a boundary: outer loops run anticlockwise, holes clockwise."""
+    """Return the plane body inside a boundary: outer loops run anticlockwise, holes clockwise."""
     rings = [shapely.Polygon(boundary.points[loop]) for loop in _loops(boundary)]
     outward = [shapely.is_ccw(r.exterior) for r in rings]
     shells = [r for r, out in zip(rings, outward, strict=True) if out]

@@ -1,4 +1,4 @@
-"""What must hold before shapes are compared: cells upright, boundary outward, no crossings.
+"""Preconditions of a shape comparison: cell orientation, outward boundary, no crossings.
 
 An inside-out boundary has an empty symmetric difference with anything in most libraries, so that a
 wrong body would score 0: it is refused here first.
@@ -93,7 +93,7 @@ class Soundness:
 
 
 def soundness(mesh: Mesh, u: Floats, boundary: Boundary) -> Soundness:
-    """The state of the body with displacement u (n, d) m and that deformed boundary."""
+    """Return the state of the body with displacement u (n, d) m and that deformed boundary."""
     return Soundness(
         inverted_cells(mesh, u), len(mesh.cells), enclosed(boundary), crossings(boundary)
     )
@@ -109,7 +109,7 @@ def inverted_cells(mesh: Mesh, u: Floats | None = None) -> Ints:
 
 
 def require_upright(mesh: Mesh, name: str) -> None:
-    """Raises `ComparisonError` with counts when cells are inverted or flat at rest."""
+    """Raise `ComparisonError` with counts when cells are inverted or flat at rest."""
     wrong = inverted_cells(mesh)
     if len(wrong):
         raise ComparisonError(
@@ -119,7 +119,7 @@ def require_upright(mesh: Mesh, name: str) -> None:
 
 
 def require_comparable(sound: Soundness, name: str) -> None:
-    """Raises `ComparisonError` when the deformed boundary is inside out or crosses itself."""
+    """Raise `ComparisonError` when the deformed boundary is inside out or crosses itself."""
     inverted = f"{len(sound.inverted)} of {sound.cells} cells are inverted"
     if sound.volume <= 0:
         raise ComparisonError(

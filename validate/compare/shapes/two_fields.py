@@ -1,4 +1,4 @@
-"""All metrics of two displacement fields, in one tuple and behind one call (paper 002, III)."""
+"""All metrics of two displacement fields in one call (paper 002, III)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Filters that run several members of a model: ensemble Kalman filter, unscented in parameters.
+"""Filters with several model members: ensemble Kalman filter, unscented in parameters.
 
 Start with `ensemble_kf`; `member_filter` steps all of them.
 """

@@ -1,4 +1,4 @@
-"""Ensemble Kalman filter: random members of one model, corrected by their own sample covariance.
+"""Ensemble Kalman filter: random members of one model, corrected by sample covariance.
 
 Members differ in parameters and loads, which may walk, and so in their states (Evensen 1994, with
 the perturbed measurements of Burgers et al. 1998, or without any, Sakov & Oke 2008). Few members
@@ -97,7 +97,7 @@ class EnsembleKf(MemberModel):
             )
 
     def prepare(self, system: System, measurements: Measurements) -> MemberStepper:
-        """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
+        """Raise `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have and for localised shapes, `ComparisonError` for times off the steps."""
         require_handled(system.scene, self)
         members = self.members(system)

@@ -1,4 +1,4 @@
-"""The stepper of filters that run several members of one model, each with parameters of its own.
+"""Stepper of filters with several model members, each with its own parameters.
 
 Between measurements every member is a run of the model; at one, an `Analysis` corrects states and
 parameters together. What is estimated is the members' mean, with their spread.
@@ -52,7 +52,7 @@ HANDLES = Handles(("linear", *LARGE), inertia=True, cavities=False, drives=False
 
 @dataclass(frozen=True)
 class MemberModel:
-    """What members are: the parameters they differ in (`doubtful`), and how they step.
+    """Model of the members: their uncertain parameters (`doubtful`) and their step.
 
     A linear scene steps implicitly by Newmark's rule, in few shapes or in all nodes; one at large
     strain explicitly, in all nodes, with a step that the stiffest member must bear.
@@ -101,7 +101,7 @@ class MemberModel:
         return doubts(scene, self.parameters, self.sd, self.bias_sd)
 
     def members(self, system: System) -> Members:
-        """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
+        """Raise `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have."""
         of = self.doubts(system.scene)
         if system.scene.material.law != "linear":
@@ -110,7 +110,7 @@ class MemberModel:
         return implicit_members(system, of, rule, self.coordinates, self.shapes, at_once)
 
     def limit(self, system: System) -> float:
-        """The largest step s of a member as stiff as the model; infinite where none is."""
+        """Return the largest step s of a member as stiff as the model; infinite where none is."""
         if system.scene.material.law == "linear" or self.beyond_limit == "run":
             return np.inf
         return (1 - MARGIN) * critical_step(system).lanczos
@@ -157,7 +157,7 @@ class Sight:
 
 
 def sight(model: MemberModel, members: Members, measurements: Measurements) -> Sight:
-    """Raises `ComparisonError` for times off the members' steps, `UsageError` as `care_of`."""
+    """Raise `ComparisonError` for times off the members' steps, `UsageError` as `care_of`."""
     H, shapes = measurements.H, members.displaced
     at = np.unique(H.indices) if shapes is None else np.arange(len(shapes))
     rows = H[:, at].toarray() if shapes is None else H @ shapes.T
@@ -217,7 +217,8 @@ class MemberStepper(OneAtATime):
         return State(0, MemberStates(X, x, self.members.ready(x), np.zeros(len(self.scene.inputs))))
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The posterior at the end of a step of `substeps` parts; `inputs` are the loads there."""
+        """Return the posterior at the end of a step of `substeps` parts; `inputs` are the loads
+        there."""
         if state.k == 0 and (failure := self._refused(state.inner.x)):
             return replace(state, failure=failure)
         last, found = cast(MemberStates, state.inner), nothing(len(self.offered.names))

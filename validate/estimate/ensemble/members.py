@@ -1,4 +1,4 @@
-"""Several runs of one model side by side, each with its own parameters and its own state.
+"""Members of one model, stepped together, each with its own parameters and state.
 
 A member's state is a row of X (s, n): implicit members carry displacement, velocity and
 acceleration, explicit ones U_t and U_{t-h}. Rows may be mixed linearly, which is what filters do.

@@ -1,4 +1,4 @@
-"""What a filter may doubt of a model besides its state, chosen by name, and what it scales.
+"""Uncertain model parameters that a filter can estimate together with its state.
 
     stiffness        of every cell            stiffness.<region>  of a region's cells
     stiffness.body   of cells of no region    support.<facets>    of a foundation (or its number)
@@ -38,7 +38,7 @@ class Doubtful:
     index: int = -1
 
     def value(self, x: float) -> float:
-        """The parameter in its unit, of its coordinate."""
+        """Return the parameter in its unit, of its coordinate."""
         return x if self.kind == "bias" else float(self.nominal * np.exp(x))
 
 
@@ -60,7 +60,8 @@ class Doubts:
         return tuple(j for j, p in enumerate(self.parameters) if p.kind in kinds)
 
     def stiffest(self, x: Floats) -> float:
-        """The largest factor on any stiffness among members x (s, p): no part has a larger one."""
+        """Return the largest factor on any stiffness among members x (s, p): no part has a larger
+        one."""
         return float(np.exp((x @ self._factors).max(initial=0.0)))
 
     @cached_property
@@ -86,7 +87,8 @@ class Doubts:
 
 @dataclass(frozen=True)
 class StiffnessPart:
-    """What a few coordinates scale together: cells of one body, or a foundation's springs.
+    """Part of the stiffness that a few coordinates scale: cells of one body, or a foundation's
+    springs.
 
     `mask` (p,) are the coordinates whose sum is the logarithm of its factor; `scene` has the part
     alone (springs: none, but `foundation`).
@@ -149,8 +151,8 @@ def _known(scene: Scene) -> Iterator[Doubtful]:
 
 
 def parts(scene: Scene, of: Doubts) -> tuple[StiffnessPart, ...]:
-    """The scene's stiffness in parts: one for every group of cells that the parameters tell apart,
-    then one for every foundation."""
+    """Return the scene's stiffness in parts: one for every group of cells that the parameters tell
+    apart, then one for every foundation."""
     p = len(of.parameters)
     masks = np.zeros((len(scene.mesh.cells), p))
     for j in of.columns("stiffness"):

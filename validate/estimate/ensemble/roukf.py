@@ -74,7 +74,7 @@ class Roukf(MemberModel):
     points: SigmaName = quantity("simplex", "1", "sigma points of p parameters: p + 1, or 2 p")
 
     def prepare(self, system: System, measurements: Measurements) -> MemberStepper:
-        """Raises `SceneError` for what no member can step, `UsageError` for parameters that the
+        """Raise `SceneError` for what no member can step, `UsageError` for parameters that the
         scene does not have, `ComparisonError` for measurements off the steps."""
         require_handled(system.scene, self)
         members = self.members(system)

@@ -1,4 +1,4 @@
-"""The extended Kalman filter of paper 003, node by node, on the explicit step.
+"""Extended Kalman filter by node (paper 003) on the explicit step.
 
 Start with `node_ekf`.
 """

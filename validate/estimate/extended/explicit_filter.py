@@ -1,4 +1,4 @@
-"""The stepper of filters that predict with the explicit step, around a core that they bring."""
+"""Stepper of filters that predict with the explicit step, with an exchangeable core."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from validate.solve.types import Ending, State
 
 
 class Memory(Protocol):
-    """What a core carries: displacements (N,) m, and what else it needs."""
+    """State of a core: displacements (N,) m, and its further data."""
 
     @property
     def u(self) -> Floats: ...

@@ -1,4 +1,4 @@
-"""The plain explicit step that the nonlinear filters predict with (paper 003, eqs 18-23).
+"""Explicit step that the nonlinear filters predict with (paper 003, eqs 18-23).
 
 Central difference on lumped masses: U_{t+dt} from U_t, U_{t-dt} and the forces at time t. Damping
 is the mass-proportional share of Rayleigh's, which stays diagonal.
@@ -57,7 +57,8 @@ class ExplicitStep:
         )
 
     def inputs(self, old: Floats, new: Floats, part: int) -> tuple[Floats, Floats]:
-        """Loads N at the start and drives m at the end of a part of the way between two inputs."""
+        """Return the loads N at the start and drives m at the end of a part of the way between two
+        inputs."""
         k = self.system.moves.shape[1]
         if self.parts == 1:
             return old[k:], new[:k]
@@ -77,7 +78,7 @@ class ExplicitStep:
 def explicit_step(
     system: System, dt: float, parts: int, precision: Precision = "double"
 ) -> ExplicitStep:
-    """The step of h = dt/parts; raises `SceneError` for damping that is not diagonal."""
+    """Return the step of h = dt/parts; raises `SceneError` for damping that is not diagonal."""
     h, lags = dt / parts, system.scene.per_cell(lambda m: m.stiffness_damping)
     if lags.any():
         raise SceneError(

@@ -1,4 +1,4 @@
-"""Compiled arithmetic of the nonlinear filters: the explicit step and the node-level update.
+"""Compiled loops of the nonlinear filters: explicit step and node-level update.
 
 Paper 003, eqs 35-39. P is packed by row, one column a component or node:
 "component" 1 row of variances m^2, "companion" 3 rows (U_t, cross, U_{t-dt}) of 2 x 2 covariances,
@@ -48,7 +48,7 @@ def follow(
 
 @_compiled
 def farthest(u: Floats) -> float:
-    """The largest |u|; infinite where one is not a number.
+    """Return the largest |u|; infinite where one is not a number.
 
     By their bits, which are ordered as the numbers are, and in vectors.
     """
@@ -76,7 +76,7 @@ def spread_components(
 def spread_companions(
     P: Floats, new: Floats, c2: Floats, c1: Floats, w: Floats, K: Floats, Q: Floats
 ) -> int:  # fmt: skip
-    """A P A^T + Q of (U_t, U_{t-dt}), A = [[a, -c1], [1, 0]]; counts those beyond `HUGE`."""
+    """Return a P A^T + Q of (U_t, U_{t-dt}), A = [[a, -c1], [1, 0]]; counts those beyond `HUGE`."""
     count = 0
     for i in range(P.shape[1]):
         a = c2[i] - w[i] * K[i]
@@ -90,7 +90,7 @@ def spread_companions(
 
 @_compiled
 def spread_nodes(P: Floats, new: Floats, c2: Floats, w: Floats, K: Floats, Q: Floats) -> int:
-    """A P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
+    """Return a P A^T + Q of every node, A = c2 I - w K_nn (3 x 3); counts those beyond `HUGE`.
 
     K (n, 6) holds the packed rows; c2, w and Q (N,) are those of the nodes' components.
     """
@@ -184,7 +184,7 @@ def correct_components(
 def correct_companions(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats, joseph: bool
 ) -> tuple[float, float]:
-    """The update of (U_t, U_{t-dt}) together, measured in U_t; returns NIS and ln det S."""
+    """Return the update of (U_t, U_{t-dt}) together, measured in U_t; returns NIS and ln det S."""
     nis, log_det, now, cross, old = 0.0, 0.0, P[0], P[1], P[2]
     for m in range(len(rows)):
         i = rows[m]
@@ -211,7 +211,7 @@ def correct_nodes(
     u: Floats, before: Floats, P: Floats, rows: Ints, z: Floats, R: Floats,
     joseph: bool, shift: bool,
 ) -> tuple[float, float]:  # fmt: skip
-    """The 3 x 3 update of the measured nodes, one component after the other; returns NIS and
+    """Return the 3 x 3 update of the measured nodes, one component after the other; returns NIS and
     ln det S.
 
     R is diagonal, so this is the joint update of a node's components.
@@ -244,7 +244,7 @@ def correct_nodes(
 
 @_compiled
 def clip(P: Floats) -> int:
-    """Scales the covariances beyond `HUGE` back to it; returns how many. One that has left the
+    """Scale the covariances beyond `HUGE` back to it; returns how many. One that has left the
     number range altogether becomes `HUGE` in its variances, uncorrelated."""
     count = 0
     for i in range(P.shape[1]):

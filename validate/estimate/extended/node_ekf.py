@@ -1,4 +1,4 @@
-"""The extended Kalman filter node by node, as paper 003 prints it (steps i-iv, eqs 24-39).
+"""Extended Kalman filter by node as in paper 003 (steps i-iv, eqs 24-39).
 
 Every component of every node is a filter of its own: its covariance sees the diagonal of the
 tangent only, so nothing that is measured at one node reaches another. Without measurements P grows
@@ -79,7 +79,7 @@ class NodeEKF:
             raise UsageError("P0 and Qp must be >= 0, and Qm above 0")
 
     def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
-        """Raises `SceneError` for what the explicit step cannot do, `ComparisonError` for
+        """Raise `SceneError` for what the explicit step cannot do, `ComparisonError` for
         measurements that are no components of nodes or that land between the steps."""
         require_handled(system.scene, self)
         explicit = explicit_step(system, self.dt, self.substeps, self.precision)

@@ -1,4 +1,4 @@
-"""filterpy's filters behind our checks, and our filters beside them.
+"""filterpy's filters with this package's checks, and a comparison with its own filters.
 
 Only `names` imports filterpy.
 """

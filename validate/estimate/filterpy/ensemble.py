@@ -1,4 +1,4 @@
-"""filterpy's ensemble filter of a linear model, whose `predict` takes the loads."""
+"""filterpy's ensemble filter of a linear model, with loads in `predict`."""
 
 import copy
 from typing import Any

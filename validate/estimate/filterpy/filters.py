@@ -128,7 +128,7 @@ class FilterpyFilter:
     smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
-        """Raises `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
+        """Raise `SceneError` as `ReducedKf`, `ComparisonError` for a filter that is none, or whose
         shapes are not the model's, `UsageError` for smoothing one whose covariances are its own."""
         require_handled(system.scene, self)
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
@@ -157,7 +157,7 @@ def _made(make: Make | str) -> Make:
 
 
 def require_shapes(filter_: Any, model: LinearModel) -> None:
-    """Raises `ComparisonError` unless the filter's arrays fit the model and each other."""
+    """Raise `ComparisonError` unless the filter's arrays fit the model and each other."""
     n, m, kind = model.size, len(model.H), type(filter_).__name__
     wanted = {"x": (n,), "P": (n, n), "Q": (n, n), "R": (m, m), "F": (n, n), "H": (m, n)}
     for name, shape in wanted.items():
@@ -180,7 +180,7 @@ def require_shapes(filter_: Any, model: LinearModel) -> None:
 
 
 def require_exact_covariances(filter_: Any) -> None:
-    """Raises `UsageError` unless P and gain of the filter are those of the linear model.
+    """Raise `UsageError` unless P and gain of the filter are those of the linear model.
 
     filterpy's unscented filter computes its gain from points without the step's noise."""
     from validate.estimate.filterpy.names import KalmanFilter

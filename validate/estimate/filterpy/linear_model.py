@@ -40,7 +40,7 @@ class LinearModel:
 
 
 def require_symmetric(P: Floats, name: str) -> None:
-    """Raises `ComparisonError` when P differs from its transpose by more than rounding."""
+    """Raise `ComparisonError` when P differs from its transpose by more than rounding."""
     off, scale = float(np.abs(P - P.T).max()), float(np.abs(P).max())
     if off > 1e-9 * scale:
         raise ComparisonError(f"{name}: differs from its transpose by {off:.1e} of {scale:.1e}")

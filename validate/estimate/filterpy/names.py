@@ -1,4 +1,4 @@
-"""The one door to filterpy (2.0, MIT): its names, and what its ensemble draws from."""
+"""Import of filterpy (2.0, MIT) in one place: its names and its random generator."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

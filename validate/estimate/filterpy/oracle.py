@@ -1,4 +1,4 @@
-"""Our small filters beside filterpy's: exact pairs on small systems, agreement to rounding."""
+"""Reference pairs of this package's filters and filterpy's: agreement to rounding."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""Linear Kalman filters: formulas, covariance, gains; KF-FEM of paper 001, in nodes and in modes.
+"""Linear Kalman filters: formulas, covariance, gains; KF-FEM of paper 001 by node and by mode.
 
 Start with `formulas`, then `kf_fem`.
 """

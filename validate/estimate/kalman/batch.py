@@ -1,4 +1,4 @@
-"""Many recordings of one experiment filtered together: they share the gains, which need no data."""
+"""Batch filtering of many recordings of one experiment with common gains."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ class OneAtATime:
 def batch_of(
     gains: GainSequence, values: Floats, y: Floats, stacked: "StackedGains", dof: Floats
 ) -> Batch:
-    """The statistics of innovations y (seeds, nt, m) m that these gains left."""
+    """Return the statistics of innovations y (seeds, nt, m) m that these gains left."""
     nis, log_det = stacked.statistics(y)
     density = np.asarray(log_likelihood(nis, dof, log_det))
     return Batch(values, y, nis, dof, density, gains.frozen)
@@ -66,7 +66,7 @@ class StackedGains:
 
 
 def stacked_gains(gains: GainSequence, nt: int, m: int, n: int) -> StackedGains:
-    """The gains of nt steps in arrays: m components measured, n numbers in the state."""
+    """Return the gains of nt steps in arrays: m components measured, n numbers in the state."""
     places: dict[int, int] = {}
     which = np.full(nt, -1)
     distinct: list[Gain] = []
@@ -86,7 +86,7 @@ def stacked_gains(gains: GainSequence, nt: int, m: int, n: int) -> StackedGains:
 
 
 def in_amplitudes(nodal: Dense, modes: InModes) -> Decoupled:
-    """The recursion of nodal displacements in amplitudes of all modes: its transition is
+    """Return the recursion of nodal displacements in amplitudes of all modes: its transition is
     diagonal."""
     Q = _white(nodal.Q, modes)
     if Q is None:

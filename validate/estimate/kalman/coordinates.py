@@ -31,7 +31,7 @@ class Coordinates(Protocol):
         ...
 
     def amplitudes(self, u: Floats) -> Floats:
-        """The coordinates of u (m,) or (m, k)."""
+        """Return the coordinates of u (m,) or (m, k)."""
         ...
 
     def variances(self, P: Floats) -> Floats:
@@ -114,7 +114,7 @@ def _in_modes(system: System, rule: Rule) -> InModes:
 
 
 def excitation_in(coordinates: Coordinates, nodal: Excitation) -> Excitation:
-    """What inputs do, in the coordinates: forces are linear in its columns."""
+    """Return the effect of inputs in the coordinates: forces are linear in its columns."""
     of = coordinates.forces
     return replace(
         nodal,

@@ -1,4 +1,4 @@
-"""Covariance recursions of a linear Kalman filter: they need no data, only when data comes.
+"""Covariance recursions of a linear Kalman filter; they need times of data, no values.
 
 A `Claim` is what the filter claims about its error. Updates are kept as the pair G, B of Joseph's
 form at the best gain, P+ = P- + G B^T + B G^T with B = G S_yy / 2 - P- H^T, which is symmetric by
@@ -29,7 +29,7 @@ class Claim:
 
 
 class Recursion(Protocol):
-    """What gains come from; H (m, n) reads measured components from the coordinates."""
+    """Recursion that gains follow from; H (m, n) reads measured components from the coordinates."""
 
     @property
     def H(self) -> Floats: ...
@@ -40,11 +40,11 @@ class Recursion(Protocol):
         ...
 
     def start(self) -> Claim:
-        """What is claimed before the first step."""
+        """Return the covariance before the first step."""
         ...
 
     def predict(self, claim: Claim, steps: int = 1) -> Claim:
-        """What is claimed so many steps >= 1 later, nothing measured."""
+        """Return the covariance so many steps >= 1 later, without a measurement."""
         ...
 
     def update(self, claim: Claim, seen: Seen, late: Floats | None = None) -> tuple[Gain, Claim]:
@@ -62,7 +62,7 @@ class Covariance(Recursion, Protocol):
     def P0(self) -> Floats: ...
 
     def ahead(self, x: Floats) -> Floats:
-        """A x."""
+        """Return a x."""
         ...
 
     def back(self, x: Floats) -> Floats:
@@ -80,7 +80,7 @@ def noise(R: Floats, late: Floats | None) -> Floats:
 
 
 def claimed(P: Floats, PHt: Floats) -> Claim:
-    """A claim without an update to come."""
+    """Return a claim without an update to come."""
     none = np.zeros((len(P), 0))
     return Claim(P, PHt, none, none)
 
@@ -106,7 +106,7 @@ class Dense:
         return np.asarray(self.A.T @ x)
 
     def over(self, steps: int) -> tuple[Floats, Floats]:
-        """A and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
+        """Return a and Q (n, n) of so many steps >= 1 together, by repeated squaring; kept."""
         if steps == 1:
             return self.A, self.Q
         if steps not in self._kept:

@@ -1,4 +1,4 @@
-"""Kalman filters whose state is the displacement vector: paper 001's, in two sets of coordinates.
+"""Kalman filters whose state is the displacement vector (paper 001), nodal or modal.
 
 The state equation is Newmark's step, u' = J^-1 A u + J^-1 (L v + M a + f) (paper 001, eqs 11-14):
 velocity and acceleration are inputs, recursed beside the filter and not part of its state, so P
@@ -47,7 +47,7 @@ Structure = Literal["white", "load"]
 
 @dataclass(frozen=True)
 class Sensed:
-    """What is measured and where it lands; rows H (m, n) of the coordinates, `driven` (m, k) of
+    """Measurements and their time steps; rows H (m, n) of the coordinates, `driven` (m, k) of
     drives."""
 
     offered: Measurements
@@ -139,7 +139,7 @@ class DisplacementStepper(InertialStepper):
         return State(0, Estimate(zeros, zeros, zeros, self.excitation.rest(), claim))
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The posterior at the end of a step; `inputs` are those there, loads included."""
+        """Return the posterior at the end of a step; `inputs` are those there, loads included."""
         last: Estimate = state.inner
         k, of = state.k + 1, self.coordinates
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)

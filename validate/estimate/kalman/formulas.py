@@ -1,4 +1,4 @@
-"""The formulas of a Kalman filter, written once: predict, innovation, gain, update.
+"""Kalman filter formulas: predict, innovation, gain, update.
 
 Pure functions of states x (n,), covariances P (n, n) and measurements z (m,), NaN = missing, all of
 one system of units; `filterpy_oracle.oracle_table` shows that they equal filterpy's to rounding.
@@ -140,7 +140,7 @@ def log_likelihood(nis: Any, dof: Any, log_det: Any) -> Any:
 
 
 def nothing(m: int) -> Innovation:
-    """A step without a measurement."""
+    """Return a step without a measurement."""
     return Innovation(np.zeros(m), np.zeros(m), 0.0, 0)
 
 
@@ -175,7 +175,7 @@ def kf_predict(prior: Gaussian, A: Floats, Q: Floats, forced: Floats | float = 0
 
 
 def kf_update(prior: Gaussian, z: Floats, H: Floats, R: Floats) -> Update:
-    """The linear update (paper 001, eq 3)."""
+    """Return the linear update (paper 001, eq 3)."""
     return ekf_update(prior, z, lambda x: np.asarray(H @ x), lambda _: H, R)
 
 
@@ -185,7 +185,7 @@ def ekf_predict(prior: Gaussian, f: Function, jacobian: Function, Q: Floats) -> 
 
 
 def ekf_update(prior: Gaussian, z: Floats, h: Function, jacobian: Function, R: Floats) -> Update:
-    """The update with H = dh/dx (m, n) at the prior."""
+    """Return the update with H = dh/dx (m, n) at the prior."""
     H, i = jacobian(prior.x), np.isfinite(z)
     PHt = prior.P @ H.T
     gain = best_gain(PHt, H @ PHt + R, tuple(i.tolist()))

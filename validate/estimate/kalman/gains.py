@@ -1,4 +1,4 @@
-"""Gains before any data: those of a linear filter depend only on when what is measured."""
+"""Precomputed gains of a linear filter; they depend only on the schedule of measurements."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -106,7 +106,7 @@ def gain_sequence(
 
 
 class Claims:
-    """What is claimed at the end of any step, recomputed in one walk while steps rise.
+    """Covariance at the end of any step, recomputed in one pass while steps rise.
 
     A whole covariance per step would not fit in memory; only the walk's place is kept.
     """

@@ -1,4 +1,4 @@
-"""KF-FEM as paper 001 prints it: the state is the displacement vector of all free unknowns.
+"""KF-FEM as in paper 001: the state is the displacement vector of all free unknowns.
 
 The reading that gives the paper's NRMSE .0116: its noise "intensity of 0.001" is a variance in mm^2
 (1e-9 m^2) for Q, R and P0 alike, P0 is that at t = 0 and the first measurement comes after one
@@ -104,7 +104,7 @@ class KfFem(DisplacementNoise):
     """
 
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
-        """Raises `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
+        """Raise `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
         require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt)
@@ -140,7 +140,7 @@ class KfFem(DisplacementNoise):
 def modal_covariance(
     settings: DisplacementNoise, system: System, measurements: Measurements, modes: InModes
 ) -> Covariance:
-    """The recursion whose transition is diagonal."""
+    """Return the recursion whose transition is diagonal."""
     H = measurements.free(system.free)
     noise, R = noise_shape(settings, system, modes, H), measurements.variances(settings.R)
     seen = np.ascontiguousarray(H @ modes.shapes)
@@ -150,7 +150,7 @@ def modal_covariance(
 def noise_shape(
     settings: DisplacementNoise, system: System, coordinates: Coordinates, H: Floats
 ) -> Floats:
-    """What one m^2 of Q or P0 means in the coordinates (n, n)."""
+    """Return the covariance (n, n) in the coordinates for one m^2 of Q or P0."""
     if settings.structure == "white":
         return coordinates.white if isinstance(coordinates, InModes) else np.eye(len(system.free))
     roots = coordinates.amplitudes(load_shapes(system, H))
@@ -166,7 +166,7 @@ def stepper_of(
     claimed: Coordinates,
     gains: GainSequence | None,
 ) -> DisplacementStepper:
-    """The stepper in `coordinates`, its covariance recursed in those of `claimed`."""
+    """Return the stepper in `coordinates`, its covariance recursed in those of `claimed`."""
     table, H = timetable(measurements, settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
     rule, a0 = rule_of(settings.rule, settings.dt), settings.a0

@@ -1,4 +1,4 @@
-"""Compiled loops over modes: the covariance of a diagonal transition, and a filter's whole walk."""
+"""Compiled loops over modes: covariance of a diagonal transition, and all steps of a filter."""
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def advance_observed(
 
 
 def mirrored(P: Floats) -> Floats:
-    """The symmetric matrix whose lower triangle P holds."""
+    """Return the symmetric matrix whose lower triangle P holds."""
     lower = np.tril(P)
     return lower + np.tril(P, -1).T
 

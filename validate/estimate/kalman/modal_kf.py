@@ -1,4 +1,4 @@
-"""The same filter as KF-FEM in modal coordinates, where a step of the covariance is no product.
+"""KF-FEM in modal coordinates, where a covariance step needs no matrix product.
 
 Newmark's transition is diagonal there, so P- = P * f f^T + Q takes one pass over P instead of two
 dense products; with all modes the estimate equals KF-FEM's to rounding, white Q included (it is
@@ -26,7 +26,7 @@ class ModalKf(DisplacementNoise):
     gains: Gains = quantity("every_step", "1", "computed in advance, or at every step")
 
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
-        """Raises `SceneError` for what linear schemes refuse and for damping that couples modes."""
+        """Raise `SceneError` for what linear schemes refuse and for damping that couples modes."""
         require_handled(system.scene, self)
         return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))
 

@@ -1,4 +1,4 @@
-"""Covariance of the observed unknowns alone: all gains of a linear filter by a small recursion.
+"""Covariance of the observed unknowns: all gains of a linear filter by a small recursion.
 
 A gain needs P H^T only. With V (n, r) spanning H^T, A H^T, A^2 H^T, ... and A V = V T the columns
 P V close among themselves: (P- V) = A (P V) T + Q V, (P+ V) = P- V - G H P- V. They stay in the
@@ -71,7 +71,7 @@ class Observed:
 
 
 def observed(covariance: Decoupled, steps: int, known: Spaces) -> Observed | None:
-    """The narrow recursion if `steps` steps stay in a space that is narrow, else None.
+    """Return the narrow recursion if `steps` steps stay in a space that is narrow, else None.
 
     `known` keeps spaces for filters that differ in their variances only.
     """

@@ -1,4 +1,4 @@
-"""A linear system in few modes with unknown load, as a model whose state is the whole state.
+"""Linear system in few modes with unknown load, as a small state-space model.
 
 x = (q, q', r, b): amplitudes and rates of the lowest modes, the rest r and a bias b in N of every
 load, which walks at random. Every mode is exact for loads held at their end value over a step. What
@@ -23,7 +23,7 @@ from validate.solve.dynamic.modal import exact_walk, left_out
 
 @dataclass(frozen=True)
 class LoadDoubt:
-    """How unsure the loads are: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
+    """Uncertainty of the loads: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
 
     `jitter` N (sd) is force noise of each step on its own.
     """
@@ -54,7 +54,7 @@ class ReducedModel:
 def reduced_model(
     system: System, measurements: Measurements, dt: float, modes: int, doubt: LoadDoubt, R: Floats
 ) -> ReducedModel:
-    """The model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
+    """Return the model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
 
     Raises `SceneError` for damping that couples the modes.
     """

@@ -1,4 +1,4 @@
-"""The smallest sound filter of a quasi-static scene: one shape, its amplitude, the load's scale.
+"""Filter of one amplitude and the scale of a load, for quasi-static scenes.
 
 u = a s with the static displacement s of the load; a follows scale * a_static with the shape's own
 time constant, which all modes share under stiffness damping alone, as in paper 001's cube. A wrong
@@ -53,7 +53,7 @@ class LoadScale:
     smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
-        """Raises `SceneError` unless one load moves the scene and the shape creeps, not swings."""
+        """Raise `SceneError` unless one load moves the scene and the shape creeps, not swings."""
         require_handled(system.scene, self)
         if len(system.scene.loads) != 1:
             raise SceneError(f"{len(system.scene.loads)} loads: one shape needs exactly one load")

@@ -1,4 +1,4 @@
-"""An extended Kalman filter on few shapes and the bias of the loads, beside the plain explicit run.
+"""Extended Kalman filter on few mode shapes and a load bias, with an explicit step.
 
 Between measurements the body runs at full size and full nonlinearity; what is uncertain are r
 amplitudes of U_t and of U_{t-h} along the shapes Phi, and one bias N a load (a random walk: a body
@@ -64,7 +64,7 @@ class Basis:
 
 
 def modes(system: System, r: int) -> Basis:
-    """The r lowest modes with lumped masses; raises `UsageError` for more than there are."""
+    """Return the r lowest modes with lumped masses; raises `UsageError` for more than there are."""
     free = system.free
     masses, m = system.masses[free], len(free)
     if not 1 <= r <= m:
@@ -85,7 +85,8 @@ def modes(system: System, r: int) -> Basis:
 
 
 def pod(explicit: ExplicitStep, r: int, force: float) -> Basis:
-    """The r strongest shapes of runs in which each load in turn ramps to `force` N and stays.
+    """Return the r strongest shapes of runs in which each load in turn ramps to `force` N and
+    stays.
 
     Raises `UsageError` without loads, or for more shapes than snapshots.
     """
@@ -163,9 +164,9 @@ class ReducedEKF:
             raise UsageError("load_walk, load_sd and process are standard deviations >= 0")
 
     def prepare(self, system: System, measurements: Measurements) -> ExplicitFilterStepper:
-        """Raises `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
-        does not exist, `ComparisonError` for a steady gain that does not, or times off the steps.
-        """
+        """Raise `SceneError` for what the explicit step cannot do, `UsageError` for a basis that
+        does not exist, `ComparisonError` for a steady gain that does not, or times off the
+        steps."""
         require_handled(system.scene, self)
         require_exact(self.smooth, self.gains)
         explicit = explicit_step(system, self.dt, self.substeps)

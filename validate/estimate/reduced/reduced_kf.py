@@ -1,4 +1,4 @@
-"""Kalman filter on few modes with a load bias, its gains precomputed or the steady one.
+"""Kalman filter on few modes with a load bias; gains precomputed or steady.
 
 The gains of a linear filter need no data, so a step costs what the model's step costs and one small
 product. The steady gain comes from the discrete Riccati equation.
@@ -70,7 +70,7 @@ class ReducedKf:
     smooth: bool = smooth_setting()
 
     def prepare(self, system: System, measurements: Measurements) -> CoreStepper:
-        """Raises `SceneError` for scenes with drives, large strain, or coupled damping, and
+        """Raise `SceneError` for scenes with drives, large strain, or coupled damping, and
         `ComparisonError` for measurements off the steps, or a steady gain of irregular ones."""
         require_handled(system.scene, self)
         require_exact(self.smooth, self.gains)
@@ -85,12 +85,13 @@ class ReducedKf:
 
 
 def dense_covariance(model: LinearModel) -> Dense:
-    """The recursion of a small model."""
+    """Return the recursion of a small model."""
     return Dense(model.F, model.Q, model.H, np.diag(model.R).copy(), model.P0)
 
 
 def steady(covariance: Dense, when: Mapping[int, Seen]) -> Steady:
-    """The filter that has settled on measuring everything as often as it usually is measured.
+    """Return the filter that has settled on measuring everything as often as it usually is
+    measured.
 
     Raises `ComparisonError` where there is none: part of the state is neither seen nor stable.
     """

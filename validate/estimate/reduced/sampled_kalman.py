@@ -1,4 +1,4 @@
-"""Kalman filters by samples, for any small model: unscented and ensemble, as pure functions."""
+"""Unscented and ensemble Kalman filters of any small model, as pure functions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ def ukf_predict(prior: Gaussian, f: Function, Q: Floats, sigma: SigmaPoints) -> 
 
 
 def ukf_update(prior: Gaussian, z: Floats, h: Function, R: Floats, sigma: SigmaPoints) -> Update:
-    """The update from new points about the prior, so that Q is seen by h."""
+    """Return the update from new points about the prior, so that Q is seen by h."""
     points = sigma.points(prior)
     mean, covariance = sigma.weights(len(prior.x))
     seen = np.array([h(p) for p in points])

@@ -1,4 +1,4 @@
-"""The stepper of filters with a small state: what they share, around a core that they bring."""
+"""Stepper of filters with a small state, with an exchangeable core."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -54,7 +54,7 @@ class SmoothCore(Core, Protocol):
     def transition(self) -> Transition: ...
 
     def corrected(self, inner: Any, e: Floats, W: Floats | None) -> Any:
-        """The state with e (n,) added, and at output frames P_s = P - (P W)(P W)^T."""
+        """Return the state with e (n,) added, and at output frames P_s = P - (P W)(P W)^T."""
         ...
 
 
@@ -90,7 +90,7 @@ class CoreStepper(OneAtATime):
         return State(0, self.core.start())
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The posterior at the end of a step; `inputs` are those there, loads alone."""
+        """Return the posterior at the end of a step; `inputs` are those there, loads alone."""
         k = state.k + 1
         inner, seen = self.core.step(state.inner, k, inputs, self.table.at(k))
         if not np.isfinite(self.core.free(inner)).all():

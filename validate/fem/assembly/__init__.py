@@ -1,4 +1,4 @@
-"""Matrices and vectors of a linear body by scikit-fem, and interpolation at points.
+"""Assembly of a linear body by scikit-fem, and interpolation at points.
 
 Start with `assemble`.
 """

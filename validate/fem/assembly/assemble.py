@@ -1,4 +1,4 @@
-"""Stiffness, mass and damping (paper 000, eqs 1-5; paper 001, eq 7); masses by scikit-fem.
+"""Stiffness, mass and damping matrices (paper 000, eqs 1-5; paper 001, eq 7).
 
 The stiffness is pointwise, mixed or with nodal mean dilatation; materials may differ from cell to
 cell.
@@ -80,7 +80,8 @@ def harmonic(scene: Scene) -> sparse.csr_array:
 
 
 def stiffness_damping(scene: Scene) -> sparse.csr_array:
-    """The share of C (N, N) N s/m that is proportional to K: sum over cells of beta_e K_e."""
+    """Return the share of C (N, N) N s/m that is proportional to K: sum over cells of beta_e
+    K_e."""
     if scene.dilatation == "nodal_mean":
         return sparse.csr_array(scene.material.stiffness_damping * stiffness(scene))
     beta = scene.thickness * scene.per_cell(lambda m: m.stiffness_damping)
@@ -146,7 +147,7 @@ def _mu(m: Material) -> float:
 
 
 def library_mesh(mesh: Mesh) -> Any:
-    """The vertices and cells as scikit-fem has them, its order of corners included."""
+    """Return the vertices and cells as scikit-fem has them, its order of corners included."""
     order = _HEXAHEDRON if mesh.bricks and mesh.dimension == 3 else slice(None)
     corners = np.ascontiguousarray(mesh.corners[:, order].T)
     vertices = int(mesh.corners.max()) + 1
@@ -273,7 +274,7 @@ def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
 
 
 def rows_of_cells(mesh: Mesh, values: Floats) -> sparse.csr_array:
-    """A row (e, N) for every cell with its corners' values (e, d + 1, d)."""
+    """Return a row (e, N) for every cell with its corners' values (e, d + 1, d)."""
     cells, d = mesh.corners, mesh.dimension
     columns = (cells[..., None] * d + np.arange(d)).reshape(len(cells), -1)
     rows = np.repeat(np.arange(len(cells)), columns.shape[1])

@@ -1,4 +1,4 @@
-"""Strain and stress of every cell under displacements, means over its points: for people to see.
+"""Strain and stress of every cell, averaged over its points, for display.
 
 Mixed and averaged volume changes are those of the points here, so that pressures of a mean
 dilatation element are not the ones that it was solved with (`fem.assembly.mean_dilatation` has

@@ -1,4 +1,4 @@
-"""Linear statics at nu = 0.5: an augmented Lagrangian keeps the volume of mixed cells exactly.
+"""Linear statics at nu = 0.5: augmented Lagrangian on mixed cells, exact volume.
 
 Find u and pressures p, of their own in every cell: a(u, v) + (p, theta(v)) = f(v), theta(u) = 0,
 theta the projected volume strain (`fem.assembly.mean_dilatation`). K holds a and a finite penalty

@@ -1,5 +1,4 @@
-"""Nodal forces of the scene's loads, per newton of their inputs, per m/s^2 of a weight, per Pa of a
-pressure; masses that hang at the body."""
+"""Nodal forces of loads (per N), weights (per m/s^2) and pressures (per Pa); attached masses."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Interpolation rows: the displacement at any point as a weighted sum of nodal displacements."""
+"""Interpolation rows: displacement at any point as weighted sum of nodal displacements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -194,7 +194,7 @@ def _csr(nodes: Ints, weights: Floats, mesh: Mesh) -> sparse.csr_array:
 
 
 def require_inside(rows: Rows, names: tuple[str, ...], limit: float) -> None:
-    """Raises `RegistrationError` naming the points further than `limit` m from the mesh."""
+    """Raise `RegistrationError` naming the points further than `limit` m from the mesh."""
     far = np.flatnonzero(rows.outside > limit)
     if len(far):
         worst = far[int(np.argmax(rows.outside[far]))]

@@ -1,4 +1,4 @@
-"""The volume change of mixed cells: its projection, in each, on constants or linear fields.
+"""Mean dilatation of mixed cells: projection of volume change on constants or linear fields.
 
 Three fields u, p, theta with p and theta of their own in every cell and eliminated there (Simo,
 Taylor & Pister 1985): theta is the projection of the law's measure of volume change, and the energy

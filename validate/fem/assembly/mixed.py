@@ -1,4 +1,4 @@
-"""A locking-free static reference: Taylor-Hood elements, displacements quadratic, pressure linear.
+"""Taylor-Hood elements (displacements quadratic, pressure linear): a locking-free reference.
 
 Find u, p: 2 mu (e(u), e(v)) - (p, div v) = f(v), (div u, q) + (p/lambda, q) = 0; stable and of
 second order in p up to nu -> 1/2 (Taylor & Hood 1973; Boffi, Brezzi & Fortin 2013, ch. 8). P2-P1

@@ -1,4 +1,4 @@
-"""Stiffness that lies on facets: elastic foundations (partial friction) and membranes."""
+"""Stiffness on facets: elastic foundations (partial friction) and membranes."""
 
 import numpy as np
 from scipy import sparse

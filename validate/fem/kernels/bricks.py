@@ -135,7 +135,7 @@ def _stressed(w: Floats, geometry: Floats, block: int) -> None:
 
 @inlined
 def add_brick_forces(geometry: Floats, cells: Any, u: Floats, f: Floats, w: Floats) -> None:
-    """Adds the internal forces N of all blocks to f (N,); cells (blocks, 8, 16) hold 3 x node."""
+    """Add the internal forces N of all blocks to f (N,); cells (blocks, 8, 16) hold 3 x node."""
     for block in range(cells.shape[0]):
         _gather(w, cells, block, u)
         _means(w, geometry, block)

@@ -1,5 +1,6 @@
-"""Compiled element loops of tet4 that take one cell after the other: laws with branches and
-logarithms, which no vector register takes, memories of viscoelastic cells, and looks at energies.
+"""Compiled element loops of tet4, cell by cell: laws with branches, viscoelasticity, energies.
+
+Vector lanes support neither branches nor logarithms, so that these loops take one cell at a time.
 
 Geometry is (blocks, 11 x 16), or with the card of a law (blocks, 11 + k, 16): the compiler knows
 which, so that neither kind is in the code of the other. Cells (blocks, 4, 16) hold 8 x node. The
@@ -140,7 +141,7 @@ def _first_along(law: int, H: Nine, D: Nine, a: float, b: float, card: Floats) -
 
 @inlined
 def add_carded(law: int, geometry: Floats, cells: Any, u: Floats, f: Floats) -> None:
-    """Adds the forces of laws that have a card."""
+    """Add the forces of laws that have a card."""
     for block in range(cells.shape[0]):
         for l in range(BLOCK):
             G, card = gradients(geometry, block, l), geometry[block, ROWS:, l]
@@ -174,7 +175,7 @@ def _dyad(axis: int, g: Three) -> Nine:
 def add_carded_blocks(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats
 ) -> None:
-    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,), by their columns."""
+    """Add forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,), by their columns."""
     rows = np.uint64(3 * d.size // f.size)
     for block in range(cells.shape[0]):
         for l in range(BLOCK):

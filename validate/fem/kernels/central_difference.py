@@ -1,4 +1,4 @@
-"""The compiled steps of central difference on lumped masses (paper 003, eq 18)."""
+"""Compiled steps of central difference on lumped masses (paper 003, eq 18)."""
 
 from validate.arrays import Floats, Ints
 from validate.fem.kernels.explicit import (

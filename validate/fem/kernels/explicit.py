@@ -1,4 +1,4 @@
-"""Compiled element loops of a body at large strain: forces, tangents of nodes, products, looks.
+"""Compiled element loops at large strain: forces, tangents by node, products, strain energy.
 
 Which loop takes a body is told by its geometry, whose kind the compiler knows: tet4 of two moduli
 (blocks, 11 x 16), tet4 whose law has a card (blocks, 11 + k, 16), mixed hex8 (four dimensions,
@@ -79,7 +79,7 @@ def parts_size(nodes: int) -> int:
 
 @_compiled
 def add_forces(law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, w: Floats) -> None:
-    """Adds the internal forces N of all blocks to f (N,); w is a workspace (`work_size`).
+    """Add the internal forces N of all blocks to f (N,); w is a workspace (`work_size`).
 
     Cells (blocks, 4, 16) hold 8 x node, those of hexahedra (blocks, 8, 16) 3 x node.
     """
@@ -130,7 +130,7 @@ def add_forces_in_parts(
 def add_forces_and_blocks(
     law: int, geometry: Floats, cells: Cells, u: Floats, f: Floats, d: Floats, w: Floats
 ) -> None:
-    """Adds the internal forces to f (N,) and the nodes' own blocks of the tangent to d.
+    """Add the internal forces to f (N,) and the nodes' own blocks of the tangent to d.
 
     d (3 n,) takes the diagonal; d (6 n,) the blocks as xx, yy, zz, xy, xz, yz.
     """
@@ -144,7 +144,7 @@ def add_forces_and_blocks(
 def add_products(
     law: int, geometry: Floats, cells: Cells, u: Floats, v: Floats, f: Floats, w: Floats
 ) -> None:
-    """Adds K_t(u) v to f (N,)."""
+    """Add K_t(u) v to f (N,)."""
     if geometry.ndim == 3:
         add_carded_products(law, geometry, cells, u, v, f)
     else:

@@ -1,4 +1,4 @@
-"""Compiled loops whose machine code several processes may store at once.
+"""Cache of compiled loops on disk, safe with several processes.
 
 numba stores one file of code a signature, numbered by an index that it reads and writes without a
 lock. Two processes that compile two signatures of one function together both take the next number,

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-call, untyped-decorator"
-"""Several cells at once, one in each lane of a vector register: a number for compiled loops.
+"""Vector lanes: a number type for compiled loops that holds several cells at once.
 
 `Lanes` holds 8 doubles or 16 floats and knows + - * / and minus; with it the tensor functions of
 `fem.kernels.tensors` and the laws at a point, written for one cell, do 8 or 16 in the same time. It
@@ -22,7 +22,8 @@ _INT = ir.IntType(32)
 
 
 def on_lines(x: np.ndarray) -> np.ndarray:
-    """A copy that begins with a line of the cache, so that no vector of it lies across two."""
+    """Return a copy that begins with a line of the cache, so that no vector of it lies across
+    two."""
     line = _BITS // 8
     room = np.empty(x.nbytes + line, np.uint8)
     start = -room.ctypes.data % line
@@ -32,7 +33,7 @@ def on_lines(x: np.ndarray) -> np.ndarray:
 
 
 def emitted(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that writes its code itself, called like any other in compiled loops."""
+    """Return a function that writes its code itself, called like any other in compiled loops."""
     return cast(Callable[..., Any], intrinsic(function))
 
 
@@ -66,7 +67,7 @@ def _spread(context: Any, builder: Any, value: Any, typ: Any, to: Lanes) -> Any:
 
 
 def shuffled(builder: Any, x: Any, y: Any, picks: list[int]) -> Any:
-    """The entries `picks` of x and y side by side."""
+    """Return the entries `picks` of x and y side by side."""
     return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INT, len(picks)), picks))
 
 
@@ -116,7 +117,7 @@ def place(context: Any, builder: Any, typ: Any, array: Any, index: Any, count: i
 
 @emitted
 def load(typing: Any, array: Any, index: Any) -> Any:
-    """The lanes of a contiguous array from its flat `index` on."""
+    """Return the lanes of a contiguous array from its flat `index` on."""
     to = Lanes(array.dtype)
 
     def code(context: Any, builder: Any, sig: Any, args: Any) -> Any:

@@ -1,5 +1,4 @@
-"""Mooney-Rivlin, Yeoh, Ogden and the coupled forms at a point, compiled: `fem.laws.polynomial`,
-`fem.laws.ogden`.
+"""Mooney-Rivlin, Yeoh, Ogden and coupled laws at a point, compiled.
 
 V times energy, P and its change along D, of H and a cell's card: bulk V, then C10 V, C01 V, C20 V,
 C30 V, or for Ogden pairs of mu_p V and alpha_p. Principal directions come from Jacobi's rotations:

@@ -1,6 +1,5 @@
 # mypy: disable-error-code="no-untyped-call, untyped-decorator"
-"""Nodes of cells turned into lanes and back (`fem.kernels.lanes`): what element loops gather and
-add up.
+"""Gather and scatter of nodes between cells and vector lanes (`fem.kernels.lanes`).
 
 A node has four numbers in a row, x, y, z and a pad, or a multiple of four: read and written at
 once, as vectors. Cells are packed in blocks of 16, corner by corner, and hold 8 x node.
@@ -135,7 +134,7 @@ def edges(typing: Any, nodes: Any, cells: Any, index: Any) -> Any:
 
 @emitted
 def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> Any:
-    """Adds the forces f, 3 x 3 (component, a - 1) of nodes 1-3, and minus their sum at node 0.
+    """Add the forces f, 3 x 3 (component, a - 1) of nodes 1-3, and minus their sum at node 0.
 
     What the pads are left with is of no use.
     """
@@ -154,8 +153,8 @@ def add_forces_of(typing: Any, nodes: Any, cells: Any, index: Any, f: Any) -> An
 
 @emitted
 def add_numbers_of(typing: Any, nodes: Any, cells: Any, index: Any, numbers: Any) -> Any:
-    """Adds m = 6 or 9 numbers at each corner, `numbers` four tuples of m lanes, to the first m of
-    a node's 8 or 12."""
+    """Add m = 6 or 9 numbers at each corner, `numbers` four tuples of m lanes, to the first m of a
+    node's 8 or 12."""
     m = numbers.dtype.count
     parts = {6: [(0, 6)], 9: [(0, 4), (4, 4), (8, 1)]}[m]
 

@@ -1,4 +1,4 @@
-"""St. Venant-Kirchhoff and neo-Hooke at a point, compiled: of one cell, or of lanes of them.
+"""St. Venant-Kirchhoff and neo-Hooke at a point, compiled, for one cell or for lanes.
 
 V times P, its change along D and the energy, of H = F - I and moduli times volume, a = V lambda
 (neo-Hooke: V kappa) and b = V mu; and what each node of a linear cell has of force and tangent.

@@ -1,4 +1,4 @@
-"""Small tensors of the compiled element loops, as tuples that are inlined into them.
+"""Small tensors of the compiled element loops, as tuples that are inlined.
 
 Numbers are floats, or lanes of cells (`fem.kernels.lanes`).
 """

@@ -1,5 +1,4 @@
-"""Compiled element loops of tet4 that take 8 cells at once, 16 in single precision
-(`fem.kernels.lanes`).
+"""Compiled element loops of tet4, 8 cells at once (16 in single precision).
 
 St. Venant-Kirchhoff, neo-Hooke, and Mooney-Rivlin and Yeoh in their split form. A block of 16 cells
 has its numbers side by side, row by row; the nodes' displacements are copied with a pad, so that a
@@ -107,7 +106,7 @@ def _add_neo_hooke(geometry: Floats, cells: Any, x: Floats, r: Floats) -> None:
 def add_lane_forces(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, w: Floats
 ) -> None:
-    """Adds internal forces to f (N,); w is a workspace (2 `room`) of the numbers of `geometry`.
+    """Add internal forces to f (N,); w is a workspace (2 `room`) of the numbers of `geometry`.
 
     Each law has a loop of its own: a choice within it would cost a tenth.
     """
@@ -142,7 +141,7 @@ def _first_of_card(H: Nine, a: float, b: float, geometry: Floats, o: int) -> Nin
 def add_lane_products(
     law: int, geometry: Floats, cells: Any, u: Floats, v: Floats, f: Floats, w: Floats
 ) -> None:
-    """Adds K_t(u) v to f (N,); w (3 `room`)."""
+    """Add K_t(u) v to f (N,); w (3 `room`)."""
     nodes, count, size = u.size // 3, lanes_of(w), geometry[0].size
     x, y = w[: room(nodes)], w[room(nodes) : 2 * room(nodes)]
     r = w[2 * room(nodes) : 3 * room(nodes)]
@@ -197,7 +196,7 @@ def _add_nodes(law: int, rows: int, geometry: Floats, cells: Any, x: Floats, r: 
 def add_lane_blocks(
     law: int, geometry: Floats, cells: Any, u: Floats, f: Floats, d: Floats, w: Floats
 ) -> None:
-    """Adds forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (4 `room`)."""
+    """Add forces to f (N,) and the nodes' own blocks to d (3 n,) or (6 n,); w (4 `room`)."""
     nodes, rows = u.size // 3, 3 * d.size // f.size
     wide = 12 if rows == 6 else 8
     x, r = w[: room(nodes)], w[room(nodes) : (1 + wide // FOUR) * room(nodes)]

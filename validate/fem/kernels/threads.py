@@ -1,4 +1,4 @@
-"""How many threads share a step: as many as a measured pilot shows to pay, one where no core idles.
+"""Number of threads of an explicit step, chosen by a measured pilot.
 
 Threads meet at the end of every step: where another process has a core, all wait for the one that
 it keeps, and a step takes several times as long as alone. So the machine is asked first, then a
@@ -40,7 +40,7 @@ class ThreadChoice:
 
 
 def chosen(most: int, seconds: Mapping[int, Sequence[float]]) -> ThreadChoice:
-    """The number of threads with the least median, one unless another is clearly faster.
+    """Return the number of threads with the least median, one unless another is clearly faster.
 
     `seconds` of steps by number of threads, of 1 among them; empty where no core was idle.
     """

@@ -26,7 +26,7 @@ _CARD: tuple[Callable[[Material], float], ...] = (
 
 
 def require_bricks(scene: Scene) -> None:
-    """Raises `SceneError` for what mixed hexahedra have no explicit form of."""
+    """Raise `SceneError` for what mixed hexahedra have no explicit form of."""
     if scene.dilatation != "mixed":
         raise SceneError(
             f"explicit hexahedra must be mixed, because {scene.dilatation} ones lock; use "

@@ -1,4 +1,4 @@
-"""What Newton's method needs of a body: of one at large strain, and of a linear one."""
+"""Common interface of linear and large-strain bodies for Newton's method."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -52,7 +52,7 @@ class LinearBody:
 
 
 def elastic(system: System) -> Elastic:
-    """The body of a system; raises `SceneError` for what has no form at large strain."""
+    """Return the body of a system; raises `SceneError` for what has no form at large strain."""
     scene = system.scene
     if scene.material.law != "linear":
         return Body(scene)

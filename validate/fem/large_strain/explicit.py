@@ -1,5 +1,4 @@
-"""A body of tet4 or mixed hex8 at large strain for explicit schemes: the forces of
-`fem.large_strain.hyperelastic`, compiled.
+"""Bodies of tet4 or mixed hex8 at large strain for explicit schemes, with compiled forces.
 
 The element loops are in `fem.kernels.explicit` and `fem.kernels.bricks`; this is their packing and
 their interface.
@@ -260,13 +259,13 @@ def _in_single(x: Floats) -> Floats:
 
 
 def knows_single(scene: Scene) -> bool:
-    """Whether a body's element loops are written for single precision."""
+    """Return whether a body's element loops are written for single precision."""
     known = scene.mesh.kind == "tet4" and _code(scene.material) in (SVK, NEO_HOOKE)
     return known and cell_branches(scene) is None
 
 
 def require_threads(threads: int) -> None:
-    """Raises `SceneError` for fewer than one."""
+    """Raise `SceneError` for fewer than one."""
     if threads < 1:
         raise SceneError(f"{threads} threads: use 1, or at most the number of idle cores")
 

@@ -1,4 +1,4 @@
-"""A hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
+"""Hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
 
 f_int = sum over points of w P : dN/dX, K_t its derivative (Bonet & Wood 2008, ch. 9). The isochoric
 law acts at every point, the volumetric one on the law's measure of volume change (tr E or J - 1):
@@ -62,8 +62,8 @@ class NodePattern:
         return np.zeros((len(self.columns), self.d, self.d))
 
     def add(self, blocks: Floats, part: slice | Ints, local: Floats) -> None:
-        """Adds the matrices (e, a, i, j, b) of the cells `part` to `blocks` in place; in 2-D
-        what they have of the third direction is left out."""
+        """Add the matrices (e, a, i, j, b) of the cells `part` to `blocks` in place; in 2-D what
+        they have of the third direction is left out."""
         place = self.place[part].ravel()
         for i in range(self.d):
             for j in range(self.d):
@@ -71,7 +71,7 @@ class NodePattern:
                 blocks[:, i, j] += np.bincount(place, values, minlength=len(blocks))
 
     def matrix(self, blocks: Floats) -> sparse.csr_array:
-        """The matrix (n d, n d), node-major."""
+        """Return the matrix (n d, n d), node-major."""
         size = self.d * self.n
         parts = (blocks, self.columns, self.starts)
         return sparse.csr_array(sparse.bsr_array(parts, shape=(size, size)))
@@ -105,8 +105,8 @@ class NodalMean:
         return float(self.volumes @ self._at_nodes(H)[0])
 
     def pressures(self, H: Floats, dH: Floats | None = None) -> Floats:
-        """The slope dU/ds (e,) Pa that acts in every cell: the mean of its nodes' slopes, with
-        the linear change that cell gradients dH (e, 3, 3) make."""
+        """Return the slope dU/ds (e,) Pa that acts in every cell: the mean of its nodes' slopes,
+        with the linear change that cell gradients dH (e, 3, 3) make."""
         _, slopes, stiff = self._at_nodes(H)
         if dH is not None:
             ds = (self.law.dilatation(H)[1] * dH).sum(axis=(-2, -1))
@@ -191,13 +191,14 @@ class Body:
         self.unit_force = float(np.linalg.norm(self._nodal(spread.sum(1))))
 
     def after(self, branches: Branches, memory: Remembered, dt: float) -> "Body":
-        """The body at the end of a step of dt s, with what its branches remember at its points."""
+        """Return the body at the end of a step of dt s, with what its branches remember at its
+        points."""
         lagged = copy(self)
         lagged.lag = branches.lag(memory, dt)
         return lagged
 
     def holding(self, multipliers: Floats | None) -> "Body":
-        """The body with these multipliers (e, q) Pa of its cells with nu = 0.5."""
+        """Return the body with these multipliers (e, q) Pa of its cells with nu = 0.5."""
         if multipliers is self.multipliers:
             return self
         held = copy(self)
@@ -209,7 +210,7 @@ class Body:
         return None if self.kept is None else np.where(self.kept[:, None], pressures, 0.0)
 
     def volume_error(self, u: Floats) -> float:
-        """The largest |theta| = |projected J - 1| of the cells with nu = 0.5."""
+        """Return the largest |theta| = |projected J - 1| of the cells with nu = 0.5."""
         if self.kept is None:
             return 0.0
         error = np.empty(self.weights.shape)
@@ -218,7 +219,7 @@ class Body:
         return float(np.abs(error[self.kept]).max())
 
     def isochoric(self, u: Floats) -> Floats:
-        """The second Piola-Kirchhoff stress (e, q, 3, 3) Pa of the relaxed isochoric law."""
+        """Return the second Piola-Kirchhoff stress (e, q, 3, 3) Pa of the relaxed isochoric law."""
         S = np.empty((*self.weights.shape, 3, 3))
         for b in self._blocks(u):
             law = b.law.law if isinstance(b.law, Lagged) else b.law
@@ -278,7 +279,8 @@ class Body:
         return total
 
     def extrapolated(self, u: Floats, du: Floats) -> Floats:
-        """The pressures (e, q) Pa at u + du, by the slope and curvature that they have at u."""
+        """Return the pressures (e, q) Pa at u + du, by the slope and curvature that they have at
+        u."""
         if self.mean:
             p = self.mean.pressures(self._cell_gradient(u), self._cell_gradient(du))
             return np.asarray(p[:, None])
@@ -298,7 +300,8 @@ class Body:
         return out
 
     def inverted(self, u: Floats) -> Inverted | None:
-        """The points with det F <= 0, of itself or as projected, if any: no state of a body."""
+        """Return the points with det F <= 0, of itself or as projected, if any: no state of a
+        body."""
         bad = ~(self.jacobians(u) > 0)
         if self.projections is not None:
             for b in self._blocks(u):
@@ -308,7 +311,7 @@ class Body:
         return Inverted(int(bad.sum()), bad.size, int(np.argmax(bad.any(axis=1))))
 
     def principal_stretches(self, u: Floats) -> Floats:
-        """The principal stretches (e, q, 3), rising, at every quadrature point."""
+        """Return the principal stretches (e, q, 3), rising, at every quadrature point."""
         squares = np.empty((*self.weights.shape, 3))
         for b in self._blocks(u):
             squares[b.cells] = np.linalg.eigvalsh(2 * green_strain(b.H) + np.eye(3))

@@ -1,4 +1,4 @@
-"""Picinbono's penalty against a change of volume: forces along the normals of every cell's faces.
+"""Volume penalty of Picinbono: forces along the face normals of every cell.
 
 Picinbono, Delingette & Ayache (2001), as paper 002 tells it (section VI.B): a low Poisson ratio,
 and at each node of an element a force along the normal of the opposite face that resists a change

@@ -97,11 +97,11 @@ class Law(Protocol):
         ...
 
     def tangent(self, H: Floats) -> Floats:
-        """A (..., J, i, j, K) Pa."""
+        """Return a (..., J, i, j, K) Pa."""
         ...
 
     def dilatation(self, H: Floats) -> tuple[Floats, Floats]:
-        """The measure of volume strain s (...) and ds/dF (..., 3, 3)."""
+        """Return the measure of volume strain s (...) and ds/dF (..., 3, 3)."""
         ...
 
     def curvature(self, H: Floats) -> Floats:
@@ -162,7 +162,7 @@ class SaintVenantKirchhoff:
 
 
 def law_of(material: Material, *, isochoric: bool = False) -> Law:
-    """The material's law, or its isochoric part.
+    """Return the material's law, or its isochoric part.
 
     Raises `SceneError` for one that is linear only, and for the isochoric part of a coupled one.
     """
@@ -191,7 +191,7 @@ def law_of(material: Material, *, isochoric: bool = False) -> Law:
 
 
 def parts_of(material: Material, *, averaged: bool) -> tuple[Law, float]:
-    """The law without its volumetric part, and kappa Pa of that, or the factor of ln^2 J/2.
+    """Return the law without its volumetric part, and kappa Pa of that, or the factor of ln^2 J/2.
 
     Raises `SceneError` as `law_of` does where the volume change is `averaged`: what is left of a
     coupled law is not isochoric.
@@ -207,8 +207,8 @@ def parts_of(material: Material, *, averaged: bool) -> tuple[Law, float]:
 
 
 def instant(material: Material) -> Material:
-    """The material whose isochoric part is that of statics: the relaxed one, or with all branches
-    of its Prony series taut."""
+    """Return the material whose isochoric part is that of statics: the relaxed one, or with all
+    branches of its Prony series taut."""
     if material.prony.statics == "relaxed":
         return material
     return stiffened(material, material.prony.instant)

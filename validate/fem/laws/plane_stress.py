@@ -1,4 +1,4 @@
-"""A hyperelastic law in plane stress: the stretch across the sheet is what leaves no stress there.
+"""Hyperelastic laws in plane stress: thickness stretch of zero normal stress.
 
 At every point P_33(H_33) = 0 is solved by secants in the logarithm of that stretch, and the tangent
 is condensed: A_iJjK - A_iJ33 A_33jK / A_3333. No pressure is left in the sheet, so that nothing

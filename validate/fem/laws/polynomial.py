@@ -1,4 +1,4 @@
-"""Laws of the invariants: Mooney-Rivlin, Yeoh, and the coupled form of neo-Hooke, in one.
+"""Laws of the invariants: Mooney-Rivlin, Yeoh and coupled neo-Hooke.
 
 f(I1) = C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3, with I1, I2 those of C = F^T F.
 "split": W = f(J^(-2/3) I1) + C01 (J^(-4/3) I2 - 3) + kappa/4 (J^2 - 1 - 2 ln J).

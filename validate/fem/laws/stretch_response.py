@@ -1,4 +1,4 @@
-"""Stress against stretch of a material point: what a testing machine sees of a law, exactly.
+"""Exact stress-stretch curves of a law at a material point (uniaxial, biaxial, shear).
 
 F = diag(stretch, second, free), the free stretches found so that their stress vanishes: Newton on
 S_33(h) = P_33/F_33, h = F_33 - 1, which has no root at a collapsed point as P_33 has.

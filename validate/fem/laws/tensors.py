@@ -1,5 +1,4 @@
-"""Tensors of the displacement gradient H = F - I per point, written so that small strains keep
-their digits."""
+"""Tensors of the displacement gradient H = F - I, accurate at small strains."""
 
 import numpy as np
 
@@ -35,7 +34,7 @@ def trace(E: Floats) -> Floats:
 
 
 def outer(indices: str, a: Floats, b: Floats) -> Floats:
-    """The product of two tensors per point, e.g. "iJ,jK->JijK"."""
+    """Return the product of two tensors per point, e.g. "iJ,jK->JijK"."""
     inputs, out = indices.split("->")
     left, right = inputs.split(",")
     return np.asarray(np.einsum(f"...{left},...{right}->...{out}", a, b))

@@ -1,4 +1,4 @@
-"""Finite viscoelasticity: the isochoric stress of a law and the state of its branches.
+"""Finite viscoelasticity: isochoric stress of a law and the state of its branches.
 
 Every branch follows dQ_i/dt + Q_i/tau_i = g_i dS/dt, with S the second Piola-Kirchhoff stress of
 the isochoric law; the whole stress is S_vol + S + sum of Q_i (Holzapfel 2000, 6.10; Simo & Hughes
@@ -87,12 +87,12 @@ def _time(i: int, m: Material) -> float:
 
 
 def relaxed(scene: Scene) -> Scene:
-    """The scene whose statics are the relaxed limit: what branches are added to."""
+    """Return the scene whose statics are the relaxed limit: what branches are added to."""
     return _made(scene, lambda m: replace(m, prony=replace(m.prony, statics="relaxed")))
 
 
 def taut(scene: Scene) -> Scene:
-    """The scene with all branches taut: its instantaneous moduli."""
+    """Return the scene with all branches taut: its instantaneous moduli."""
     return _made(scene, lambda m: stiffened(m, m.prony.instant))
 
 

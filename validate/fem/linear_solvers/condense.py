@@ -1,4 +1,4 @@
-"""A linear system on the nodes that matter alone: exact, no approximation (paper 000, eqs 17-20).
+"""Static condensation of a linear system on selected nodes, exact (paper 000, eqs 17-20).
 
 Forces act on kept nodes only, so that only their rows and columns of the inverse are needed. Two
 forms: `dense` holds all of them (the paper's explicit inverse, m^2 numbers), `by columns` keeps the
@@ -79,7 +79,7 @@ class Condensed:
         return np.asarray((dense + dense.T) / 2)
 
     def column(self, unknown: int) -> Floats:
-        """The dense form's column (W,) m/N of one unknown alone, kept once it was asked for.
+        """Return the dense form's column (W,) m/N of one unknown alone, kept once it was asked for.
 
         Raises `SceneError` for an unknown that is prescribed: a force on it moves nothing.
         """
@@ -91,7 +91,7 @@ class Condensed:
         return self._columns[unknown]
 
     def prefetch(self, unknowns: Ints) -> None:
-        """Keeps the columns of `unknowns` before they are asked for, so that no step has to solve.
+        """Keep the columns of `unknowns` before they are asked for, so that no step has to solve.
 
         Raises `MemoryShortError` where they do not fit.
         """
@@ -140,7 +140,7 @@ class Condensed:
 
 
 def condense(system: System, keep: Ints) -> Condensed:
-    """The system on the nodes `keep`, those of its cavities and those of its driven plates.
+    """Return the system on the nodes `keep`, those of its cavities and those of its driven plates.
 
     Raises `SceneError` for nodes that the mesh does not have and for a law at large strain.
     """

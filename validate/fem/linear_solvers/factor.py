@@ -1,4 +1,4 @@
-"""Factorisation of a symmetric positive definite matrix: the one place that chooses a solver."""
+"""Factorisation of a symmetric positive definite matrix; the only choice of a solver."""
 
 import math
 from dataclasses import dataclass
@@ -105,30 +105,30 @@ def factor_bytes(unknowns: float, dimension: int, *, indefinite: bool = False) -
 
 
 def next_to_nothing(unknowns: float, dimension: int) -> bool:
-    """Whether a system a hundred times as large in memory would fit, too."""
+    """Return whether a system a hundred times as large in memory would fit, too."""
     free = free_memory()
     return free is None or 100 * solvable_bytes(unknowns, dimension) < free
 
 
 def require_solvable(unknowns: float, dimension: int, what: str) -> None:
-    """Raises `MemoryShortError` where a system of so many unknowns does not fit, assembled or
+    """Raise `MemoryShortError` where a system of so many unknowns does not fit, assembled or
     factored: asked before a mesh of a ladder is made."""
     needed = solvable_bytes(unknowns, dimension)
     require_memory(needed, f"{what} with up to {unknowns:.3g} unknowns in {dimension}-D")
 
 
 def solvable_bytes(unknowns: float, dimension: int) -> float:
-    """The larger of assembly and factor: the two do not peak at once."""
+    """Return the larger of assembly and factor: the two do not peak at once."""
     return max(_ASSEMBLED[dimension] * unknowns, factor_bytes(unknowns, dimension))
 
 
 def require_assembly(unknowns: float, dimension: int) -> None:
-    """Raises `MemoryShortError` where the stiffness of so many unknowns does not fit."""
+    """Raise `MemoryShortError` where the stiffness of so many unknowns does not fit."""
     require_memory(_ASSEMBLED[dimension] * unknowns, f"assembly of {unknowns:.4g} unknowns")
 
 
 def require_factor(unknowns: float, dimension: int, *, indefinite: bool = False) -> None:
-    """Raises `MemoryShortError` where the factor of so many unknowns does not fit."""
+    """Raise `MemoryShortError` where the factor of so many unknowns does not fit."""
     needed = factor_bytes(unknowns, dimension, indefinite=indefinite)
     require_memory(needed, f"factor of {unknowns:.4g} unknowns in {dimension}-D")
 
@@ -156,7 +156,7 @@ class Factor:
 
 
 def factorise(A: sparse.csr_array, node: Ints, places: Floats) -> Factor | Fronts:
-    """Factorises A (m, m); unknown i belongs to mesh node `node[i]` at `places[node[i]]` m.
+    """Factorise A (m, m); unknown i belongs to mesh node `node[i]` at `places[node[i]]` m.
 
     Raises `MemoryShortError` before memory is taken that is not there, and `SceneError` when A is
     not positive definite: SuperLU itself would go on silently.
@@ -190,7 +190,7 @@ def _require_positive(A: sparse.csr_array) -> None:
 
 
 def factorise_indefinite(A: sparse.csr_array, order: Ints) -> Factor:
-    """Factorises a symmetric A (m, m) in the given order, whatever the signs of its pivots.
+    """Factorise a symmetric A (m, m) in the given order, whatever the signs of its pivots.
 
     For tangents, which may lose definiteness: the caller reads `negative_pivots`. Raises
     `SceneError` only where a pivot vanishes.
@@ -202,7 +202,7 @@ def factorise_indefinite(A: sparse.csr_array, order: Ints) -> Factor:
 
 
 def factorise_general(A: sparse.csr_array, order: Ints) -> Factor:
-    """Factorises an A (m, m) of symmetric pattern that is not symmetric, in the given order.
+    """Factorise an A (m, m) of symmetric pattern that is not symmetric, in the given order.
 
     Its pivots say nothing of stability. Raises `SceneError` where one vanishes.
     """

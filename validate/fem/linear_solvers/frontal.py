@@ -61,7 +61,7 @@ class _Update:
 
 
 def fronts(A: sparse.csr_array, order: Ints, stops: Ints, children: Sequence[int]) -> Fronts | None:
-    """Factorises A (m, m) in `order` (m,); None when A is not positive definite.
+    """Factorise A (m, m) in `order` (m,); None when A is not positive definite.
 
     Front i eliminates the unknowns before `stops[i]` of the order and takes up what its
     `children[i]` predecessors on the stack have left: the tree in postorder.

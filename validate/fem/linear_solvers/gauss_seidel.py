@@ -1,4 +1,4 @@
-"""Gauss-Seidel sweeps over a sparse matrix: the compiled kernel, and plain loops to check it by."""
+"""Gauss-Seidel sweeps over a sparse matrix: compiled kernel, and plain loops as reference."""
 
 from validate.arrays import Floats, Ints
 from validate.fem.kernels.jit_cache import compiled

@@ -1,4 +1,4 @@
-"""Any measured body: its mesh, what moves it, its markers and its motion.
+"""Measured bodies of any shape: mesh, drive, markers and motion.
 
 Start with `measured`.
 """

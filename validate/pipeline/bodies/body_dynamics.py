@@ -1,4 +1,4 @@
-"""Dynamics of a measured body: its methods, its damping, and its uncertain parameters.
+"""Dynamics of a measured body: methods, damping and uncertain parameters.
 
 One scene, one registration and one error budget for everything that moves a body: a release, a
 weight, a force, a pressure or a displacement over time. What differs is the load alone.
@@ -73,7 +73,8 @@ _POINTS = 1500  # of a chart
 
 
 def motion_exhibit(p: Tree, cases: Cases, tell: Progress, *, shown: RecordedMotion) -> Told:
-    """The recorded motion `shown`, and the runs of its marker where they are compared with it."""
+    """Return the recorded motion `shown`, and the runs of its marker where they are compared with
+    it."""
     main = cases[MAIN]
     scene = next(iter(main.values())).scene
     modes = _modes(scene) if isinstance(scene, Scene) else ()
@@ -200,10 +201,10 @@ def moving(
     split: int = 1,
     **settings: Any,
 ) -> Method:
-    """A method of a moving body, by name: schemes with inertia, statics beside them, and filters
-    that are given `markers`. `element` is the body's, where it is another one than declared;
-    `split` steps in one of the recording's, for the explicit one; `settings` are those of the
-    scheme or filter."""
+    """Return a method of a moving body, by name: schemes with inertia, statics beside them, and
+    filters that are given `markers`. `element` is the body's, where it is another one than
+    declared; `split` steps in one of the recording's, for the explicit one; `settings` are those of
+    the scheme or filter."""
     scheme, words = METHODS[name]
     cells = ", quadratic cells" if is_quadratic(element) else ", linear cells" if element else ""
     label = words.format(law=f"{law} law{cells}", modes=_MODES)
@@ -222,8 +223,8 @@ def model_law(name: str, law: LawName) -> LawName | None:
 
 
 def fits_motion(name: str, law: LawName, kind: str, *, preloaded: bool, measured: bool) -> bool:
-    """Whether a method can solve a body in motion: its law, drives or loads of that `kind` of
-    motion, and a start at rest under a load (`preloaded`). Filters need something `measured`."""
+    """Return whether a method can solve a body in motion: its law, drives or loads of that `kind`
+    of motion, and a start at rest under a load (`preloaded`). Filters need something `measured`."""
     settings = METHODS[name][0]
     handles, driven = type(settings).handles, kind in ("moves", "follows")
     if model_law(name, law) is None or not (handles.drives if driven else handles.loads):
@@ -234,7 +235,7 @@ def fits_motion(name: str, law: LawName, kind: str, *, preloaded: bool, measured
 
 
 def in_motion(bare: Experiment, build: Any, folder: Path) -> Experiment:
-    """The experiment with the motion of its body in place of static states."""
+    """Return the experiment with the motion of its body in place of static states."""
     assert bare.uncertainty is not None
     cheap = "modal" if "modal" in bare.methods else bare.accepted[0]
     linear = "implicit" if "implicit" in bare.methods else cheap
@@ -273,7 +274,7 @@ def following(experiment: Experiment, recordings: Sequence[Recording], p: Tree) 
 
 
 def judged(p: Tree) -> str | None:
-    """The topic whose motion a report describes: that of what is judged."""
+    """Return the topic whose motion a report describes: that of what is judged."""
     seen: SeenOf = p.settings.seen
     return seen.markers or seen.outline or seen.force
 
@@ -360,7 +361,7 @@ def _damped(p: Tree, beta: float, **settings: Any) -> Tree:
 
 
 def against_mode(shown: RecordedMotion, first: float | None, p: Tree) -> str:
-    """The recorded frequency beside the body's first natural one, in words."""
+    """Return the recorded frequency beside the body's first natural one, in words."""
     recorded = f"recorded motion mostly at {shown.frequency:.3g} Hz"
     if not first:
         return recorded

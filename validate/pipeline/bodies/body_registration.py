@@ -1,4 +1,4 @@
-"""Registration of a measured body: what moves it, what is compared, at which instants."""
+"""Registration of a measured body: drive, observations and compared instants."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,4 @@
-"""What a user decides of a measured body beside its scene: what was seen of it, its motion, the
-testing machine, and declared uncertainties."""
+"""Settings of a measured body besides its scene: observations, motion, machine, uncertainties."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,5 +1,4 @@
-"""What moves or loads a measured body: the one drive, indenter, load, pressure or set of tracked
-points of its scene, or its weight; by the signal of that name, markers, notes, or a release."""
+"""Drive of a measured body: drive, indenter, load, pressure, tracked points, weight or release."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -43,8 +42,8 @@ FEWEST = 3  # markers on a place that follows them
 
 
 def mover(scene: Scene) -> Mover:
-    """The one part of a declared scene that moves or loads the body: its weight, where nothing else
-    does. Raises `UsageError` where there is none, or several."""
+    """Return the one part of a declared scene that moves or loads the body: its weight, where
+    nothing else does. Raises `UsageError` where there is none, or several."""
     weights = tuple(part for part in scene.loads if isinstance(part, Weight))
     parts: tuple[Mover, ...] = (
         *(d for d in scene.drives if d.follows is None), *scene.movers, *scene.tracked,
@@ -63,25 +62,26 @@ def mover(scene: Scene) -> Mover:
 
 
 def weight_beside(scene: Scene) -> Weight | None:
-    """The weight that acts beside what moves the body."""
+    """Return the weight that acts beside what moves the body."""
     weights = [part for part in scene.loads if isinstance(part, Weight)]
     return weights[0] if weights and mover(scene) is not weights[0] else None
 
 
 def along_of(scene: Scene) -> Floats:
-    """The unit vector (3,) along which the body is moved or loaded; 0 where that has none."""
+    """Return the unit vector (3,) along which the body is moved or loaded; 0 where that has
+    none."""
     direction = getattr(mover(scene), "direction", None)
     return np.zeros(3) if direction is None else np.array(direction)
 
 
 def pressing(scene: Scene) -> Indenter | None:
-    """The indenter, where one presses on the body."""
+    """Return the indenter, where one presses on the body."""
     shapes = [part.shape for part in scene.movers]
     return shapes[0] if shapes and isinstance(shapes[0], Indenter) else None
 
 
 def drive_kind(recording: Recording, p: Tree) -> Kind:
-    """What the load is; raises `UsageError` where no signal of its name has its unit."""
+    """Return the kind of the load; raises `UsageError` where no signal of its name has its unit."""
     part, motion = mover(p.scene), p.settings.motion
     kind: Kind = _KINDS[type(part)]
     released = motion.held_force is not None or motion.held_displacement is not None
@@ -146,7 +146,8 @@ def _noted(p: Tree, t: Floats) -> SignalObservation:
 
 
 def zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
-    """The signal from its mean at rest; its noise as declared, or more as its samples scatter."""
+    """Return the signal from its mean at rest; its noise as declared, or more as its samples
+    scatter."""
     s = recording.signal(topic, unit)
     early = s.y[s.t <= max(until, float(s.t[0]))]
     scatter = load_noise(s.y[:, 0]) if len(s.t) >= MIN_SAMPLES else 0.0
@@ -155,8 +156,8 @@ def zeroed(recording: Recording, topic: str, unit: str, until: float) -> Signal:
 
 
 def zeroed_force(recording: Recording, p: Tree, kind: Kind, until: float) -> Signal:
-    """The force on the moved place from its mean until then; raises `ComparisonError` where no
-    displacement moves a place."""
+    """Return the force on the moved place from its mean until then; raises `ComparisonError` where
+    no displacement moves a place."""
     if kind != "moves":
         raise ComparisonError(
             f"seen.force = {p.settings.seen.force}: a force is predicted only if a displacement "
@@ -168,7 +169,7 @@ def zeroed_force(recording: Recording, p: Tree, kind: Kind, until: float) -> Sig
 def observed_force(
     recording: Recording, p: Tree, force: Signal, t: Floats, y: Floats
 ) -> SignalObservation:
-    """The force y (nt, 1) N at t (nt,) s but its first sample, which is at rest."""
+    """Return the force y (nt, 1) N at t (nt,) s but its first sample, which is at rest."""
     topic = str(p.settings.seen.force)
     return SignalObservation(
         topic, "validates", t[1:], y[1:], "N", force.sd, "force", f"{mover(p.scene).name}.force",

@@ -1,5 +1,4 @@
-"""Registration of a measured body that moves in time: its start, its steps, its loads, and its
-markers and force at every sample.
+"""Registration of a moving body: start, time steps, loads, markers and force at every sample.
 
 The body rests until the start, where the recording's clock is set to 0; loads and displacements
 count from there. The start is a sample: where a release lies between two of them, half the interval
@@ -63,7 +62,7 @@ class Started:
 
 
 def started(recording: Recording, p: Tree) -> Started:
-    """The recording from `motion.start`, or from where its motion is found to begin.
+    """Return the recording from `motion.start`, or from where its motion is found to begin.
 
     Raises `UsageError` for a start outside the recording.
     """
@@ -187,7 +186,7 @@ def _used(p: Tree, topic: str | None) -> set[str]:
 
 
 def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -> Registered:
-    """Loads at every step, markers, force and outlines at every sample.
+    """Return loads at every step, markers, force and outlines at every sample.
 
     Raises `ComparisonError` where nothing is compared, `RegistrationError` as the parts do.
     """

@@ -1,4 +1,4 @@
-"""The first natural frequencies of a body as it is held."""
+"""First natural frequencies of a supported body."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,17 +23,17 @@ _QUADRATIC = ("quadratic", "hex27", "tet10")
 
 
 def model_of(law: LawName, element: str = "") -> dict[str, str]:
-    """The changes by path; without an element that of the declared body."""
+    """Return the changes by path; without an element that of the declared body."""
     return {"material.law": law, **({"body.element": element} if element else {})}
 
 
 def law_of(method: Method, p: Tree) -> str:
-    """The law that a method has of the declared scene's material."""
+    """Return the law that a method has of the declared scene's material."""
     return str((method.scene or {}).get("material.law", p.scene.material.law))
 
 
 def element_of(method: Method, p: Tree) -> str:
-    """The element of the cells that a method is solved in."""
+    """Return the element of the cells that a method is solved in."""
     return str((method.scene or {}).get("body.element", p.scene.body.element))
 
 

@@ -1,4 +1,4 @@
-"""A measured body's markers in its own frame: by their layout, or as they were recorded there."""
+"""Markers of a measured body in its own frame: by their layout, or as recorded there."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -127,7 +127,7 @@ def _declared(recording: Recording, markers: Markers, p: Tree, mesh: Mesh) -> Ma
 
 
 def compared_markers(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
-    """The registered markers but those that move the body.
+    """Return the registered markers but those that move the body.
 
     Raises `ComparisonError` where none is left, and as `registered` does.
     """
@@ -143,7 +143,7 @@ def compared_markers(recording: Recording, p: Tree, at: BodyAt) -> MarkerObserva
 
 
 def leading(scene: Scene) -> tuple[str, ...]:
-    """The markers that move the body."""
+    """Return the markers that move the body."""
     return tuple(name for part in scene.tracked for name in part.labels)
 
 
@@ -153,8 +153,8 @@ def listed_names(names: Iterable[str]) -> str:
 
 
 def layout_of(recording: Recording, text: str, folder: Path) -> dict[str, Floats]:
-    """Places (3,) m of markers in the body's frame: of the record "marker_layout", or of the points
-    of a file of landmarks. Raises `RecordingError` for a file without points."""
+    """Return the places (3,) m of markers in the body's frame: of the record "marker_layout", or of
+    the points of a file of landmarks. Raises `RecordingError` for a file without points."""
     if text == "recorded":
         record = recording.record("marker_layout")
         return {name: vector(at, f"marker_layout '{name}'") for name, at in record.items()}
@@ -178,7 +178,7 @@ def _points_in(path: Path) -> Mapping[str, Markers]:
 
 
 def markers_topic(recording: Recording, p: Tree) -> str:
-    """The markers' topic, where it is not said the only one."""
+    """Return the markers' topic, where it is not said the only one."""
     if p.settings.seen.markers:
         return str(p.settings.seen.markers)
     if len(recording.markers) != 1:

@@ -1,5 +1,4 @@
-"""Any body under what a recording says moved it: a mesh file, block or cylinder, held and moved
-where its scene says, judged by force, markers and outlines; and the experiment that follows.
+"""Experiment of a measured body: mesh file, block or cylinder, against force, markers, outlines.
 
 Statics at evenly spaced instants, or the motion in time (`moving_body`). In statics the body is
 unloaded at the first one: what is compared of markers and outlines counts from there. An open
@@ -65,7 +64,7 @@ _REFINED = 600.0  # s, of the runs that --refine makes of quadratic cells
 
 
 def solid(label: str, law: LawName = "neo_hooke", scene: Changes | None = None) -> Method:
-    """A static model of the body in a law, with further changes of the scene by path."""
+    """Return a static model of the body in a law, with further changes of the scene by path."""
     settings = QuasiStatic() if law == "linear" else StaticNewton("none")
     return Method(label, settings, {**model_of(law), **(scene or {})})
 
@@ -86,7 +85,7 @@ def measured_body(
     folder: Path,
     kind: Kind = "measured",
 ) -> Experiment:
-    """The experiment; the last method, the cheapest, is the one that inputs are varied with.
+    """Return the experiment; the last method, the cheapest, is the one that inputs are varied with.
 
     `folder` is that of the experiment's file, from which a mesh file is found.
     """
@@ -164,8 +163,8 @@ def _identified(
 
 
 def static_scene(recording: Recording, p: Tree, model: Changes, folder: Path) -> Scene:
-    """The body as it is held and loaded, in the law and element of a method; a mesh file is found
-    from the `folder`."""
+    """Return the body as it is held and loaded, in the law and element of a method; a mesh file is
+    found from the `folder`."""
     E = modulus_in(p.settings.by_method, model_name(model))
     changed = changed_by(p, {**model, **({} if E is None else {"material.E": E})})
     _require_known(recording, changed)

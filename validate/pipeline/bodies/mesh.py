@@ -1,4 +1,4 @@
-"""Mesh of a measured body: of its declared geometry, and how many unknowns it has."""
+"""Mesh of a measured body from its declared geometry, and its number of unknowns."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -65,7 +65,7 @@ _BODIES = (Box, Cylinder, MeshFile, IndentedBlock, IndentedCylinder)
 
 
 def mesh_of(p: Tree, folder: Path) -> Mesh:
-    """The body with the facet set "surface" of all of it.
+    """Return the body with the facet set "surface" of all of it.
 
     The places of a mesh file are chosen on the mesh as it is, and halved with it: smaller facets
     beside a box would enter it, and the nearest one of a point is a quarter as large. Raises
@@ -93,7 +93,7 @@ def _meshed(body: Geometry, folder: Path, places: tuple[str, ...], changed: int)
 
 
 def named_places(scene: Scene) -> tuple[str, ...]:
-    """The places that hold and move a declared body, in words."""
+    """Return the places that hold and move a declared body, in words."""
     parts: tuple[Any, ...] = (
         *scene.supports, *scene.drives, *scene.contacts, *scene.tracked, *scene.loads
     )  # fmt: skip
@@ -128,7 +128,7 @@ def unknowns_of(p: Tree, order: int, folder: Path) -> float:
 
 
 def costs_of(p: Tree, order: int, folder: Path) -> float:
-    """The unknowns that a solution costs: those of nodal mean dilatation count more."""
+    """Return the unknowns that a solution costs: those of nodal mean dilatation count more."""
     N = unknowns_of(p, order, folder)
     filed = isinstance(p.scene.body, MeshFile)
     return N * NODAL_MEAN if filed and order == 1 and not mesh_of(p, folder).bricks else N

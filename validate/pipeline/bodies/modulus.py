@@ -1,4 +1,4 @@
-"""The modulus of a measured body, identified by every judged law itself, with its budget.
+"""Modulus of a measured body, identified with each tested law, with its budget.
 
 Force under a displacement is in proportion to the modulus at a fixed Poisson ratio: one solution
 with a unit modulus is scaled to the measured force up to `seen.fit_to` of the load. A second one
@@ -53,7 +53,7 @@ _NEWTON = 1e-4  # relative: equilibrium is found to less than this
 
 
 def model_name(model: Changes) -> str:
-    """What parameters call a model: its law and element, where it has its own."""
+    """Return the name of a model in parameters: its law and element, where it has its own."""
     return ", ".join(str(value) for value in (model or {}).values())
 
 

@@ -1,4 +1,4 @@
-"""An experiment's own body on coarser and finer meshes, and the motion or load it was given.
+"""User-defined body of an experiment on coarser and finer meshes, with its prescribed input.
 
 A parameter refines the mesh where it changes the number of nodes and leaves the body's extents and
 volume as they are. Without such a parameter the mesh that was built is refined uniformly.
@@ -56,7 +56,7 @@ class OwnBody:
         return tuple(p for p in candidates if self._refines(p))
 
     def at(self, level: int) -> Scene:
-        """Raises `SceneError` for a level at which the body cannot be meshed."""
+        """Raise `SceneError` for a level at which the body cannot be meshed."""
         if level not in self._scenes:
             self._scenes[level] = self._meshed(level)
         return self._scenes[level]
@@ -120,8 +120,8 @@ def own_body(experiment: Experiment) -> OwnBody:
 
 
 def meshed(scene: AnyScene) -> Scene:
-    """The scene; raises `SceneError` for one without a mesh, where nothing can be refined, and for
-    rigid bodies that touch, which the schemes of a derived ladder do not know."""
+    """Return the scene; raises `SceneError` for one without a mesh, where nothing can be refined,
+    and for rigid bodies that touch, which the schemes of a derived ladder do not know."""
     if isinstance(scene, Meshless):
         raise SceneError("the scene has no mesh and no steps; a study needs both")
     if scene.contacts:
@@ -133,7 +133,7 @@ def meshed(scene: AnyScene) -> Scene:
 
 
 def with_law(scene: Scene, law: LawName) -> Scene:
-    """The scene with that law everywhere."""
+    """Return the scene with that law everywhere."""
     regions = tuple(replace(r, material=r.material.of_law(law)) for r in scene.regions)
     return replace(scene, material=scene.material.of_law(law), regions=regions)
 

@@ -1,4 +1,4 @@
-"""Identification before prediction: what is free, on which residuals, with what uncertainty.
+"""Calibration before prediction: free parameters, their data and their uncertainty.
 
 Start with `calibration`.
 """

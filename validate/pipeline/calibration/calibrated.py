@@ -1,4 +1,4 @@
-"""Identification before prediction: what stands open is found on what calibrates, kept apart.
+"""Calibration before prediction: open parameters are identified on separate data.
 
 What was identified goes on with its covariance as uncertain inputs, along its principal axes; what
 calibrated is named, so that no figure serves twice.
@@ -162,7 +162,8 @@ def here(number: int, problem: Problem) -> Identification:
 
 
 def open_free(experiment: Experiment, parameters: Any) -> tuple[tuple[Free, ...], ...]:
-    """What of every calibration stands open; raises `UsageError` for a path that is none."""
+    """Return the open parameters of every calibration; raises `UsageError` for a path that is
+    none."""
     values = {p.path: p.default for p in describe(parameters)}
     for free in (f for c in experiment.calibrations for f in c.free):
         with_values(parameters, {free.path: repr(free.low)})
@@ -172,7 +173,7 @@ def open_free(experiment: Experiment, parameters: Any) -> tuple[tuple[Free, ...]
 
 
 def apart(experiment: Experiment, parameters: Any) -> tuple[Any, ...]:
-    """The parameters of every recording that only calibrates what stands open."""
+    """Return the parameters of every recording that only calibrates what stands open."""
     each = zip(experiment.calibrations, open_free(experiment, parameters), strict=True)
     ons = (on for c, free in each if free for on in c.on if not on.judged)
     return tuple(on.change(parameters) for on in ons)
@@ -208,7 +209,7 @@ def problem_of(
     methods: Mapping[str, Method],
     shipped: tuple[Recording, ...],
 ) -> Problem:
-    """The recordings that calibrate are loaded; raises what that raises."""
+    """Return the recordings that calibrate are loaded; raises what that raises."""
     calibration = experiment.calibrations[number]
     if calibration.method not in methods:
         raise UsageError(
@@ -344,7 +345,7 @@ def _each_by_itself(experiment: Experiment) -> set[str]:
 
 
 def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
-    """Raises `ComparisonError` where what is judged calibrates, under whatever name."""
+    """Raise `ComparisonError` where what is judged calibrates, under whatever name."""
     for part in (p for p in problem.parts if p.judged):
         twice = next((n for n in part.on.quantities for a in accept if _all_of(a, n)), "")
         if not twice:
@@ -365,7 +366,7 @@ def _all_of(accept: Accept, name: str) -> bool:
 
 
 def require_identified(experiment: Experiment, one: Calibrated) -> None:
-    """Raises `ComparisonError` for a parameter that its recordings do not identify."""
+    """Raise `ComparisonError` for a parameter that its recordings do not identify."""
     for estimate, free in zip(one.found.estimates, one.problem.free, strict=True):
         if not estimate.identified:
             raise ComparisonError(
@@ -384,8 +385,8 @@ def served(fitted: Iterable[Calibrated]) -> tuple[str, ...]:
 
 
 def with_inputs(experiment: Experiment, fitted: Sequence[Calibrated]) -> Experiment:
-    """The experiment with the covariance of what was identified among its uncertain inputs, in
-    place of declared ranges of the same parameters."""
+    """Return the experiment with the covariance of what was identified among its uncertain inputs,
+    in place of declared ranges of the same parameters."""
     inputs = tuple(i for one in fitted for i in inputs_of(one))
     if not inputs:
         return experiment

@@ -1,4 +1,4 @@
-"""What calibrates, declared: which parameters are identified, on which residuals of what.
+"""Declaration of a calibration: free parameters and the residuals that identify them.
 
 A parameter that stands open (None) is identified before anything is predicted; one with a value is
 taken as it is. What calibrated is shown as fitted and is never evidence.

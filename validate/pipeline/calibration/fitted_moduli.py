@@ -1,4 +1,4 @@
-"""Moduli that each method was fitted with, as parameters carry them, and how inputs move them.
+"""Moduli fitted by each method as parameters, and their change with uncertain inputs.
 
 A judged law has the modulus that the same law was identified with. So parameters hold one entry a
 model: its name, its modulus Pa and the displacement m at which its load begins.
@@ -43,7 +43,7 @@ class Moves:
 
 
 def modulus_in(entries: tuple[Entry, ...], name: str) -> float | None:
-    """The modulus of a model; None where it was not identified."""
+    """Return the modulus of a model; None where it was not identified."""
     return next((E for own, E, _ in entries if own == name), None)
 
 
@@ -60,7 +60,8 @@ def moving(p: Any, moves: Moves, z: float) -> Any:
 def with_move(
     name: str, doc: str, source: str, moves: Moves, also: Callable[[Any, float], Any] | None = None
 ) -> Input:
-    """An input that moves the moduli as identification under it does, and what `also` moves."""
+    """Return an input that moves the moduli as identification under it does, and what `also`
+    moves."""
 
     def move(p: Any, z: float) -> Any:
         return moving(also(p, z) if also else p, moves, z)
@@ -69,7 +70,7 @@ def with_move(
 
 
 def reidentified(ladder: MeshLadder, ratios: tuple[Mapping[str, float], ...]) -> MeshLadder:
-    """The ladder whose meshes have the moduli that were identified on them."""
+    """Return the ladder whose meshes have the moduli that were identified on them."""
 
     def level(change: Callable[[Any], Any], ratio: Mapping[str, float]) -> Callable[[Any], Any]:
         return lambda p: moving(change(p), Moves(ratio, {}), 1.0)
@@ -122,7 +123,7 @@ def effect(before: Floats, after: Floats) -> float:
 
 
 def counts(effect: float) -> bool:
-    """Whether a relative effect on a prediction is more than arithmetic."""
+    """Return whether a relative effect on a prediction is more than arithmetic."""
     return abs(effect) > _NOTHING
 
 
@@ -163,7 +164,7 @@ def finding(law: str, pattern: Pattern | None, off: Misfit) -> str:
 
 
 def sentence(one: IdentifiedValue) -> str:
-    """The value, its 95 % half width, its terms in falling order, and what it rests on."""
+    """Return the value, its 95 % half width, its terms in falling order, and what it rests on."""
     value = with_unit(one.value, one.unit, 4)
     low, high = one.interval
     terms = sorted(one.parts.items(), key=lambda item: -item[1])

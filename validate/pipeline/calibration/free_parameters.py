@@ -1,4 +1,4 @@
-"""Free parameters of an identification as a user writes them: `a,b` or `path=low:high`."""
+"""Free parameters of an identification in the user's notation: `a,b` or `path=low:high`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ FreeOf = tuple[tuple[Free, ...], ...]  # of every calibration
 def asked(
     experiment: Experiment, parameters: Any, wanted: Sequence[str] = ()
 ) -> tuple[Experiment, FreeOf]:
-    """The experiment with its calibrations, and what is free of each.
+    """Return the experiment with its calibrations, and what is free of each.
 
     Nothing wanted: what stands open, or all that is declared where nothing does. What is not
     declared needs bounds, and is identified with the first calibration; an experiment without one

@@ -1,4 +1,4 @@
-"""One calibration as mathematics: coordinates of the free parameters -> whitened residuals."""
+"""Calibration as a least-squares problem: free parameters -> whitened residuals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is `free` of a calibration, on its recordings, by its method."""
+    """Least-squares problem of a calibration: its `free` parameters, recordings and method."""
 
     experiment: Experiment
     calibration: Calibration

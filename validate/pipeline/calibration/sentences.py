@@ -1,4 +1,4 @@
-"""Sentences on an identification: what was fitted, its uncertainty, what stays undetermined."""
+"""Sentences on an identification: fitted values, uncertainty, unidentifiable parameters."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -35,7 +35,7 @@ def headline(one: Calibrated) -> str:
 
 
 def unit_of(one: Calibrated, path: str) -> str:
-    """The unit of what was identified."""
+    """Return the unit of what was identified."""
     return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}[path]
 
 
@@ -109,7 +109,7 @@ def not_identified(one: Calibrated, e: Profiled, free: Free) -> str:
 
 
 def helping(free: Free) -> str:
-    """The measurement that would help."""
+    """Return the measurement that would help."""
     return free.helps or "a measurement that depends on it and not on the others"
 
 

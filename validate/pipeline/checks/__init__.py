@@ -1,4 +1,4 @@
-"""Verdicts of the accepted methods, and what makes a difference plausible.
+"""Verdicts of the accepted methods, and likely causes of differences.
 
 Start with `checks`.
 """

@@ -56,7 +56,7 @@ def variants_of(road: Road) -> list[Variant]:
 
 @dataclass(frozen=True)
 class Terms:
-    """What a residual is judged with: the requirement, u_num, and the parts of u_input.
+    """Terms of a residual's check: the requirement, u_num, and the parts of u_input.
 
     `fitted` says why its data are no evidence; "" where they are.
     """
@@ -72,7 +72,8 @@ class Terms:
 
 
 def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
-    """The verdict on everything that the experiment accepts; what compared nothing has failed.
+    """Return the verdict on everything that the experiment accepts; what compared nothing has
+    failed.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
@@ -84,7 +85,7 @@ def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
 
 
 def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]]:
-    """What every residual that is accepted is judged with, by its name.
+    """Return the terms of every accepted residual, by its name.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
@@ -252,7 +253,7 @@ def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
 
 
 def shown_effects(road: Road) -> tuple[EffectSpec, ...]:
-    """The effects whose methods the user runs anyway; none in a quick run.
+    """Return the effects whose methods the user runs anyway; none in a quick run.
 
     None either without an accepted method: its u_num and u_input are part of what hides an effect.
     """

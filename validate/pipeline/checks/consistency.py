@@ -1,4 +1,4 @@
-"""Does each filter know how wrong it is? Innovations, NIS and node errors against their bands."""
+"""Consistency scores of each filter: innovations, NIS and node errors against their bands."""
 
 from collections.abc import Mapping
 
@@ -85,7 +85,7 @@ def nis_of(followed: Followed) -> Consistency | None:
 
 
 def claims_hold(followed: Followed) -> bool:
-    """Whether NIS lies within its 95 % band; True for a method without innovations."""
+    """Return whether NIS lies within its 95 % band; True for a method without innovations."""
     nis = nis_of(followed)
     return nis is None or nis.band_95.holds(nis.mean)
 

@@ -320,7 +320,7 @@ def _at(found: Difference, t: Floats) -> Floats:
 
 
 def difference_of(followed: Followed, history: History, inertia: bool) -> Difference:
-    """A history of a run, beside the body's first mode."""
+    """Return a history of a run, beside the body's first mode."""
     try:
         first = first_frequencies(followed.body, 1)[0]
     except (ValidateError, np.linalg.LinAlgError):
@@ -331,9 +331,10 @@ def difference_of(followed: Followed, history: History, inertia: bool) -> Differ
 def explained_by(
     results: Sequence[MethodResult], differences: Callable[[str, Failed], Sequence[Difference]]
 ) -> tuple[str, tuple[Exhibit, ...]]:
-    """A sentence with the likeliest cause of the first method with a check that fails, and a table
-    of all causes by method and history; nothing where every check passes or nothing was recorded
-    over time. `differences` are those of a method's observations with a failed quantity."""
+    """Return a sentence with the likeliest cause of the first method with a check that fails, and a
+    table of all causes by method and history; nothing where every check passes or nothing was
+    recorded over time. `differences` are those of a method's observations with a failed
+    quantity."""
     rows, sentence = [], ""
     for method in results:
         failed = {c.name.split("@")[0] for c in method.checks

@@ -31,7 +31,7 @@ def variants(uncertainty: Uncertainty, name: str) -> dict[str, list[Variant]]:
 
 
 class Refined:
-    """How a method's residuals converge, by part of u_num; of the meshes and steps that ran."""
+    """Convergence of a method's residuals, by part of u_num; of the meshes and steps that ran."""
 
     def __init__(self, road: Road, uncertainty: Uncertainty, name: str) -> None:
         self._uncertainty = uncertainty
@@ -49,7 +49,7 @@ class Refined:
         return {part: self._converged(part, residual, rounding) for part in self._runs}
 
     def numerical(self, residual: Residual, limit: float = inf) -> Numerical:
-        """The parts of u_num, how each was found, and what would decide within `limit`."""
+        """Return the parts of u_num, how each was found, and what would decide within `limit`."""
         found = self.of(residual, limit)
         deciding = {part: self._deciding(part, c, limit) for part, c in found.items() if c}
         lost = [part for part, c in found.items() if c is None or not c.asymptotic]

@@ -29,7 +29,8 @@ def doubts(
     recordings: Sequence[Recording],
     first: Followed,
 ) -> tuple[str, ...]:
-    """A sentence with the factor for everything implausible; `first` is any method that was run."""
+    """Return a sentence with the factor for everything implausible; `first` is any method that was
+    run."""
     found = [w for p in parameters for w in _of_value(p, stated)]
     found += [f"{r.name}: {line}" for r in recordings for line in odd_scales(r)]
     if isinstance(first.scene, Scene) and first.scene.mesh.dimension == 3:

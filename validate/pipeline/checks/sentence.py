@@ -1,4 +1,4 @@
-"""The words that open a report and a terminal: what was judged by what, and what came of it."""
+"""Verdict sentence of a report and of the terminal."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -37,7 +37,7 @@ _VALIDATION = {
 
 
 def verdict_sentence(results: tuple[MethodResult, ...], kind: Kind, *, quick: bool) -> str:
-    """What was decided, for how many comparisons, and what was not."""
+    """Return the verdict in words: number of decided and of undecided comparisons."""
     checked = [m for m in results if m.checks]
     if not checked:
         return "Nothing was compared: none of the accepted methods was run."

@@ -1,4 +1,4 @@
-"""Standard deviations of what drives a simulation, as uncertain inputs of its verdict.
+"""Standard deviations of drives as uncertain inputs of a verdict.
 
 A recorded standard deviation of a stage, a force or of tracked points is taken as an error that is
 there at all times after rest (an offset): at every instant of a static problem it does what an

@@ -1,1 +1,1 @@
-"""What every experiment adds to a report besides the views of its table."""
+"""Report items of every experiment besides the views of its table."""

@@ -1,4 +1,4 @@
-"""Measurements that the gate of a filter rejected: how many, of which marker, when, how far off."""
+"""Measurements that a filter's gate rejected: number, marker, time and distance."""
 
 from collections.abc import Mapping
 
@@ -42,7 +42,7 @@ def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | 
 
 
 def parameters_of(f: Followed) -> tuple[str, ...]:
-    """Names of what a filter's run estimated."""
+    """Return the names of what a filter's run estimated."""
     ends = [n for n in f.run.traces if n.startswith(_OF) and n.endswith(".left")]
     found = [n.removeprefix(_OF).removesuffix(".left") for n in ends]
     return tuple(found) if len(f.run.t) else ()
@@ -146,7 +146,7 @@ def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
 
 
 def gate_warnings(main: Mapping[str, Followed]) -> tuple[str, ...]:
-    """A sentence on every filter whose gate rejected more looks than it let pass."""
+    """Return a sentence on every filter whose gate rejected more looks than it let pass."""
     found = []
     for f in main.values():
         tested = int(_sum(f, "gate.tested"))

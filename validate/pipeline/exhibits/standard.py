@@ -1,4 +1,4 @@
-"""What every experiment shows: displacements, errors, other cases; and how fast each method is."""
+"""Standard report items: displacements, errors, other cases, speed of each method."""
 
 from collections.abc import Mapping
 

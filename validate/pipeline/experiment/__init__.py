@@ -1,4 +1,4 @@
-"""What an experiment declares: methods, parameters, variations, and its JSON form.
+"""Declaration of an experiment: methods, parameters, variations, and its JSON form.
 
 Start with `experiment`.
 """

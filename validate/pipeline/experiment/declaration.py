@@ -1,4 +1,4 @@
-"""A declaration as JSON: exact, and data.
+"""JSON form of a declared experiment, exact and without code.
 
 An object is {"type": name of its class, ...} with the fields that are not their defaults; numbers
 are in SI. What is code stays in the experiment's file: {"code": "twin.record"} says where in its
@@ -36,7 +36,7 @@ from validate.solve.schemes import SCHEMES, SOLVERS
 
 
 def require_paths(experiment: Experiment, file: Path) -> None:
-    """Raises `UsageError` for a variation, case, effect or method whose path or rule is none."""
+    """Raise `UsageError` for a variation, case, effect or method whose path or rule is none."""
     parameters = experiment.parameters
     for what, change in _changes(experiment):
         try:
@@ -108,13 +108,13 @@ _RUNS_PROGRAMS = ("ExternalSimulator", "ExternalLetGo")  # settings with a comma
 
 
 def to_json(experiment: Experiment) -> str:
-    """The declaration; what is code is named by its place in the experiment's file."""
+    """Return the declaration; what is code is named by its place in the experiment's file."""
     document = {"format": FORMAT, "experiment": _encoded(experiment, "")}
     return json.dumps(document, indent=1, allow_nan=False)
 
 
 def holds_code(declaration: str) -> bool:
-    """Whether a declaration refers to the code of the experiment's file."""
+    """Return whether a declaration refers to the code of the experiment's file."""
 
     def code(value: Any) -> bool:
         if isinstance(value, dict):
@@ -171,8 +171,8 @@ def _is_ours(kind: type) -> bool:
 
 
 def classes() -> Mapping[str, type]:
-    """The classes that a declaration may name: the package's, then those of plug-ins and scripts,
-    which may add some at any time."""
+    """Return the classes that a declaration may name: the package's, then those of plug-ins and
+    scripts, which may add some at any time."""
     coefficients = (kind.holds for kind in LAWS.further if kind.holds is not None)
     further = (*SCHEMES.further, *SOLVERS.further, *FILTERS.further, *SENSORS.further)
     return _classes((*further, *coefficients))
@@ -197,7 +197,7 @@ def encoded(part: Any, at: str) -> str:
 
 
 def from_json(text: str, path: Path, declared: Experiment | None = None) -> Experiment:
-    """The experiment of a declaration; code is that of `declared`, where it is given.
+    """Return the experiment of a declaration; code is that of `declared`, where it is given.
 
     Recordings and meshes are found from the folder of `path`. Raises `UsageError` that names the
     path in the declaration for what is no declaration, and for code where there is no `declared`.

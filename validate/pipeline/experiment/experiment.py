@@ -1,4 +1,4 @@
-"""What an experiment declares. One experiment is one Python file in `experiments/`.
+"""Declaration of an experiment. One experiment is one Python file in `experiments/`.
 
 An experiment file is code: run only your own. A recording is data: nothing in it is executed.
 """
@@ -88,7 +88,7 @@ class Input:
         return lambda parameters: self.move(parameters, z)
 
     def at(self, method: str, z: float) -> Variant:
-        """The method with this input off by z standard uncertainties."""
+        """Return the method with this input off by z standard uncertainties."""
         return Variant(method, self.by(z), off=tuple(z * x for x in self.off))
 
 
@@ -140,7 +140,7 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How u_num and u_input are found: meshes and steps, the inputs, and a cheap method for them.
+    """Settings for u_num and u_input: meshes and steps, the inputs, and a cheap surrogate method.
 
     None for `mesh` or `steps`: the truth is the model's own there, or there is none. `stand_in`
     names, for a method too slow on every mesh, a faster one of the same element that takes its
@@ -174,7 +174,7 @@ Variation = Input | MeshLadder | StepLadder | Free | Sweep
 def vary(
     path: str | tuple[str, ...], rule: str, name: str = "", doc: str = "", source: str = "assumed"
 ) -> Any:
-    """A variation by path and rule; several paths of an input move together.
+    """Return a variation by path and rule; several paths of an input move together.
 
         vary("material.E", "relative 3 %")                        an uncertain input
         vary("material.nu", "absolute 0.005, below 0.5")          (`pipeline.experiment.variation`)
@@ -208,15 +208,15 @@ def free(
     source: str = "assumed",
     helps: str = "",
 ) -> Free:
-    """A parameter that is identified where it stands open, between bounds with their unit, `on`
-    residuals (a quantity, or quantity@load) that are then no evidence."""
+    """Return a parameter that is identified where it stands open, between bounds with their unit,
+    `on` residuals (a quantity, or quantity@load) that are then no evidence."""
     names = (on,) if isinstance(on, str) else tuple(on)
     return Free(path, bound(low, path), bound(high, path), source, helps, names)
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What was identified from the recordings: parameters to use, scores, and sentences to show.
+    """Result of an identification: parameters to use, scores, and sentences of the report.
 
     `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
     whose data served: checks on them are fitted, and no evidence. `doubts` of what was given are
@@ -235,7 +235,8 @@ class Identified:
     mesh: "MeshLadder | None" = None
 
     def of(self, experiment: "Experiment") -> "Experiment":
-        """The experiment with the inputs and meshes that the identification left uncertain."""
+        """Return the experiment with the inputs and meshes that the identification left
+        uncertain."""
         declared = experiment.uncertainty
         if declared is None:
             return experiment
@@ -283,7 +284,7 @@ def _as_read(recording: Recording, parameters: Any) -> Recording:
 
 @dataclass(frozen=True)
 class Twin:
-    """How a synthetic recording is made, and what its truth was.
+    """Twin: function of the synthetic recording, and its truth.
 
     `truth` repeats the twin: it scores the runs, and no method sees it. `remake` are prefixes of
     parameters that the twin reads: changing one makes the recording anew. `read` is what `load`
@@ -301,7 +302,7 @@ class Twin:
     read: Callable[[Recording, Any], Recording] = _as_read
 
     def made(self, parameters: Any, progress: Progress) -> Recording:
-        """A recording in memory, as one that was loaded."""
+        """Return a recording in memory, as one that was loaded."""
         return self.read(self.record(parameters, progress), parameters)
 
 

@@ -1,4 +1,4 @@
-"""Kinds of experiments: the settings of a kind make its declaration complete."""
+"""Kinds of experiments: the settings of a kind complete its declaration."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -36,7 +36,7 @@ def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment
 
 
 def of_a_kind(experiment: Experiment) -> bool:
-    """Whether its scene and settings say all that is declared of it."""
+    """Return whether its scene and settings say all that is declared of it."""
     return _kind(experiment) in kinds()
 
 
@@ -46,7 +46,7 @@ def _kind(experiment: Experiment) -> type:
 
 
 def completed(experiment: Experiment, path: Path) -> Experiment:
-    """The experiment declared in that file, with what its kind adds."""
+    """Return the experiment declared in that file, with what its kind adds."""
     if not isinstance(experiment.parameters, Tree):
         raise UsageError(
             f"{path}: parameters of type {type(experiment.parameters).__name__}; declare a scene: "

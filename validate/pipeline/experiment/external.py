@@ -1,4 +1,4 @@
-"""External simulators among the methods of an experiment: declared ones and added ones."""
+"""External simulators as methods of an experiment, declared or added."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""Experiments by name or by file: the one that is asked for is run, and only that."""
+"""Experiments by name or file; only the requested file is run."""
 
 import ast
 import importlib.util
@@ -24,7 +24,7 @@ _LOADED: dict[Path, tuple[Experiment, ...]] = {}  # by file
 
 
 def find(name: str, start: Path, named: Sequence[Path] = ()) -> Experiment:
-    """The experiment of that name, or of that file when it ends in .py or .json.
+    """Return the experiment of that name, or of that file when it ends in .py or .json.
 
     Names are looked for as `experiment_files` says. Raises `UsageError` naming the nearest ones
     when there is none.
@@ -70,8 +70,8 @@ def load_file(path: Path) -> Experiment:
 
 
 def loaded_from(path: Path) -> tuple[Experiment, ...]:
-    """The experiments that a file gave this process, the last one first; each load makes another
-    one, with functions of its own."""
+    """Return the experiments that a file gave this process, the last one first; each load makes
+    another one, with functions of its own."""
     return _LOADED.get(path.resolve(), ())
 
 
@@ -151,8 +151,8 @@ def _declared_at(path: Path, line: int) -> str:
 
 
 def sources_of(path: Path) -> tuple[Path, ...]:
-    """An experiment's file, those beside it that it names, and those of other experiments' folders
-    that it imports from; none of one without a file."""
+    """Return an experiment's file, those beside it that it names, and those of other experiments'
+    folders that it imports from; none of one without a file."""
     if not path.is_file():
         return ()
     if path.suffix == ".json":

@@ -1,4 +1,4 @@
-"""The solver that a method's constitutive law needs.
+"""Solver that a method's constitutive law needs.
 
 What a method changes of the scene's material has a law, its settings solve it. Where a user sets
 another law, a static method takes a solver of that law: that of the experiment's own static method
@@ -23,7 +23,7 @@ _LINEAR, _LARGE = (ExactPressure, NoFluid, QuasiStatic), (StaticNewton, Tabulate
 
 
 def laws_of(method: Method) -> tuple[str, ...]:
-    """The laws that a method may have."""
+    """Return the laws that a method may have."""
     static = isinstance(method.settings, (*_LINEAR, *_LARGE))
     handles: Handles | None = getattr(method.settings, "handles", None)
     own: tuple[LawName, ...] = get_args(LawName) if static or handles is None else handles.law
@@ -31,7 +31,7 @@ def laws_of(method: Method) -> tuple[str, ...]:
 
 
 def with_law(name: str, method: Method, law: str, declared: Mapping[str, Method]) -> Method:
-    """A method of which a user sets the law, with a solver of that law.
+    """Return a method of which a user sets the law, with a solver of that law.
 
     Raises `UsageError` for a law that the method's scheme does not solve.
     """

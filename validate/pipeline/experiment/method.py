@@ -1,4 +1,4 @@
-"""A method of an experiment: a scheme or a filter, and the scene options it is built with."""
+"""Method of an experiment: a scheme or a filter, with its changes of the scene."""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
@@ -56,7 +56,7 @@ class Method:
         given: Mapping[str, Any],
         declared: "Method | None" = None,
     ) -> Stepper:
-        """The prepared scheme or filter, with the experiment's settings where it has them.
+        """Return the prepared scheme or filter, with the experiment's settings where it has them.
 
         Filters get what moves freely of their markers. Raises as `given` does.
         """
@@ -66,11 +66,11 @@ class Method:
         return cast(Stepper, settings.prepare(system, self.offered(system, seen)))
 
     def offered(self, system: System, seen: Registered) -> Measurements:
-        """The measurements of its markers that a filter is given: of what moves freely."""
+        """Return the measurements of its markers that a filter is given: of what moves freely."""
         return measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
 
     def given(self, given: Mapping[str, Any], declared: "Method | None" = None) -> Any:
-        """The settings with those that the experiment itself gives.
+        """Return the settings with those that the experiment itself gives.
 
         Raises `UsageError` where a user set one of these to something else: a value that is neither
         the experiment's, nor the default, nor that of the method as `declared`.

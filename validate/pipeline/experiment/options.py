@@ -1,4 +1,4 @@
-"""What a user may change of an experiment, and where the experiment lies."""
+"""User options of a run (values, methods, cases), and the folder of the experiment."""
 
 import os
 from collections.abc import Mapping
@@ -65,7 +65,7 @@ def _require_read(values: Mapping[str, str], methods: Mapping[str, Method]) -> N
 
 
 def chosen_cases(experiment: Experiment, options: Options) -> tuple[Case, ...]:
-    """The cases to run: all, or the one that is named, with every chosen method.
+    """Return the cases to run: all, or the one that is named, with every chosen method.
 
     Raises `UsageError` for an unknown name.
     """
@@ -77,7 +77,7 @@ def chosen_cases(experiment: Experiment, options: Options) -> tuple[Case, ...]:
 
 
 def require_case(experiment: Experiment, name: str) -> None:
-    """Raises `UsageError` where the experiment has no case of that name."""
+    """Raise `UsageError` where the experiment has no case of that name."""
     names = {c.name for c in experiment.cases}
     if name not in names | {RECORDED}:
         hint = nearest_names(name, names) if names else "the experiment has none"
@@ -127,7 +127,7 @@ def _of_scenes(
 
 
 def doubtful(experiment: Experiment, values: Mapping[str, str]) -> tuple[str, ...]:
-    """A line for each value that looks like one whose unit was forgotten."""
+    """Return a line for each value that looks like one whose unit was forgotten."""
     mine, theirs = _split(values)
     ours, _ = _of_scenes(experiment, theirs)
     return (*doubts(experiment.parameters, mine), *doubts(experiment.methods, ours))
@@ -140,8 +140,8 @@ def _split(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def mesh_files(parameters: Any, folder: Path) -> tuple[Path, ...]:
-    """The files of meshes and of landmarks that parameters name, beside the experiment in `folder`
-    or where the program runs, as far as they can be read; with what a deck includes."""
+    """Return the files of meshes and of landmarks that parameters name, beside the experiment in
+    `folder` or where the program runs, as far as they can be read; with what a deck includes."""
     named = (p.default for p in describe(parameters) if isinstance(p.default, str))
     texts = [text for text in named if text.lower().endswith((*_MESHES, *_LAYOUTS))]
     paths = [p for text in texts for p in (folder / text, Path(text))]
@@ -150,7 +150,8 @@ def mesh_files(parameters: Any, folder: Path) -> tuple[Path, ...]:
 
 
 def folder_of(experiment: Experiment) -> Path:
-    """The folder of the experiment's file; `ComparisonError` when it was not loaded from one."""
+    """Return the folder of the experiment's file; `ComparisonError` when it was not loaded from
+    one."""
     if experiment.path is None:
         raise ComparisonError(f"experiment '{experiment.name}' was not loaded from a file")
     return experiment.path.parent

@@ -1,5 +1,4 @@
-"""What the recordings say of an experiment's parameters, what they leave open, and where every
-value comes from."""
+"""Origin of every parameter: recording, user, default or identified; open parameters."""
 
 import ast
 import math
@@ -32,7 +31,7 @@ class Opened:
 
 
 def opened(experiment: Experiment, parameters: Any) -> Opened:
-    """Loads the recordings; what is not set is taken from them.
+    """Load the recordings; what is not set is taken from them.
 
     Raises `UsageError` for what neither they nor the user say, with the line of the file.
     """
@@ -53,7 +52,7 @@ def _common(stated: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def same(value: Any, stated: float) -> bool:
-    """Whether a value is the recording's, as it is written into a file."""
+    """Return whether a value is the recording's, as it is written into a file."""
     return isinstance(value, int | float) and math.isclose(value, stated, rel_tol=_WRITTEN)
 
 
@@ -84,7 +83,7 @@ def _line(tree: ast.AST, parameter: str) -> int:
 def marked(
     experiment: Experiment, options: Options, found: Opened, described: Sequence[Parameter]
 ) -> tuple[Parameter, ...]:
-    """The parameters `described` as used, each with its origin."""
+    """Return the parameters `described` as used, each with its origin."""
     declared = describe(experiment.parameters) + describe(experiment.methods, "methods.")
     origins = {p.path: p.origin for p in declared}
     before = {p.path: p.default for p in describe(found.parameters)}

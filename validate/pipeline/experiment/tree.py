@@ -1,4 +1,4 @@
-"""The parameters of a declared experiment: its recording, its scene, and settings of its own.
+"""Parameters of a declared experiment: its recording, its scene, and further settings.
 
 The scene's paths have no prefix (`material.E`, `body.cells`), nor have the settings' own.
 """
@@ -50,7 +50,7 @@ class Meshes:
 
 @dataclass(frozen=True)
 class TrackedTwin:
-    """What made a tracked recording; the models do not know it."""
+    """Settings of the twin behind a tracked recording; the models do not use them."""
 
     seed: int = quantity(1, "1", "seed of the noise")
     noise: float = quantity(1e-9, "m2", "variance of the white noise per component (.001 mm2)")
@@ -68,13 +68,13 @@ class TrackedTwin:
         return Camera(sqrt(self.noise), self.every, self.missing, still=10_000)
 
     def true(self, material: Material) -> Material:
-        """The models' material as the twin has it."""
+        """Return the models' material as the twin has it."""
         nu = material.nu if self.nu is None else self.nu
         return replace(material, E=self.stiffness * material.E, nu=nu)
 
 
 def require_used(given: Coefficients, laws: set[LawName]) -> None:
-    """Raises `UsageError` for coefficients of the material that the law of no method knows."""
+    """Raise `UsageError` for coefficients of the material that the law of no method knows."""
     for f in fields(given):
         value = getattr(given, f.name)
         if value != f.default and all(getattr(given.known_to(w), f.name) != value for w in laws):
@@ -124,7 +124,8 @@ class Tree:
 
 
 def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
-    """The one recording that the tree names, from the experiment's folder or the current one."""
+    """Return the one recording that the tree names, from the experiment's folder or the current
+    one."""
     from validate.recording.readers import read_recording  # all formats: only where needed
 
     own = folder / tree.recording
@@ -132,7 +133,7 @@ def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 
 
 def placed_by_names(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    """The recording by the names of the scene's inputs (`register.as_declared`)."""
+    """Return the recording by the names of the scene's inputs (`register.as_declared`)."""
     return as_declared(recording, scene)
 
 
@@ -157,7 +158,8 @@ class Built:
 
 
 def changed_by(tree: Tree, changes: Mapping[str, Any]) -> Tree:
-    """The tree with a method's changes by path; its law keeps what it knows of the coefficients.
+    """Return the tree with a method's changes by path; its law keeps what it knows of the
+    coefficients.
 
     Raises `UsageError` where a change follows a value that stands open.
     """
@@ -169,7 +171,7 @@ def changed_by(tree: Tree, changes: Mapping[str, Any]) -> Tree:
 
 
 def valued(tree: Tree, changes: Mapping[str, Any], given: Collection[str]) -> dict[str, Any]:
-    """A method's changes with the texts of the paths `given` as values; what follows another
+    """Return a method's changes with the texts of the paths `given` as values; what follows another
     parameter, or is a factor or a step, does so later.
 
     Raises what `changed_by` does for a path or a value; what stands open may be followed.
@@ -184,7 +186,7 @@ def valued(tree: Tree, changes: Mapping[str, Any], given: Collection[str]) -> di
 
 
 def follows(value: Any) -> bool:
-    """Whether a change takes another parameter's value: "as PATH"."""
+    """Return whether a change takes another parameter's value: "as PATH"."""
     return isinstance(value, str) and value.startswith("as ")
 
 
@@ -223,8 +225,8 @@ class ScaledBody:
 
 
 def mesh_of(recording: Recording | None, tree: Tree, folder: Path) -> Mesh:
-    """The mesh of the declared body. Raises `ComparisonError` where it follows from a recording and
-    there is none."""
+    """Return the mesh of the declared body. Raises `ComparisonError` where it follows from a
+    recording and there is none."""
     body = tree.scene.body
     if isinstance(body, Mesh):
         return body

@@ -1,4 +1,4 @@
-"""Variations: a path of the parameters and a rule that says how its value changes.
+"""Variations: a path of the parameters and a rule for the change of its value.
 
     {"twin.stiffness": 0.8, "membranes.wall.thickness": "0.1 mm"}   values, of a case or an effect
     {"material.E": "x 1.1", "mesh.cells": "+ 1"}              a factor, a step
@@ -96,7 +96,7 @@ def change_of(given: Mapping[str, Any] | Change) -> Change:
 
 @dataclass(frozen=True)
 class Shift:
-    """How an uncertain input moves: `paths` by z standard uncertainties, as `rule` says."""
+    """Change of an uncertain input: `paths` by z standard uncertainties, as `rule` says."""
 
     paths: tuple[str, ...]
     rule: str
@@ -206,7 +206,7 @@ def swept(rule: str, path: str) -> str:
 
 
 def bound(given: str | float, path: str) -> float:
-    """A bound in SI, from a number or a text with its unit."""
+    """Return a bound in SI, from a number or a text with its unit."""
     if not isinstance(given, str):
         return given
     parts = split(given)

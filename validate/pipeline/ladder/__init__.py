@@ -1,4 +1,4 @@
-"""The ladder of an experiment: meshes, steps and solvers for studies of cost.
+"""Ladder of an experiment: meshes, steps and solvers for studies of cost.
 
 Start with `ladder`.
 """

@@ -1,4 +1,4 @@
-"""The ladder of an experiment that declares none: derived from its scene and its recording.
+"""Default ladder of an experiment, derived from its scene and its recording.
 
 Elements are those its cells allow, meshes coarser and finer ones of the same body, solvers all that
 know its kind; those that refuse it are rows with the reason. Errors are against the finest mesh of

@@ -1,4 +1,4 @@
-"""How an experiment enters the studies: what is refined, what solves it, what is compared.
+"""Ladder of an experiment in studies: refinements, solvers and compared quantities.
 
 An experiment may declare its ladder; `pipeline.ladder.default` derives one from its scene.
 """
@@ -83,7 +83,7 @@ class Trial:
                 raise SceneError(f"steps of {dt:g} s do not end on the frames of the ladder")
 
     def times(self, dt: float) -> Floats:
-        """Ends (nt,) s of all steps of dt s."""
+        """Return the ends (nt,) s of all steps of dt s."""
         return dt * np.arange(1, round(float(self.frames[-1]) / dt) + 1, dtype=np.float64)
 
     @property
@@ -97,7 +97,7 @@ class Trial:
 
 
 def marker_noise(recording: Recording) -> tuple[float, str] | None:
-    """The declared standard deviation m of the markers, and what declares it."""
+    """Return the declared standard deviation m of the markers, and what declares it."""
     for name, marker in recording.markers.items():
         if marker.sd:
             return float(marker.sd), f"markers '{name}' of the recording"
@@ -131,7 +131,7 @@ class Turned:
 
 
 def turned(material: Material, mesh: int) -> Turned:
-    """A material with density, on a mesh."""
+    """Return a material with density, on a mesh."""
     m = material
     if m.rho is None:
         raise SceneError("a motion needs a density; set the material's rho, kg/m3")
@@ -167,7 +167,7 @@ class StabilityBody:
     qualities: tuple[float, ...] = QUALITY
 
     def build(self, body: Turned) -> Scene:
-        """Raises `SceneError` for materials, meshes and cells that cannot be."""
+        """Raise `SceneError` for materials, meshes and cells that cannot be."""
         if not body.quality > 0:
             raise SceneError(
                 f"altitude ratio {body.quality:g}: cells are flat or inverted; it must be positive"
@@ -181,13 +181,14 @@ class StabilityBody:
         return replace(scene, body=squeezed(scene.mesh, body.quality))
 
     def pulled(self, body: Turned) -> Scene:
-        """The body under its one static load."""
+        """Return the body under its one static load."""
         scene = self.build(body)
         return scene if self.pull is None else replace(scene, drives=(), loads=(self.pull,))
 
 
 def squeezed(mesh: Mesh, quality: float) -> Mesh:
-    """The mesh with the layer of cells just beyond the middle of x at `quality` of its thickness.
+    """Return the mesh with the layer of cells just beyond the middle of x at `quality` of its
+    thickness.
 
     The others are stretched alike, so that the outline stays.
     """

@@ -1,4 +1,4 @@
-"""Candidate methods for a body that a probe touches: the experiment's own, ordered by cost.
+"""Candidate methods for a body that a probe touches, ordered by cost.
 
 The whole prefactored solve, regions around the contact and reduced models are compared at one
 spring and one pad. Their reference is the whole solve in short steps.

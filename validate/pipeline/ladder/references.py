@@ -50,7 +50,8 @@ def _newton_dynamics(dt: float) -> Scheme:
 
 
 def still_best(cavities: bool) -> Callable[[float], Scheme]:
-    """The linear solver without error: superposition, with the root of the fluid's pressure."""
+    """Return the linear solver without error: superposition, with the root of the fluid's
+    pressure."""
     return lambda dt: ExactPressure() if cavities else QuasiStatic()
 
 

@@ -1,4 +1,4 @@
-"""A model against the clock: from a recorded path, or from packets on this machine's loopback."""
+"""Real-time loop of a model: from a recorded path, or from UDP packets on loopback."""
 
 from validate.pipeline.live.clock import Lived, live, realtime
 from validate.pipeline.live.listener import Listener

@@ -1,4 +1,4 @@
-"""The loop against the clock: a place in, a tick of the model, a force out.
+"""Real-time loop: position in, one step of the model, force out, with deadlines.
 
 A tick that is not there when the next one is due is missed, and counted. Whatever comes in, no
 force beyond the model's own limit goes out; without a new place it fades to zero.
@@ -143,7 +143,7 @@ def live(
     clock: Callable[[], float] = perf_counter,
     wait: Callable[[float], None] = sleep,
 ) -> Lived:
-    """Runs until the source ends, or for so many seconds; an interruption ends it, too."""
+    """Run until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
     _first_too(stepper.threads)
     kept, skipped = _Ticked(), 0

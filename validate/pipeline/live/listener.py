@@ -1,4 +1,4 @@
-"""Positions from UDP packets on loopback; forces go back to whoever sends them.
+"""Positions from UDP packets on loopback; forces return to the sender.
 
 Nothing that arrives ends the loop: what is no sound packet is counted by its fault. After `RESYNC`
 packets in a row that are late or out of order the sender's clock and numbers are taken anew; until
@@ -37,7 +37,7 @@ class Position:
 
 
 def position_of(data: bytes, d: int) -> Position | str:
-    """The packet, or in a word why it is none: short, long, magic, not finite."""
+    """Return the packet, or in a word why it is none: short, long, magic, not finite."""
     form = f"<4sIq{d}d"
     size = struct.calcsize(form)
     if len(data) != size:
@@ -52,13 +52,13 @@ def position_of(data: bytes, d: int) -> Position | str:
 
 
 def position_bytes(position: Position) -> bytes:
-    """What a device sends."""
+    """Return the packet of a device."""
     d = len(position.x)
     return struct.pack(f"<4sIq{d}d", PLACE, position.sequence, position.ns, *position.x.tolist())
 
 
 def force_bytes(sequence: int, force: Floats, flags: int) -> bytes:
-    """What the loop answers with force (d,) N."""
+    """Return the packet of the loop with force (d,) N."""
     return struct.pack(f"<4sI{len(force)}dI", FORCE, sequence, *force.tolist(), flags)
 
 
@@ -69,7 +69,7 @@ def force_of(data: bytes, d: int) -> tuple[int, Floats, int]:
 
 
 def newer(sequence: int, last: int) -> bool:
-    """Whether a sequence number comes after the last one, beyond 2^32 - 1 again at 0."""
+    """Return whether a sequence number comes after the last one, beyond 2^32 - 1 again at 0."""
     return 0 < (sequence - last) % 2**32 < 2**31
 
 
@@ -122,11 +122,12 @@ class Listener:
         return k / self.rate
 
     def after(self, k: int, now: float) -> int:
-        """The tick after k: those whose time is over are left out, nobody waits for them."""
+        """Return the tick after k: those whose time is over are left out, nobody waits for them."""
         return max(k + 1, int(now * self.rate))
 
     def place(self, k: int, now: float) -> Floats | None:
-        """The newest sound position (d,) m since the last tick, at `now` s; None without one."""
+        """Return the newest sound position (d,) m since the last tick, at `now` s; None without
+        one."""
         found = None
         for _ in range(_AT_ONCE):
             try:
@@ -173,7 +174,7 @@ class Listener:
         return ("late" if behind - quickest > _LATE_NS else ""), behind
 
     def give(self, force: Floats, flags: int) -> None:
-        """Sends the force (d,) N to the sender of the last position."""
+        """Send the force (d,) N to the sender of the last position."""
         if self._peer is None or self._last is None:
             return
         try:

@@ -1,4 +1,4 @@
-"""The recording of a live loop, which `validate run` replays to the same numbers."""
+"""Recording of a real-time loop, which `validate run` replays to the same numbers."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -69,7 +69,7 @@ _SAME = 1e-9  # N: a replay of a live loop is the same to rounding
 
 
 def as_given(experiment: Experiment, recording: Recording) -> Experiment:
-    """The live loop's own force is held against the method that gave it, and nothing else is.
+    """Return the experiment with the loop's force compared with its own method only.
 
     Raises `ComparisonError` for an experiment without a twin, which every live loop's has.
     """

@@ -1,4 +1,4 @@
-"""Positions from a recorded path, each when its time has come."""
+"""Positions from a recorded path, each at its recorded time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ class RecordedPath:
         return float(self.t[k] - self.t[0]) if k < len(self.t) else None
 
     def after(self, k: int, now: float) -> int:
-        """The next one: no sample of a recorded path is left out."""
+        """Return the next one: no sample of a recorded path is left out."""
         return k + 1
 
     def place(self, k: int, now: float) -> Floats | None:

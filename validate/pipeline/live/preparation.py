@@ -1,4 +1,4 @@
-"""Preparation of a method for a live loop: the same system that `validate run` uses."""
+"""Preparation of a method for a real-time loop, with the same system as `validate run`."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -38,7 +38,7 @@ class Prepared:
 
 
 def prepared(experiment: Experiment, options: Options, method: str = "") -> Prepared:
-    """Prepares a method (none: the first one accepted).
+    """Prepare a method (none: the first one accepted).
 
     Raises `UsageError` for an experiment without a tool, and what the pipeline raises.
     """

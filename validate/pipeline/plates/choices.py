@@ -1,5 +1,4 @@
-"""What a user decides of a body between two plates, or between grips, besides its scene: declared
-uncertainties, windows of strain, and what images show of it."""
+"""Settings of a body between plates or grips: uncertainties, strain windows, images."""
 
 import math
 from collections.abc import Mapping

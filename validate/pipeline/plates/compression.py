@@ -1,5 +1,4 @@
-"""Bodies pressed between two plates, or pulled between two grips, from a log of displacement and
-force: the experiment that follows from a scene and its `Compression`.
+"""Experiment of a compression or tension test, from a log of displacement and force.
 
 The body is a cylinder or a mesh file (`pipeline.plates.scene`). Displacement counts from contact
 less the toe (where the fitted line reaches zero force), force from the cell's own offset; the first
@@ -68,7 +67,7 @@ def compression(
     *,
     folder: Path = Path(),
 ) -> Experiment:
-    """The experiment: `force` is judged in the windows "fit" and "beyond", outlines that the
+    """Return the experiment: `force` is judged in the windows "fit" and "beyond", outlines that the
     settings name at images of their own.
 
     `folder` is that of the experiment's file, from which a mesh file is found. Raises `UsageError`

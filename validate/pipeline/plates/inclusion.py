@@ -1,5 +1,4 @@
-"""A block with a fluid-filled inclusion between two plates, from outlines, markers and a stage:
-what a file declares beside its scene, and the experiment that follows.
+"""Experiment of a block with a fluid-filled inclusion between plates (outlines, markers, stage).
 
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
 """
@@ -55,7 +54,8 @@ def plates_of_share(share: float, E: float, apart: float) -> tuple[Contact, floa
 
 
 def rubbing_share(contact: str, friction: float, E: float, apart: float) -> float:
-    """The share 0..1 of that contact with springs of `friction` N/m^3; see `plates_of_share`."""
+    """Return the share 0..1 of that contact with springs of `friction` N/m^3; see
+    `plates_of_share`."""
     if contact != "partial":
         return float(contact == "bonded")
     return friction / (friction + _HALF * E / apart)
@@ -102,7 +102,7 @@ class InclusionRegistration(MarkerFit):
 
 @dataclass(frozen=True)
 class InclusionTest:
-    """What no scene holds of such a test."""
+    """Settings of an inclusion test besides its scene."""
 
     streams: Streams = Streams()
     registration: InclusionRegistration = InclusionRegistration()
@@ -111,7 +111,7 @@ class InclusionTest:
 
 
 def rubbing(tree: Tree, share: float) -> Tree:
-    """The plates rub by a share, from 0 (they slip) to 1 (bonded)."""
+    """Return the plates rub by a share, from 0 (they slip) to 1 (bonded)."""
     contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
     path = "foundations.plates."
     changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
@@ -153,8 +153,8 @@ def inclusion_test(
     accept: tuple[Accept, ...],
     kind: Kind = "measured",
 ) -> Experiment:
-    """The experiment; inputs are varied with the first method of linear elements (none: the last),
-    which is cheap."""
+    """Return the experiment; inputs are varied with the first method of linear elements (none: the
+    last), which is cheap."""
     cheap = [n for n, m in methods.items() if _linear(parameters, m)]
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, load,
@@ -172,8 +172,8 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 
 
 def outlined(recording: Recording, tree: Tree) -> Recording:
-    """The recording with the outlines in the images of its sweep, where the body is meshed from
-    it."""
+    """Return the recording with the outlines in the images of its sweep, where the body is meshed
+    from it."""
     return outlined_sweep(recording) if tree.scene.body.inclusion.shape == "sweep" else recording
 
 

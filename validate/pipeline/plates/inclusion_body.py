@@ -1,4 +1,4 @@
-"""A block with an inclusion: the body of a scene whose mesh follows from a recording.
+"""Block with an inclusion: a body whose mesh follows from a recording.
 
 The settings beside such a scene say where the outlines are (`streams`) and how the image lies
 (`registration`); see `pipeline.plates.inclusion`.
@@ -96,7 +96,7 @@ class BlockWithInclusion:
 
 
 def inclusion(recording: Recording, tree: Tree) -> InclusionShape:
-    """The inclusion that is meshed: what the user set, else what was measured."""
+    """Return the inclusion that is meshed: what the user set, else what was measured."""
     mine: MeshedInclusion = tree.scene.body.inclusion
     if mine.shape == "sweep":
         return swept(sweep_stack(recording, tree), mine.free, mine.wider, mine.longer)
@@ -111,7 +111,8 @@ def inclusion(recording: Recording, tree: Tree) -> InclusionShape:
 
 
 def measured_inclusion(recording: Recording, tree: Tree) -> InclusionShape:
-    """The inclusion as measured: by the rest outline and the declared sweep, or by the sweep."""
+    """Return the inclusion as measured: by the rest outline and the declared sweep, or by the
+    sweep."""
     capsule = _outlined(recording, tree)  # which refuses a mirrored image
     if tree.scene.body.inclusion.shape == "capsule":
         return capsule
@@ -119,7 +120,7 @@ def measured_inclusion(recording: Recording, tree: Tree) -> InclusionShape:
 
 
 def sweep_stack(recording: Recording, tree: Tree) -> Stack:
-    """The slices of the recorded sweep, as the image is placed."""
+    """Return the slices of the recorded sweep, as the image is placed."""
     sweep = shifted(recording.contour(SWEEP), tree)
     return stack_of(recording, sweep, recording.signal(tree.settings.streams.stage, "m"))
 

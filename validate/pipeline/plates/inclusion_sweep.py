@@ -1,4 +1,4 @@
-"""The inclusion from a sweep of parallel images across its long axis (paper 000, section 4.4).
+"""Inclusion from a sweep of parallel images across its long axis (paper 000, section 4.4).
 
 Stream "sweep" holds the outlines (or the images to outline) of the phantom at rest, with the pose
 of its image plane at position 0; signal "sweep_position" says how far the plane then lay along its
@@ -20,7 +20,7 @@ _BEHIND = 0.02  # of the outermost gap: how near the outermost slice an end may 
 
 
 def outlined_sweep(recording: Recording) -> Recording:
-    """The recording with images of a sweep replaced by the outlines found in them."""
+    """Return the recording with images of a sweep replaced by the outlines found in them."""
     if SWEEP not in recording.frames:
         return recording
     frames = {k: f for k, f in recording.frames.items() if k != SWEEP}
@@ -29,7 +29,7 @@ def outlined_sweep(recording: Recording) -> Recording:
 
 
 def stack_of(recording: Recording, sweep: Contours, stage: Signal) -> Stack:
-    """The stack of the `sweep`, taken while the stage was at rest.
+    """Return the stack of the `sweep`, taken while the stage was at rest.
 
     Raises `RegistrationError` for a stage that had moved, and what `stacked` raises.
     """
@@ -45,7 +45,8 @@ def stack_of(recording: Recording, sweep: Contours, stage: Signal) -> Stack:
 
 
 def swept(stack: Stack, free: float = 0.0, wider: float = 0.0, longer: float = 0.0) -> SlicedShape:
-    """The surface of `free` sections, radii and length changed by m; ends stay behind slices."""
+    """Return the surface of `free` sections, radii and length changed by m; ends stay behind
+    slices."""
     at, ends = stack.positions, stack.ends + longer / 2 * np.array([-1.0, 1.0])
     least = _BEHIND * float(np.diff(at).min())
     ends = np.array([min(ends[0], at[0] - least), max(ends[1], at[-1] + least)])
@@ -53,7 +54,7 @@ def swept(stack: Stack, free: float = 0.0, wider: float = 0.0, longer: float = 0
 
 
 def off_circles(stack: Stack) -> str:
-    """How far the outlines lie from their circles, in a sentence."""
+    """Return the distance of the outlines from their circles, in a sentence."""
     worst = int(stack.off_round.argmax())
     every = float(np.sqrt((stack.off_round**2).mean()))
     return (

@@ -1,4 +1,4 @@
-"""Compliance of a testing machine: taken off the displacement, measured on a rigid block, doubted.
+"""Machine compliance: correction of the displacement, measured on a rigid block.
 
 Frame, load cell and grips yield in series with the specimen, so that u_specimen = u_recorded - C F.
 """

@@ -1,5 +1,4 @@
-"""The modulus of every law of a compression (or tension) test, identified by that law itself, with
-its uncertainty budget.
+"""Modulus of every law of a compression or tension test, with its uncertainty budget.
 
 Each method's own force curve, of a unit modulus on its own mesh, is scaled and shifted to the
 measured force in the window "fit": the scale is the modulus, the shift where the load begins (the

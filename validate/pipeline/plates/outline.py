@@ -1,5 +1,4 @@
-"""What the images of a pressed body show of it: its own edge, or the wall of an inclusion, against
-the section of the simulated surface with the plane of the images.
+"""Outlines in images of a pressed body against the section of its simulated surface.
 
 The images' place in the body's frame (axis z, the resting plate at z = 0) is declared, or stands in
 the recording; without either nothing is compared. They rest with that plate.
@@ -157,7 +156,7 @@ def _shifted(axis: int) -> Callable[[Tree, float], Tree]:
 
 
 def stiffer(tree: Tree, by: float) -> Tree:
-    """The body with the given moduli times a factor; those that are identified follow by
+    """Return the body with the given moduli times a factor; those that are identified follow by
     themselves."""
     moduli = {path: value_at(tree, path)[0] for path in MODULI}
     return tree.given({path: by * E for path, E in moduli.items() if E is not None})

@@ -1,4 +1,4 @@
-"""The scene of a body between two plates or grips: contact, sizes, and the modulus of a model.
+"""Scene of a body between two plates or grips: contact, sizes, and the modulus of a model.
 
     Scene(
         body=Cylinder("25 mm", "20 mm", element="tet10", part="quarter"),
@@ -81,7 +81,7 @@ LOWER, UPPER = PLATES
 
 
 def between(ends: Ends, tree: Tree) -> Mapping[str, Any]:
-    """What a method changes for plates that slip or hold the body."""
+    """Return a method's changes for plates that slip or stick."""
     if ends == "bonded":
         return BONDED_PLATES
     whole = not getattr(tree.scene.body, "held", ())
@@ -89,12 +89,12 @@ def between(ends: Ends, tree: Tree) -> Mapping[str, Any]:
 
 
 def ends_of(scene: Scene) -> Ends:
-    """Whether the moving plate holds the body sideways."""
+    """Return whether the moving plate holds the body sideways."""
     return "bonded" if any(s.facets == UPPER for s in scene.supports) else "slip"
 
 
 def kind_of_test(tree: Tree) -> TestKind:
-    """Whether the upper plate presses or pulls; raises `UsageError` for another motion."""
+    """Return whether the upper plate presses or pulls; raises `UsageError` for another motion."""
     moved = {(d.name, d.facets, tuple(d.direction)) for d in tree.scene.drives}
     for kind, sign in (("compression", -1.0), ("tension", 1.0)):
         if moved == {("stage", UPPER, (0.0, 0.0, sign))}:
@@ -120,12 +120,12 @@ def pressed_size(tree: Tree, folder: Path) -> CylinderSize:
 
 
 def model_name(law: str, ends: str, order: int) -> str:
-    """What parameters call a model."""
+    """Return the name of a model in parameters."""
     return f"{law}, {ends}, order {order}"
 
 
 def by_model(scene: Scene) -> str:
-    """The name of the model that a scene was built with."""
+    """Return the name of the model that a scene was built with."""
     return model_name(scene.material.law, ends_of(scene), scene.mesh.order)
 
 
@@ -143,7 +143,7 @@ class BuiltPressed(Built):
         return super().__call__(recording, tree, own)
 
     def model(self, tree: Tree) -> str:
-        """The name of the model with these parameters, a method's changes among them."""
+        """Return the name of the model with these parameters, a method's changes among them."""
         order = mesh_of(None, tree, self.folder).order
         return model_name(tree.scene.material.law, ends_of(tree.scene), order)
 

@@ -1,4 +1,4 @@
-"""The run of an experiment: each method with each change, as cells of the engine.
+"""Runs of an experiment: each method with each change, as cells of the engine.
 
 Start with `pipeline`.
 """

@@ -1,4 +1,4 @@
-"""The inputs of a run, and whether a stored run has the same ones and can be used again.
+"""Inputs of a run, and reuse of a stored run with the same inputs.
 
 Everything is held by its content: code and libraries, the machine, the experiment's file with its
 helpers, meshes, recordings and every parameter. What has no hash is never taken as unchanged.
@@ -67,7 +67,7 @@ def _top(module: str) -> str:
 
 
 def rests_on(experiment: Experiment, options: Options, command: Sequence[str] = ()) -> Made:
-    """What makes a run, taken before it: files may be edited while it computes."""
+    """Return the inputs of a run, read before it: files may be edited while it computes."""
     path = experiment.path
     parameters, methods = configure(experiment, options)
     read = mesh_files(parameters, path.parent if path else Path())
@@ -88,7 +88,7 @@ def _used(recording: Recording, role: str) -> UsedFile:
 
 
 def stored_run(experiment: Experiment, folder: Path) -> tuple[Json | None, str]:
-    """Checks and printed figures of the run in `folder`, as results.json has them, where the
+    """Return checks and printed figures of the run in `folder`, as results.json has them, where the
     experiment as declared would be computed from the same; else None and what differs ("" where
     nothing is stored).
 

@@ -62,8 +62,8 @@ def placed(
     parameters: Any,
     off: tuple[float, ...] = (),
 ) -> tuple[tuple[AnyScene, ...], tuple[Registered, ...]]:
-    """The scene of every recording, and the recording as it is registered there, its drives `off`
-    by these amounts."""
+    """Return the scene of every recording, and the recording as it is registered there, its drives
+    `off` by these amounts."""
     scenes = _scenes(experiment, recordings, method, parameters)
     return scenes, _registered(experiment, recordings, scenes, parameters, off)
 
@@ -124,7 +124,8 @@ def run_on(
     seen: Sequence[Registered],
     kept: KeptFields = KeptFields(),
 ) -> tuple[Run, ...]:
-    """Runs of a method on recordings as they are registered: a filter's on other samples, say."""
+    """Return the runs of a method on recordings as they are registered: a filter's on other
+    samples, say."""
     runs = _Runs(experiment, name, method, parameters, scene, 0.0, lambda _: None, kept)
     return tuple(runs.on(one, scene) for one in seen)
 

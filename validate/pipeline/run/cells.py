@@ -1,4 +1,4 @@
-"""Runs as cells of the engine: kept in a store, side by side on workers, taken up after a break.
+"""Runs as cells of the engine: stored, in parallel on workers, resumed after an interruption.
 
 A cell names a method, a case and the parameters as JSON; its key is the hash of all that its
 numbers rest on: these, the recordings, mesh files, the code and the experiment's own files. Two
@@ -60,7 +60,7 @@ class RunCell:
 
 @dataclass(frozen=True)
 class ToldCell:
-    """What an experiment adds to its runs."""
+    """Cell of the report items and rows that an experiment adds to its runs."""
 
     key: str
     label: str = "what the experiment adds"
@@ -69,7 +69,7 @@ class ToldCell:
 
 @dataclass(frozen=True)
 class CellFound:
-    """What a cell gives."""
+    """Result of a cell."""
 
     solved: RunFound | None = None
     truth: Truth | None = None
@@ -89,7 +89,7 @@ class RunJob:
 
 
 def open_road(job: RunJob) -> Road:
-    """The road on a worker, with its recordings."""
+    """Return the road on a worker, with its recordings."""
     experiment = with_simulators(job.of.experiment(), job.of.simulators)
     options = Options(dict(job.of.values), (), job.of.quick, simulators=job.of.simulators)
     declared, methods = configure(experiment, options)

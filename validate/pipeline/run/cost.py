@@ -1,4 +1,4 @@
-"""Computing time of a body's runs, estimated from its unknowns before anything is solved.
+"""Computing time of a body's runs, estimated from its unknowns before a solve.
 
 CPU time of one core of an AMD EPYC, of blocks of 1 000 to 47 000 unknowns (linear and
 quadratic tetrahedra, hexahedra of 8 and 27 nodes): assembly goes with N, a factor in space with N^2

@@ -1,4 +1,4 @@
-"""Estimate of a run before it is started: time, memory and unknowns of all its variants."""
+"""Estimate of a run before its start: time, memory and unknowns of all its variants."""
 
 from dataclasses import dataclass
 from pathlib import Path

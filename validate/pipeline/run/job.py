@@ -1,4 +1,4 @@
-"""What all cells of a run or a study share: the experiment as a worker opens it."""
+"""Job of a run or study: data that all its cells share, loaded by a worker."""
 
 import hashlib
 from collections.abc import Mapping
@@ -100,7 +100,7 @@ class Job:
     code: str = ""
 
     def experiment(self) -> Experiment:
-        """Raises `UsageError` when the file is not the one that the study began with."""
+        """Raise `UsageError` when the file is not the one that the study began with."""
         path = Path(self.path)
         base = _loaded(path, self.sha256) if self.sha256 and not self.declaration else None
         changes = added_here(self.changes)
@@ -129,7 +129,7 @@ def _loaded(path: Path, sha256: str) -> Experiment:
 def job_of(
     experiment: Experiment, values: Mapping[str, str] | None = None, quick: bool = False
 ) -> Job:
-    """Raises what loading the experiment's recordings does."""
+    """Raise what loading the experiment's recordings does."""
     loaded = experiment.load(experiment.parameters, folder_of(experiment))
     hashes = tuple(r.source.sha256 for r in loaded)
     return job_on(experiment, hashes, values or {}, quick)

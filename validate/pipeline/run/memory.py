@@ -1,4 +1,4 @@
-"""Whether the systems of an experiment fit in memory, asked first; and a mesh that does."""
+"""Memory check of an experiment's systems before a run, and a mesh that fits."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,7 +26,7 @@ def require_room(
     *,
     quick: bool,
 ) -> None:
-    """Raises `MemoryShortError` for what will not fit, before anything is identified or solved."""
+    """Raise `MemoryShortError` for what will not fit, before anything is identified or solved."""
     asking = Road(experiment, methods, parameters, None, quick=quick)
     asking.expect(variants_of(asking))
     try:
@@ -40,8 +40,9 @@ def require_room(
 
 
 def coarser(name: str, parameters: Any, share: float) -> str:
-    """The `--set`s that bring memory down to `share` of what it is, as far as parameters called
-    mesh.*, or those of a declared body, say how fine the mesh is: counts and lengths of cells."""
+    """Return the `--set`s that bring memory down to `share` of what it is, as far as parameters
+    called mesh.*, or those of a declared body, say how fine the mesh is: counts and lengths of
+    cells."""
     by = _MARGIN * share**_POWER
     mesh = [p for p in describe(parameters) if p.path.startswith("mesh.") or p.path in _OF_A_BODY]
     sets = [f"--set {p.path}={value}" for p in mesh if (value := _coarsened(p, by))]

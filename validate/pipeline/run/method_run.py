@@ -22,7 +22,7 @@ MAIN = ""  # the case that was recorded
 
 @dataclass(frozen=True)
 class Truth:
-    """What the twin really did: displacement (nt, d) m of every probe at the steps' times.
+    """True motion of the twin: displacement (nt, d) m of every probe at the steps' times.
 
     `u` (no, n, d) m are its fields at the output frames, where its `mesh` is the models' mesh.
     """
@@ -39,7 +39,7 @@ NO_TRUTH = Truth({})
 
 
 def truth_of(run: Run, scene: Scene) -> Truth:
-    """What a twin's run says of its own probes and nodes."""
+    """Return the truth from a twin's run, at its own probes and nodes."""
     axes = "xyz"[: scene.mesh.dimension]
     probes = {
         p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in axes], axis=1)
@@ -109,7 +109,7 @@ class Followed:
 
     @property
     def over_time(self) -> bool:
-        """Whether every sample is compared, not holds or windows of a load."""
+        """Whether every sample is compared, not load steps or windows of a load."""
         return self.seen.moves or any(s.t is None for s in self.seen.selections)
 
     @property
@@ -119,7 +119,7 @@ class Followed:
         return self.run.t * self.seen.time_scale
 
     def reference(self, probe: str) -> Floats:
-        """The truth (nt, d) m at the times of the run's own steps."""
+        """Return the truth (nt, d) m at the times of the run's own steps."""
         at = np.searchsorted(self.seen.t, self.run.t - 1e-9)
         return self.truth.probes[probe][at]
 

@@ -1,4 +1,4 @@
-"""The name of a run: its experiment's, and what the user changed with a short hash of it.
+"""Name of a run: the experiment's name, the user's changes and a short hash.
 
 Nothing is overwritten unseen: a run that computes something else has a folder of its own. What is
 computed counts, not how it was typed: `15kPa` and `15000` are one run.
@@ -39,7 +39,7 @@ def run_name(experiment: Experiment, options: Options) -> str:
 
 
 def differences(experiment: Experiment, options: Options) -> tuple[list[str], list[Any]]:
-    """What the user changed: its words, and its content with every value.
+    """Return the user's changes: in words, and as content with every value.
 
     Raises `UsageError` for unknown methods, paths and values.
     """

@@ -1,4 +1,4 @@
-"""The pipeline: recording -> scene -> registration -> system -> run -> comparison.
+"""Pipeline: recording -> scene -> registration -> system -> run -> comparison.
 
 One for every experiment, at holds or over time, with a twin's truth beside or without one.
 """
@@ -65,8 +65,8 @@ def compare(
     identify: Identify = here,
     by: Solves | None = None,
 ) -> Result:
-    """Runs an experiment and judges it; `identify` finds what its calibrations leave open, `by`
-    solves its runs (none: in this process).
+    """Run an experiment and compute its verdicts; `identify` finds what its calibrations leave
+    open, `by` solves its runs (none: in this process).
 
     Raises children of `ValidateError` for bad input.
     """

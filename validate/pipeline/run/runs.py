@@ -1,4 +1,4 @@
-"""The runs of an experiment: each method with each change of the parameters, on each case, once."""
+"""All runs of an experiment: methods, changed parameters and cases, each once."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -121,7 +121,7 @@ class RunFound:
 
 
 class Solves(Protocol):
-    """Who solves what a road wants."""
+    """Solver of the runs that a `Road` requests."""
 
     def ahead(self, road: "Road", wanted: Sequence[RunWanted]) -> None:
         """Told of all that will be asked for, in order; may solve it side by side."""
@@ -130,7 +130,7 @@ class Solves(Protocol):
     def solved(self, road: "Road", wanted: RunWanted) -> RunFound: ...
 
     def truth(self, road: "Road", wanted: RunWanted) -> Truth:
-        """What the twin really did, on the case and in the scene of that run."""
+        """Return the true motion of the twin, on the case and in the scene of that run."""
         ...
 
     def told(self, road: "Road", cases: Cases, make: Callable[[], Told]) -> Told:
@@ -202,14 +202,15 @@ class Road:
                 yield RunWanted(case.name, name, self.parameters, whole=True)
 
     def wanted(self, variant: Variant) -> RunWanted:
-        """A variant on the experiment's own recordings; a method as it is is wanted whole."""
+        """Return a variant on the experiment's own recordings; a method as it is is wanted
+        whole."""
         changed = variant.change(self.parameters)
         as_it_is = (changed, variant.split, variant.off) == (self.parameters, 1, ())
         whole = as_it_is and variant.method in self.methods
         return RunWanted(MAIN, variant.method, changed, variant.split, variant.off, whole)
 
     def require_room(self, recording: Recording) -> None:
-        """Raises `MemoryShortError`, before anything is solved, for a method whose finest mesh will
+        """Raise `MemoryShortError`, before anything is solved, for a method whose finest mesh will
         not fit; where the first one takes next to nothing the others are not asked."""
         for name, method in self.methods.items():
             scene = self.experiment.build(recording, self.parameters, method.scene)
@@ -233,7 +234,7 @@ class Road:
     # --- recordings -------------------------------------------------------------------------------
 
     def start(self, shipped: tuple[Recording, ...], *, remake: bool = True) -> tuple[str, ...]:
-        """Takes the recordings, made anew where the user changed their twin, unless not `remake`;
+        """Take the recordings, regenerated where the user changed their twin, unless not `remake`;
         what to say of it."""
         self.remakes = remake
         if not remake:
@@ -252,7 +253,8 @@ class Road:
         )
 
     def of_case(self, name: str) -> tuple[tuple[Recording, ...], Any]:
-        """The recordings of a case and the parameters of their truth: shipped or made in memory."""
+        """Return the recordings of a case and the parameters of their truth: shipped or made in
+        memory."""
         if name == MAIN:
             return self.recordings, self._true
         if name not in self._of_cases:
@@ -297,11 +299,11 @@ class Road:
             self._report(*self.pace.progress, what)
 
     def main(self, method: str) -> Followed:
-        """A method on the experiment's own recordings."""
+        """Return a method on the experiment's own recordings."""
         return self._followed(self.wanted(Variant(method)))
 
     def varied(self, variant: Variant) -> Varied:
-        """A variant on the experiment's own recordings."""
+        """Return a variant on the experiment's own recordings."""
         wanted = self.wanted(variant)
         if wanted.method in self.refused:
             return _varied(self._not_run(wanted))
@@ -391,7 +393,7 @@ class Road:
 def solves_here(
     experiment: Experiment, recordings: tuple[Recording, ...], parameters: Any
 ) -> SolvesVariants:
-    """What solves variants of these parameters, one after the other in this process."""
+    """Return the solver of variants of these parameters, one after the other in this process."""
     road = Road(experiment, experiment.methods, parameters, None, quick=False)
     road.start(recordings, remake=False)
     return road.residuals

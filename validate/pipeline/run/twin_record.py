@@ -1,4 +1,4 @@
-"""The settings of a twin in its recording: the truth follows the recording, not later settings.
+"""Settings of a twin in its recording; the truth follows the recording, not later settings.
 
 A user who changes a material asks what a wrong model does, so the truth must stay; a user who
 changes the twin asks for another recording, so it is made anew in memory.
@@ -18,18 +18,18 @@ _RECORD = "made_with"
 
 
 def stamped(recording: Recording, parameters: Any) -> Recording:
-    """The recording with a record of every parameter but files."""
+    """Return the recording with a record of every parameter but files."""
     kept = MappingProxyType({**recording.metadata, _RECORD: _texts(parameters)})
     return replace(recording, metadata=kept)
 
 
 def synthetic(recording: Recording) -> bool:
-    """Whether a recording says of itself that a model made it."""
+    """Return whether a recording says of itself that a model made it."""
     return made_here(recording) or _told(recording) == "twin"
 
 
 def computed(recording: Recording) -> bool:
-    """Whether a recording says of itself that a code of others computed it."""
+    """Return whether a recording says of itself that a code of others computed it."""
     return _told(recording) == "reference"
 
 
@@ -49,7 +49,7 @@ def _told(recording: Recording) -> str:
 
 
 def made_here(recording: Recording) -> bool:
-    """Whether a recording says which parameters it was made with."""
+    """Return whether a recording says which parameters it was made with."""
     return _RECORD in recording.metadata
 
 
@@ -60,7 +60,7 @@ def made_by(
     remake: tuple[str, ...],
     record: Callable[[Any], Recording],
 ) -> tuple[Recording, Any, tuple[str, ...]]:
-    """The recording to use, the parameters that made it, and what is to be said of it.
+    """Return the recording to use, the parameters that made it, and what is to be said of it.
 
     `remake` are prefixes of the twin's own parameters: where the user's differ from the recording's
     it is made anew with them. Raises `UsageError` where they differ from the `declared` ones and
@@ -93,7 +93,7 @@ def require_known(
     remake: tuple[str, ...],
     known: tuple[str, ...] = (),
 ) -> None:
-    """Raises `UsageError` for a twin's parameter that differs from the `declared` one and is not
+    """Raise `UsageError` for a twin's parameter that differs from the `declared` one and is not
     `known` of the recording."""
     mine, own = _texts(parameters), _texts(declared)
     lost = [p for p in mine if p.startswith(remake) and p not in known and mine[p] != own.get(p)]

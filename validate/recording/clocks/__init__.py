@@ -1,4 +1,4 @@
-"""Times of streams: what they look like, and how two clocks are brought together.
+"""Time stamps of streams, and synchronisation of two clocks.
 
 Start with `alignment`.
 """

@@ -1,4 +1,4 @@
-"""Streams with clocks of their own: the offset between two of them, and a stream moved by it.
+"""Clock offset between two streams, and a stream shifted by it.
 
 It stands on the recording floor because clocks are mended before anything is registered or
 compared. An offset is what must be *added* to a stream's times to bring them onto the reference's
@@ -31,7 +31,7 @@ MIN_COVERAGE = 0.5  # share of the stream's samples that must meet the reference
 
 @dataclass(frozen=True)
 class Offset:
-    """What to add to a stream's times: `seconds` s, `sd` s (one standard uncertainty).
+    """Offset to add to a stream's times: `seconds` s, `sd` s (one standard uncertainty).
 
     `count` samples of the stream meet the reference then, a share `coverage` of them all.
     """
@@ -50,7 +50,8 @@ def offset_by_correlation(
     min_coverage: float = MIN_COVERAGE,
     min_correlation: float = MIN_CORRELATION,
 ) -> Offset:
-    """The offset |tau| <= `within` (s) at which the stream follows the reference, up to scale.
+    """Return the offset |tau| <= `within` (s) at which the stream follows the reference, up to
+    scale.
 
     Both signals (nt, 1), of any rate, with gaps; a positive linear relation is assumed. Raises
     `RecordingError`, with the numbers, for flat and periodic signals, ramps (any lag fits them), a
@@ -78,7 +79,7 @@ def offset_near(reference: Signal, stream: Signal, start: float) -> tuple[float,
 
 
 def declared_offset(recording: Recording, topic: str, seconds: float, sd: float) -> Offset:
-    """An offset that the user states, s; counted are the samples that meet any other stream.
+    """Return an offset that the user states, s; counted are the samples that meet any other stream.
 
     Raises `RecordingError` for an unknown topic, a lone stream, and too small a coverage.
     """
@@ -97,7 +98,8 @@ def declared_offset(recording: Recording, topic: str, seconds: float, sd: float)
 def matched(
     reference: Signal, stream: Stream, offset: Offset, min_coverage: float = MIN_COVERAGE
 ) -> Offset:
-    """The offset with its samples counted: those that fall within the reference, not in its gaps.
+    """Return the offset with its samples counted: those that fall within the reference, not in its
+    gaps.
 
     Raises `RecordingError` below `min_coverage`.
     """
@@ -117,7 +119,7 @@ def _require_coverage(offset: Offset, total: int, least: float) -> None:
 
 
 def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
-    """A recording whose stream `topic` is moved by the offset, which is kept as a record.
+    """Return a recording whose stream `topic` is moved by the offset, which is kept as a record.
 
     Times start again at the earliest sample of all streams. Raises `RecordingError` for an unknown
     topic and for one that was moved before.
@@ -143,7 +145,7 @@ def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
 
 
 def rebased(recording: Recording) -> Recording:
-    """The recording with time 0 at its earliest sample, at the same moments of the clock.
+    """Return the recording with time 0 at its earliest sample, at the same moments of the clock.
 
     Where that moment would lie before the clock's own zero (an export without date), the clock
     begins at the earliest sample.

@@ -1,4 +1,4 @@
-"""One channel of a recording by its name: what two clocks are brought together by.
+"""Channels of a recording by name, for synchronisation of two clocks.
 
 `force` is a signal of one column, `force.1` the second column of several, `markers.tip.z` a
 marker's coordinate, `images.brightness` the mean grey level of each image (a flash) and
@@ -19,7 +19,7 @@ _OF_IMAGES = ("brightness", "change")
 
 
 def channel(recording: Recording, name: str) -> Signal:
-    """The channel as a signal (nt, 1), samples where nothing was seen left out.
+    """Return the channel as a signal (nt, 1), samples where nothing was seen left out.
 
     Raises `UsageError` with the channels that there are.
     """

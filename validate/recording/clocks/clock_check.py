@@ -1,4 +1,4 @@
-"""What a stream's times look like, before anything is concluded from its values.
+"""Check of a stream's time stamps: steps, duplicates, backward steps and gaps.
 
 Time of a measurement: the stamp in its message, else its publish time, never its log time, which
 holds the recorder's delays.
@@ -14,7 +14,7 @@ GAP_FACTOR = 3.0  # a step longer than this many median steps is a gap
 
 
 def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints) -> Clock:
-    """The clock of one stream from int64 ns (n,) each, in the order of the file.
+    """Return the clock of one stream from int64 ns (n,) each, in the order of the file.
 
     `stamps_ns` None: the messages have no stamp and publish time counts. The median step is over
     steps forward, so repeated stamps do not hide gaps; `longest_gap` is 0 where there is no gap.

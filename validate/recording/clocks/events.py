@@ -1,4 +1,4 @@
-"""The moment of a marked event in a signal, and the offset between two streams that both show it.
+"""Events in signals (onset, step), and the offset between two streams of one event.
 
 An onset is where a signal leaves its rest and begins to climb or fall; a step is where it crosses
 the middle between two levels.
@@ -28,7 +28,7 @@ def offset_by_event(
     windows: tuple[Window | None, Window | None] = (None, None),
     min_coverage: float = MIN_COVERAGE,
 ) -> Offset:
-    """The offset that brings the stream's event onto the reference's.
+    """Return the offset that brings the stream's event onto the reference's.
 
     `windows` are the times (s) between which each signal shows the event and nothing else, None:
     everywhere. Raises `RecordingError` where no or no single event is found, or coverage is small.

@@ -1,4 +1,4 @@
-"""At which lag one signal follows another: found on a grid, then refined between the samples.
+"""Lag between two signals: grid search, then refinement between the samples.
 
 scipy is loaded by what computes a lag: looking into a recording needs none of it.
 """
@@ -34,7 +34,8 @@ def coarse_lag(
     min_coverage: float,
     min_correlation: float = MIN_CORRELATION,
 ) -> float:
-    """The lag (s) of the highest correlation on a grid of `step` s, when it is the only one."""
+    """Return the lag (s) of the highest correlation on a grid of `step` s, when it is the only
+    one."""
     a, a_seen = _on_grid(reference, step)
     b, b_seen = _on_grid(stream, step)
     start = float(reference.t[0] - stream.t[0])

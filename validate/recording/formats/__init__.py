@@ -1,1 +1,1 @@
-"""Formats of other programs, each by its library behind one file."""
+"""Third-party formats, each with its library behind one module."""

@@ -33,7 +33,7 @@ class DeviceSet:
     landmarks: Mapping[str, Floats]
 
     def transform(self, source: str, target: str) -> DeclaredTransform:
-        """Raises `RecordingError` naming what is there instead."""
+        """Raise `RecordingError` naming what is there instead."""
         if (source, target) not in self.transforms:
             there = ", ".join(f"{a} to {b}" for a, b in list(self.transforms)[:_KNOWN])
             raise RecordingError(
@@ -43,7 +43,7 @@ class DeviceSet:
 
 
 def read_device_set(path: Path) -> DeviceSet:
-    """Raises `RecordingError` for a file that is missing, damaged, too large or not XML, and for a
+    """Raise `RecordingError` for a file that is missing, damaged, too large or not XML, and for a
     matrix or position that is none."""
     text = head(path, _BYTES + 1)
     if not text or len(text) > _BYTES or b"<!" in text.replace(b"<!--", b""):

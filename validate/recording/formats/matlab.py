@@ -1,4 +1,4 @@
-"""MATLAB 5 and 7.3 files: arrays that the user names, points and stacks of images.
+"""Reader of MATLAB 5 and 7.3 files: points, stacks of images, arrays by name.
 
 Such a file states neither units nor times: what an array needs to become a stream is asked for.
 """
@@ -177,7 +177,8 @@ def times_of(options: Options, found: Arrays) -> Floats | None:
 
 
 def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) -> Signal | Markers:
-    """The stream `key`: axes t alone or t and c (channels) make a signal, those with x points.
+    """Return the stream `key`: axes t alone or t and c (channels) make a signal, those with x
+    points.
 
     Raises `UsageError` for what is not said or does not fit, `RecordingError` for numbers that are
     none.
@@ -294,8 +295,8 @@ _OPTIONS = (
 
 
 def read_matlab(path: Path, options: Options) -> Recording:
-    """The arrays that the user names (`matlab_named`; images in px); where none is named, numbers
-    (n, 2 or 3) as points at one instant and uint8 (h, w) or (h, w, nt) as images.
+    """Return the arrays that the user names (`matlab_named`; images in px); where none is named,
+    numbers (n, 2 or 3) as points at one instant and uint8 (h, w) or (h, w, nt) as images.
 
     A topic is the variable's path; points are named by their row, from 1. Options: STREAM=PATH:UNIT
     for each array that is named, `time` of all of them (PATH:UNIT) or `rate` (Hz), `axes.STREAM`;

@@ -1,4 +1,4 @@
-"""What a MATLAB 7.3 file (HDF5) holds, as plain arrays. The only reader that imports h5py.
+"""Arrays of a MATLAB 7.3 file (HDF5). The only reader that imports h5py.
 
 HDF5 counts axes the other way round: an array of h rows and w columns stands there as (w, h). Links
 to other files, and data that lie in them, are not followed.

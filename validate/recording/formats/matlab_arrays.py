@@ -1,4 +1,4 @@
-"""What a MATLAB 5 file holds, as plain arrays. The only file that imports scipy.io."""
+"""Arrays of a MATLAB 5 file. The only file that imports scipy.io."""
 
 import struct
 import warnings

@@ -1,4 +1,4 @@
-"""What a file does not say itself, as users say it: `--map KEY=VALUE`."""
+"""Parser of `--map KEY=VALUE`: facts that a file does not contain."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def frame(default: str) -> MapOption:
 
 
 def asked(option: MapOption) -> MapOption:
-    """An option that no file of the format declares."""
+    """Return an option that no file of the format declares."""
     return replace(option, default="")
 
 
@@ -46,7 +46,7 @@ def spread(options: Options) -> float:
 
 
 def above_zero(options: Options, key: str) -> float:
-    """A number above 0; raises `UsageError` for anything else."""
+    """Return a number above 0; raises `UsageError` for anything else."""
     try:
         value = float(options[key])
     except ValueError:

@@ -1,4 +1,4 @@
-"""Bags of ROS: rosbag2's SQLite or its folder, and ROS 1's. What is in them is read as in MCAP."""
+"""Reader of ROS bags (rosbag2 SQLite or folder, ROS 1), converted to MCAP messages."""
 
 import re
 import tempfile
@@ -23,8 +23,8 @@ _YAML, _SAYS = "metadata.yaml", b"rosbag2_bagfile_information"
 
 
 def read_bag(path: Path, options: Options) -> Recording:
-    """The messages of a bag that mean something, as `validate.recording.mcap.read.read_all` has
-    them, with its options; a folder is read whole, in the order of its files.
+    """Return the messages of a bag that mean something, as `validate.recording.mcap.read.read_all`
+    has them, with its options; a folder is read whole, in the order of its files.
 
     A bag that holds no definitions of its types is read by those of ROS 2 Humble. Raises
     `RecordingError` for a bag that is cut or damaged, or of which nothing is a stream.

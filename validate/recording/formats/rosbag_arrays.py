@@ -1,4 +1,4 @@
-"""A bag of ROS, 1 or 2, as the bytes of one MCAP file. The only file that imports rosbags."""
+"""Conversion of a ROS bag to the bytes of one MCAP file. The only file that imports rosbags."""
 
 import tempfile
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Landmarks of 3D Slicer: FCSV, and markups as JSON (.mrk.json). Points at one instant, in mm."""
+"""Reader of 3D Slicer landmarks: FCSV and markups JSON (.mrk.json), in mm."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

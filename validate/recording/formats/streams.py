@@ -20,7 +20,8 @@ def recorded(
     told: Record,
     unread: Mapping[str, str] | None = None,
 ) -> Recording:
-    """The recording of streams whose times count from its first sample; `told` is its provenance.
+    """Return the recording of streams whose times count from its first sample; `told` is its
+    provenance.
 
     Such formats have one time a sample: it is stamp, publish and log time alike. Raises
     `RecordingError` for times that no nanoseconds of int64 hold: no clock counts so far.
@@ -41,13 +42,14 @@ def recorded(
 
 
 def begun(streams: Mapping[str, Stream]) -> dict[str, Stream]:
-    """The streams with times from the first sample of all, to the nanosecond."""
+    """Return the streams with times from the first sample of all, to the nanosecond."""
     begin = min(float(s.t[0]) for s in streams.values())
     return {topic: replace(s, t=np.rint(1e9 * (s.t - begin)) / 1e9) for topic, s in streams.items()}
 
 
 def distinct(labels: Sequence[str], count: int) -> tuple[str, ...]:
-    """A name for each of `count`: the file's, numbered where one stands twice or is missing."""
+    """Return a name for each of `count`: the file's, numbered where one stands twice or is
+    missing."""
     told = [str(s) for s in labels[:count]]
     told += [""] * (count - len(told))
     named = [s or f"unnamed {i + 1}" for i, s in enumerate(told)]

@@ -1,1 +1,1 @@
-"""B-mode images: PNG, folders of them, and the outlines of inclusions in them."""
+"""B-mode and camera images: PNG, stacks, sequences, videos, DICOM."""

@@ -1,4 +1,4 @@
-"""DICOM images, above all of ultrasound: each calibrated region is a stream with its own scale."""
+"""Reader of DICOM images, mainly ultrasound: one stream per calibrated region."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,12 +23,12 @@ _MOST = 20_000  # files of one folder
 
 
 def is_dicom(path: Path) -> bool:
-    """Whether the file begins as one."""
+    """Return whether the file begins as one."""
     return head(path, AT + 4)[AT:] == MAGIC
 
 
 def begins_as_dicom(path: Path) -> bool:
-    """Whether a file is one, or a folder's first file by name; raises nothing."""
+    """Return whether a file is one, or a folder's first file by name; raises nothing."""
     try:
         if not path.is_dir():
             return is_dicom(path)
@@ -39,8 +39,8 @@ def begins_as_dicom(path: Path) -> bool:
 
 
 def files_of(folder: Path) -> list[Path]:
-    """The DICOM files of a folder by name; raises `RecordingError` where others lie beside them, or
-    there are more than `_MOST`."""
+    """Return the DICOM files of a folder by name; raises `RecordingError` where others lie beside
+    them, or there are more than `_MOST`."""
     files = [member(f) for f in members(folder) if _may_be(f)]
     others = [f.name for f in files if not is_dicom(f)]
     if others:

@@ -1,4 +1,4 @@
-"""What DICOM images hold, by pydicom, in a process of its own; JPEG by Pillow, lossless by GDCM.
+"""Pixels of DICOM images by pydicom in a subprocess; JPEG by Pillow, lossless by GDCM.
 
 Colour is made grey by ITU-R BT.601's luma, as a screen's operator sees it.
 """

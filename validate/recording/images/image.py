@@ -1,4 +1,4 @@
-"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Owns OpenCV.
+"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Only OpenCV user.
 
 A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk, length
 of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard error;
@@ -36,7 +36,8 @@ class _Header:
 
 
 def encode_png(image: Pixels) -> bytes:
-    """A grey image (h, w) uint8 as PNG; raises `RecordingError` for other arrays or sizes."""
+    """Return a grey image (h, w) uint8 as PNG; raises `RecordingError` for other arrays or
+    sizes."""
     import cv2
 
     if image.dtype != np.uint8 or image.ndim != 2:
@@ -49,7 +50,7 @@ def encode_png(image: Pixels) -> bytes:
 
 
 def decode_png(data: bytes) -> Pixels:
-    """The grey image (h, w) uint8, read-only, of a PNG with 8 bits a sample.
+    """Return the grey image (h, w) uint8, read-only, of a PNG with 8 bits a sample.
 
     Colour is accepted where all pixels are grey (equal channels, opaque). Raises `RecordingError`
     for a damaged PNG, one over `MAX_SIDE`, interlaced, with a palette or of another depth.
@@ -177,7 +178,7 @@ def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
 
 
 def shrunk(image: Floats, shape: tuple[int, int]) -> Floats:
-    """The image (h, w) as means over the areas of `shape` (rows, columns) larger pixels."""
+    """Return the image (h, w) as means over the areas of `shape` (rows, columns) larger pixels."""
     import cv2
 
     small = cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
@@ -185,7 +186,7 @@ def shrunk(image: Floats, shape: tuple[int, int]) -> Floats:
 
 
 def correlated(image: Floats, kernel: Floats) -> Floats:
-    """Sums of the image under a centred kernel; the border pixels go on outside."""
+    """Return sums of the image under a centred kernel; the border pixels go on outside."""
     import cv2
 
     out = cv2.filter2D(image, cv2.CV_64F, kernel, borderType=cv2.BORDER_REPLICATE)
@@ -221,8 +222,8 @@ def ellipse_through(points: Floats) -> tuple[Floats, Floats, float]:
 
 
 def demosaiced(mosaic: NDArray[Any], order: str) -> NDArray[Any]:
-    """The luma (h, w) of an image behind colour filters, uint8 or uint16, whose first two rows
-    begin with the colours of `order` ("RGGB"); raises `RecordingError` below 4 px a side."""
+    """Return the luma (h, w) of an image behind colour filters, uint8 or uint16, whose first two
+    rows begin with the colours of `order` ("RGGB"); raises `RecordingError` below 4 px a side."""
     import cv2
 
     if min(mosaic.shape) < _MOSAIC:
@@ -231,8 +232,8 @@ def demosaiced(mosaic: NDArray[Any], order: str) -> NDArray[Any]:
 
 
 def undistorted(image: Pixels, K: Floats, D: Floats) -> Pixels:
-    """The image (h, w) as a camera of the matrix K (3, 3) px without the distortion D (k,) sees it;
-    what it did not see is black."""
+    """Return the image (h, w) as a camera of the matrix K (3, 3) px without the distortion D (k,)
+    sees it; what it did not see is black."""
     import cv2
 
     return np.asarray(cv2.undistort(image, K, D), dtype=np.uint8)
@@ -250,7 +251,7 @@ def luma(colour: NDArray[Any]) -> NDArray[Any]:
 
 
 def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixels, ...], str]:
-    """The images (h, w) in 8 bits, and in words how they became so: the level `white` of the
+    """Return the images (h, w) in 8 bits, and in words how they became so: the level `white` of the
     options, or the largest of all, became 255.
 
     Raises `RecordingError` for an image beyond `MAX_SIDE`, and levels below 0 or above all numbers;

@@ -1,4 +1,4 @@
-"""Images of cameras and microscopes (PNG, JPEG, TIFF, BMP), a folder or the pages of a TIFF."""
+"""Reader of camera and microscope images (PNG, JPEG, TIFF, BMP): a folder or a TIFF stack."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A lens bends straight lines: images straightened by the camera's calibration."""
+"""Lens distortion: correction of images by the camera's calibration."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,8 +18,8 @@ _LARGEST = 10**6  # bytes of a calibration
 def straightened(
     images: Sequence[Pixels], options: Options
 ) -> tuple[tuple[Pixels, ...], dict[str, str]]:
-    """The images (h, w) without the distortion that the file `lens` of the options states, and what
-    is told of it; as they are, and nothing, without that option.
+    """Return the images (h, w) without the distortion that the file `lens` of the options states,
+    and what is told of it; as they are, and nothing, without that option.
 
     The file is one of OpenCV's calibration or of ROS' camera_calibration. A scale `m_per_px` then
     holds over a plane across the camera's axis. Raises `UsageError` for images of another size than

@@ -1,5 +1,7 @@
-"""What a file of a camera's calibration holds, by OpenCV, in a process of its own: its own YAML,
-XML and JSON, and the YAML of ROS' camera_calibration, which lacks OpenCV's first line."""
+"""Camera calibration files (OpenCV YAML, XML, JSON; ROS YAML), read by OpenCV in a subprocess.
+
+The YAML of ROS' camera_calibration lacks OpenCV's first line.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -20,8 +22,9 @@ _MODELS = ("", "plumb_bob", "rational_polynomial")
 
 
 def arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The camera's matrix `K` (3, 3) px, distortion `D` (k,), `size` (w, h) px and reprojection
-    `error` px; NaN of what is not stated. Raises `RecordingError` for other models of a lens."""
+    """Return the camera's matrix `K` (3, 3) px, distortion `D` (k,), `size` (w, h) px and
+    reprojection `error` px; NaN of what is not stated. Raises `RecordingError` for other models of
+    a lens."""
     import cv2
 
     text = _text(path)

@@ -1,4 +1,4 @@
-"""MetaImage (.mha, .mhd) with the frames of the PLUS toolkit in its header.
+"""Reader of MetaImage (.mha, .mhd) with the frames of the PLUS toolkit in its header.
 
 ITK's own reader, the library for this format, refuses sequences of transforms without images
 (DimSize 0 0 n) and knows nothing of frames: the header is text, and it is read as such, without a

@@ -1,4 +1,4 @@
-"""NRRD with the frames of the PLUS toolkit: the same sequence as a MetaImage holds."""
+"""Reader of NRRD with the frames of the PLUS toolkit, like a MetaImage sequence."""
 
 from pathlib import Path
 from typing import Any

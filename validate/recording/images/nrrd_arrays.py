@@ -1,4 +1,4 @@
-"""What an NRRD file holds, as plain arrays. The only file that imports pynrrd."""
+"""Arrays of an NRRD file. The only file that imports pynrrd."""
 
 import zlib
 from math import prod

@@ -1,4 +1,4 @@
-"""Pictures as cameras and recorders pack them (PNG, JPEG, TIFF, BMP), made grey. Owns Pillow here.
+"""Compressed images of cameras (PNG, JPEG, TIFF, BMP) as grey images, by Pillow.
 
 For images of others: ours are PNG, grey, and checked chunk by chunk in `image`.
 """
@@ -40,7 +40,7 @@ class RawImage:
 
 
 def grey(image: RawImage) -> NDArray[Any]:
-    """The image (h, w), uint8 or uint16; colour by its luma.
+    """Return the image (h, w), uint8 or uint16; colour by its luma.
 
     Raises `RecordingError` for an encoding of other kinds, and too few bytes.
     """
@@ -87,7 +87,7 @@ _DEEP = "I;16"  # Pillow's mode, in either order of bytes
 
 
 def decode_picture(data: bytes) -> NDArray[Any]:
-    """The image (h, w) uint8, colour by ITU-R BT.601's luma; uint16 of grey so deep.
+    """Return the image (h, w) uint8, colour by ITU-R BT.601's luma; uint16 of grey so deep.
 
     Raises `RecordingError` for a picture of another format, over `MAX_SIDE`, deeper, cut or
     damaged.

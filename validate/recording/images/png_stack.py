@@ -1,4 +1,4 @@
-"""A folder of PNG images as a recording."""
+"""Reader of a folder of PNG images."""
 
 import struct
 from pathlib import Path

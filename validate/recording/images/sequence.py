@@ -1,5 +1,4 @@
-"""Tracked sequences: images and 4 x 4 transforms of tools, frame by frame, as the PLUS toolkit
-writes them into MetaImage and NRRD alike.
+"""Tracked sequences of the PLUS toolkit: images and 4 x 4 transforms of tools, frame by frame.
 
 Every frame has fields `Seq_Frame0007_<Tool>To<Frame>Transform`, its `...Status`, `Timestamp` (s)
 and `ImageStatus`. Only what is OK enters the recording: a tool that was not seen has no sample.
@@ -49,7 +48,7 @@ class Sequence:
 
 
 def by_frame(pairs: Iterable[tuple[str, str]]) -> dict[int, dict[str, str]]:
-    """The fields of every frame by their own names, from keys and texts of a header."""
+    """Return the fields of every frame by their own names, from keys and texts of a header."""
     found: dict[int, dict[str, str]] = {}
     for key, text in pairs:
         named = _FIELD.fullmatch(key)
@@ -59,8 +58,8 @@ def by_frame(pairs: Iterable[tuple[str, str]]) -> dict[int, dict[str, str]]:
 
 
 def recorded(path: Path, held: Sequence, options: Options) -> Recording:
-    """The sequence as a recording: of a transform XToY two signals, `XToY/rotation` (nt, 9), the
-    linear part row by row, and `XToY/translation` (nt, 3) m; images as `images`.
+    """Return the sequence as a recording: of a transform XToY two signals, `XToY/rotation` (nt, 9),
+    the linear part row by row, and `XToY/translation` (nt, 3) m; images as `images`.
 
     Options: `m_per_px`, which a spacing of 1 (pixels, not mm) needs; `images=no` leaves them out;
     `rate` (Hz) for frames without times; `white` as `shallow` has it. Raises `UsageError` where

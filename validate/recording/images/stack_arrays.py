@@ -1,4 +1,4 @@
-"""What a folder of images or a TIFF of several pages holds. The only file that imports Pillow."""
+"""Pixels of a folder of images or a multi-page TIFF. The only file that imports Pillow."""
 
 import re
 from collections.abc import Iterator

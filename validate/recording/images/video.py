@@ -1,4 +1,4 @@
-"""Videos (MP4, MOV, AVI, Matroska) as images: grey, on the container's own times, at a scale said.
+"""Reader of videos (MP4, MOV, AVI, Matroska): grey images on the container's time stamps.
 
 A container states no size of a pixel; a camera that is not calibrated (`lens`) has none that holds
 over the whole image. Its end is checked by its own account of lengths.

@@ -1,4 +1,4 @@
-"""What a video holds, as plain arrays: its frames in grey. By OpenCV, in a process of its own."""
+"""Grey frames of a video, decoded by OpenCV in a subprocess."""
 
 import os
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""MCAP files: verified front to back, read by index, written whole or not at all."""
+"""MCAP files: verified front to back, read by index, written completely or not at all."""

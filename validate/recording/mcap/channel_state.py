@@ -1,4 +1,4 @@
-"""The state of a channel of our own schema while its messages pass; samples are not kept.
+"""State of a channel of this package's schema during decoding, without its samples.
 
 Whole batches that are like the first message are taken at once (`batches`), others one by one; so
 a recording of any length is inspected in the memory of its time stamps, and what is wrong with it
@@ -79,7 +79,7 @@ class Alike:
 
 
 def batch(schema: str, messages: Sequence[bytes]) -> Alike | None:
-    """The messages as one batch; None where one is odd, differs, or has another schema."""
+    """Return the messages as one batch; None where one is odd, differs, or has another schema."""
     columns = {SIGNAL: _signals, MARKERS: _markers}.get(schema)
     if columns is None:
         return None
@@ -201,7 +201,7 @@ class Pictures:
 
 
 def pictures(messages: Sequence[bytes]) -> Pictures | None:
-    """The messages as one batch; None where one is odd, or differs from the others."""
+    """Return the messages as one batch; None where one is odd, or differs from the others."""
     found = [_looked(data) for data in messages]
     seen = {one[1:] for one in found if one is not None}
     if None in found or len(seen) != 1:

@@ -1,4 +1,4 @@
-"""Channels of any schema, JSON or Protobuf, as one MCAP file: whole or not at all, both CRCs, zstd.
+"""Writer of channels of any schema (JSON, Protobuf) as one MCAP file with CRCs and zstd.
 
 The only writer: of recordings and of files that are made to be looked at, such as a report's
 replay. `enable_data_crcs` is off by default in the `mcap` package. Equal channels, messages and
@@ -33,7 +33,7 @@ class MessageSchema:
 
 
 def json_schema(name: str, definition: Json) -> MessageSchema:
-    """The schema of messages that `schemas.to_bytes` writes."""
+    """Return the schema of messages that `schemas.to_bytes` writes."""
     return MessageSchema(name, JSON_SCHEMA, to_bytes(definition))
 
 

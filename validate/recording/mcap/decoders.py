@@ -1,4 +1,4 @@
-"""Messages of others as plain dicts: ROS 2 (CDR), Protobuf, JSON, CBOR. Owns their libraries.
+"""Decoders of third-party messages: ROS 2 (CDR), Protobuf, JSON, CBOR as plain dicts.
 
 Numbers stay numbers, texts texts, bytes bytes, lists lists; times of Protobuf become {sec, nsec}.
 """
@@ -23,7 +23,7 @@ _TIMES = ("google.protobuf.Timestamp", "google.protobuf.Duration")
 
 
 def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
-    """What reads the messages of a channel, or why nothing does."""
+    """Return the decoder of a channel's messages, or the reason for none."""
     encodings = (schema.encoding if schema else "", channel.encoding)
     try:
         if encodings == ("ros2msg", "cdr") and schema is not None:
@@ -122,7 +122,7 @@ def _cbor() -> Decoder:
 
 
 def binary(value: Any) -> bytes:
-    """The bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
+    """Return the bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
     if isinstance(value, str):
         try:
             return base64.b64decode(value, validate=True)

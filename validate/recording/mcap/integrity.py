@@ -1,4 +1,4 @@
-"""The front-to-back check of an MCAP file that precedes every use of it.
+"""Integrity check of an MCAP file, front to back, before every use.
 
 One pass reads each byte once: magic at both ends, every record's length, chunk, attachment,
 data-section and summary CRCs (the `mcap` package never checks the last), ids that are used before
@@ -66,7 +66,7 @@ class Sums:
         self._handed: deque[Future[None]] = deque()
 
     def update(self, data: bytes) -> None:
-        """Adds bytes behind the others."""
+        """Add bytes behind the others."""
         self._waiting.append(data)
         self._size += len(data)
         if self._size >= _HASHED_AT_ONCE:
@@ -83,7 +83,7 @@ class Sums:
         self._crc = 0
 
     def hexdigest(self) -> str:
-        """The SHA-256 of all bytes; nothing can be added afterwards."""
+        """Return the SHA-256 of all bytes; nothing can be added afterwards."""
         self._settle()
         if self._thread is not None:
             self._thread.shutdown()
@@ -120,7 +120,7 @@ _IN_DATA = {Op.HEADER, Op.MESSAGE, Op.CHUNK, Op.ATTACHMENT, Op.METADATA}
 
 
 class MessageTaker(Protocol):
-    """Who looks at messages while the file is checked."""
+    """Receiver of messages while the file is checked."""
 
     def wants(self, channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
         """Asked at a channel's first message, with the names of the metadata before it."""
@@ -136,7 +136,7 @@ class _ShortError(RecordingError):
 def verify(
     stream: BinaryIO, path: Path, taker: MessageTaker | None = None, *, cut: bool = False
 ) -> Verified:
-    """Check the whole open file; `RecordingError` names the byte and counts what precedes it.
+    """Check the complete open file; `RecordingError` names the byte and counts what precedes it.
 
     `cut` takes a file that only stops short as far as it is whole, and says so in `Verified.cut`.
     """

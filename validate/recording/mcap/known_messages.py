@@ -1,4 +1,4 @@
-"""What messages of ROS 2 and Foxglove mean: points, poses, numbers with units, images.
+"""Known messages of ROS 2 and Foxglove: points, poses, numbers with units, images.
 
 Each known type is one function from its plain fields to parts; a part is a sample of the stream
 `<topic><part>`. Coordinates of both are metres, forces newtons, angles radians.

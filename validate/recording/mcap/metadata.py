@@ -21,7 +21,7 @@ CALIBRATION_KEYS = ("m_per_px_x", "m_per_px_y")
 
 
 def own_records(recording: Recording) -> dict[str, Record]:
-    """The records that a recording's file adds to the recording's."""
+    """Return the records that a recording's file adds to the recording's."""
     own: dict[str, Record] = {RECORD: {"format": FORMAT, "name": recording.name}}
     posed: dict[str, Contours | Frames] = {**recording.contours, **recording.frames}
     for topic, stream in posed.items():
@@ -35,7 +35,7 @@ def own_records(recording: Recording) -> dict[str, Record]:
 
 
 def all_records(recording: Recording) -> dict[str, Record]:
-    """The recording's records and those that its file adds.
+    """Return the recording's records and those that its file adds.
 
     Raises `RecordingError` for records that bear a name of the file's own or hold more than texts.
     """

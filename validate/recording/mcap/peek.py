@@ -1,4 +1,4 @@
-"""The messages of a topic as plain values, whoever wrote them."""
+"""Messages of a topic as plain values, of any writer."""
 
 from collections.abc import Iterator
 from itertools import islice

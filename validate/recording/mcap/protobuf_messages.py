@@ -29,13 +29,14 @@ _FIELDS: Mapping[str, Mapping[str, str]] = {
 
 
 def protobuf_schema(name: str) -> MessageSchema:
-    """The schema of one of our messages, with all that it stands on."""
+    """Return the schema of one of our messages, with all that it stands on."""
     files = descriptor_pb2.FileDescriptorSet(file=[_timestamp(), _file()])
     return MessageSchema(name, PROTOBUF, files.SerializeToString(deterministic=True))
 
 
 def protobuf_message(name: str, content: Json) -> bytes:
-    """The message whose JSON form is `content`; null in a list becomes NaN, else is left out."""
+    """Return the message whose JSON form is `content`; null in a list becomes NaN, else is left
+    out."""
     made = _classes()[name]()
     for field, value in content.items():
         if field == "stamp":

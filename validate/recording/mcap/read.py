@@ -1,4 +1,4 @@
-"""An MCAP file as a recording: verified front to back, then read by the index of that check.
+"""Reader of MCAP files: verified front to back, then read by the index of that check.
 
 Topics with schemas of others, mirrors among them, are not read by `read_recording`, which
 experiments use, nor are images without a record of their calibration (`calibration/<topic>`:
@@ -31,7 +31,7 @@ from validate.recording.types import Clock, Recording, by_kind
 
 
 def read_recording(path: Path) -> Recording:
-    """The recording in an MCAP file; t = 0 is the earliest sample of all its streams.
+    """Return the recording in an MCAP file; t = 0 is the earliest sample of all its streams.
 
     A measurement's time is the stamp in its message, else its publish time, never log time.
     Raises `RecordingError` for a file that is damaged (with the byte), contradicts itself, holds
@@ -87,8 +87,8 @@ def _clock(raw: Collected) -> Clock:
 
 
 def read_all(path: Path, options: Options) -> Recording:
-    """The recording in an MCAP file of anybody: streams of ours, and messages of others that mean
-    something (`known_messages`), as one.
+    """Return the recording in an MCAP file of anybody: streams of ours, and messages of others that
+    mean something (`known_messages`), as one.
 
     Options: `m_per_px` of images without a scale, `/topic.field=UNIT` for a number in messages of
     other types, `unit` of markers and outlines that were wrongly declared in m. Raises as

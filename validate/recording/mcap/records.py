@@ -1,4 +1,4 @@
-"""The records of an MCAP file, read strictly: no field reaches past its record, nothing unbounded.
+"""Strict parser of MCAP records: no field exceeds its record, all sizes are bounded.
 
 Layout after the MCAP specification (mcap.dev/spec): opcode u8, length u64, content; all integers
 little-endian, strings and maps with a u32 byte length before them. Unlike the `mcap` package's own
@@ -139,7 +139,7 @@ class Message:
 
     @staticmethod
     def read(data: bytes, at: int, end: int) -> "Message":
-        """The message that stands there in a chunk, or in a record of its own."""
+        """Return the message that stands there in a chunk, or in a record of its own."""
         if end - at < MESSAGE_HEAD.size:
             raise RecordingError(f"a message record of {end - at} bytes, at least 22 needed")
         channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(data, at)
@@ -200,7 +200,7 @@ class Attachment:
 
     @staticmethod
     def read(content: bytes) -> "Attachment":
-        """Raises `RecordingError` unless the fields fit and the CRC (0: none) is right."""
+        """Raise `RecordingError` unless the fields fit and the CRC (0: none) is right."""
         fields = Cursor(content)
         times = fields.integer(8), fields.integer(8)
         words = fields.text(), fields.text()
@@ -215,7 +215,7 @@ class Attachment:
 
 
 def statistics_messages(content: bytes) -> int:
-    """The message count a statistics record claims."""
+    """Return the message count a statistics record claims."""
     return Cursor(content).integer(8)
 
 
@@ -227,7 +227,8 @@ def chunk_index_place(content: bytes) -> tuple[int, int]:
 
 
 def unpack(compression: str, data: memoryview, size: int) -> bytes:
-    """The `size` bytes packed in `data`; refuses sizes over `MAX_RECORD` before allocating."""
+    """Return the `size` bytes packed in `data`; refuses sizes over `MAX_RECORD` before
+    allocating."""
     if size > MAX_RECORD:
         raise RecordingError(f"a chunk of {size} bytes unpacked, the limit is {MAX_RECORD}")
     if size > max(_PLENTY, _TIMES * len(data)):

@@ -1,4 +1,4 @@
-"""The whole part of a file whose writer was ended, as a file with an end: byte for byte.
+"""Recovery of a truncated MCAP file: its complete part, byte for byte, with a new end.
 
 A record `validate.recovered` tells what was saved and what is missing. There is no summary, so
 readers that need an index find none.

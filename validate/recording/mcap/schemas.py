@@ -1,4 +1,4 @@
-"""The messages of our own recordings: their JSON schemas, how they are written and read.
+"""JSON schemas of this package's messages, and their encoding and decoding.
 
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane
@@ -60,7 +60,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """How many float64 would take the memory that the sample takes."""
+        """Memory of the sample in numbers of float64."""
         return self.values.size + (0 if self.image is None else -(-self.image.size // 8))
 
 
@@ -126,14 +126,14 @@ def _ours(ns: int, frame: str) -> Json:
 
 
 def markers_message(ns: int, frame: str, names: Sequence[str], x: Floats, sd: float) -> Json:
-    """The message of one instant; x (k, 2 or 3) m, NaN becomes null."""
+    """Return the message of one instant; x (k, 2 or 3) m, NaN becomes null."""
     axes = [_nullable(x[:, axis]) for axis in range(x.shape[1])]
     places = dict(zip("xyz", [*axes, None], strict=False))
     return {**_ours(ns, frame), "names": list(names), **places, "sd": sd}
 
 
 def mirror_message(ns: int, frame: str, x: Floats) -> Json:
-    """The points seen at one instant as unturned poses; points in a plane get z = 0."""
+    """Return the points seen at one instant as unturned poses; points in a plane get z = 0."""
     seen = x[~np.isnan(x).any(axis=1)]
     turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
     poses = [
@@ -144,22 +144,22 @@ def mirror_message(ns: int, frame: str, x: Floats) -> Json:
 
 
 def signal_message(ns: int, frame: str, unit: str, values: Floats, sd: float) -> Json:
-    """The message of one instant; values (c,) in `unit`."""
+    """Return the message of one instant; values (c,) in `unit`."""
     return {**_ours(ns, frame), "unit": unit, "values": values.tolist(), "sd": sd}
 
 
 def contour_message(
     ns: int, frame: str, outline: Floats, sd: float, each: Floats | None = None
 ) -> Json:
-    """The message of one instant; outline (k, 2) m in the image plane, `each` its own sd m and
-    confidence."""
+    """Return the message of one instant; outline (k, 2) m in the image plane, `each` its own sd m
+    and confidence."""
     x, y = outline.T.tolist()
     own = {} if each is None else dict(zip(_OWN, each.tolist(), strict=True))
     return {**_ours(ns, frame), "x": x, "y": y, "sd": sd, **own}
 
 
 def image_message(ns: int, frame: str, image: Pixels) -> Json:
-    """The message of one instant; image (h, w) uint8 as PNG."""
+    """Return the message of one instant; image (h, w) uint8 as PNG."""
     data = base64.b64encode(encode_png(image)).decode("ascii")
     if len(data) > MAX_MESSAGE - 1024:
         raise RecordingError(
@@ -169,7 +169,7 @@ def image_message(ns: int, frame: str, image: Pixels) -> Json:
 
 
 def parse_json(data: bytes) -> Json:
-    """The object in a message.
+    """Return the object in a message.
 
     Raises `RecordingError` for what is no JSON object, for NaN and infinity, a field twice.
     """
@@ -187,7 +187,7 @@ def parse_json(data: bytes) -> Json:
 
 
 def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
-    """The sample in a message of one of our schemas.
+    """Return the sample in a message of one of our schemas.
 
     Raises `RecordingError` for what `parse` refuses, for a field that is missing, of a wrong type
     or of another length than its neighbours.

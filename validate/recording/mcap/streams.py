@@ -1,4 +1,4 @@
-"""From verified messages to streams: decoding, one clock, names and units that stay.
+"""Streams from verified messages: decoding, common clock, constant names and units.
 
 A stream is what one channel of ours holds. Everything that would have to be guessed is refused:
 samples out of order, a unit, frame, spread or set of names that changes on the way, stamps in some
@@ -84,7 +84,8 @@ class Collected:
 
 
 def ours(verified: Verified) -> dict[int, Collected]:
-    """An empty collector for every channel with a schema of ours, and of images calibrated."""
+    """Return an empty collector for every channel with a schema of ours, and of images
+    calibrated."""
     found: dict[int, Collected] = {}
     for number, (channel, schema) in our_channels(verified).items():
         log, publish = verified.log_ns[number], verified.publish_ns[number]
@@ -94,14 +95,15 @@ def ours(verified: Verified) -> dict[int, Collected]:
 
 
 def our_channels(verified: Verified) -> dict[int, tuple[Channel, Schema]]:
-    """The channels that are streams of ours, by number."""
+    """Return the channels that are streams of ours, by number."""
     records = {record.name for record in verified.metadata}
     all_ = {n: (c, verified.schemas.get(c.schema_id)) for n, c in verified.channels.items()}
     return {n: (c, s) for n, (c, s) in all_.items() if s is not None and is_ours(c, s, records)}
 
 
 def is_ours(channel: Channel, schema: Schema | None, records: Set[str]) -> bool:
-    """Whether a channel has a schema of ours, or images whose calibration is in `records`."""
+    """Return whether a channel has a schema of ours, or images whose calibration is in
+    `records`."""
     if schema is None:
         return False
     calibrated = schema.name == IMAGE and CALIBRATION + channel.topic in records
@@ -135,7 +137,7 @@ def _null_of_none(parse: Parse) -> Parse:
 
 
 def not_ours(verified: Verified) -> dict[str, str]:
-    """The topics that are no stream, but for mirrors of one, and why."""
+    """Return the topics that are no stream, but for mirrors of one, and why."""
     ours_by_topic = {c.channel.topic for c in ours(verified).values()}
     found: dict[str, str] = {}
     for channel in verified.channels.values():
@@ -161,7 +163,8 @@ def fill(collected: dict[int, Collected], messages: Iterable[Message]) -> None:
 
 
 def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stream:
-    """The stream of one channel of ours, times from `t0_ns`; `records` hold poses and scales.
+    """Return the stream of one channel of ours, times from `t0_ns`; `records` hold poses and
+    scales.
 
     Raises `RecordingError`, with the topic, for samples that do not make one stream.
     """
@@ -186,7 +189,7 @@ def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stre
 
 
 def own_of(topic: str, samples: Sequence[Sample]) -> Floats | None:
-    """The own sd and confidence (nt, 2) of outlines; None where none has them.
+    """Return the own sd and confidence (nt, 2) of outlines; None where none has them.
 
     Raises `RecordingError` where only some have.
     """
@@ -206,7 +209,7 @@ def _named(topic: str, make: Callable[[], Stream]) -> Stream:
 
 
 def require_all_stamped(topic: str, stamped: int, messages: int) -> None:
-    """Raises `RecordingError` where only some messages have a stamp."""
+    """Raise `RecordingError` where only some messages have a stamp."""
     if stamped != messages:
         raise RecordingError(
             f"{topic!r}: {stamped} of {messages} messages have a stamp; stamp all or none"
@@ -214,7 +217,7 @@ def require_all_stamped(topic: str, stamped: int, messages: int) -> None:
 
 
 def require_forward(topic: str, ns: Ints, t0_ns: int) -> None:
-    """Raises `RecordingError` where times (n,) ns run backward; the error has s from `t0_ns`."""
+    """Raise `RecordingError` where times (n,) ns run backward; the error has s from `t0_ns`."""
     backward = np.flatnonzero(np.diff(ns) < 0)
     if len(backward):
         i = int(backward[0]) + 1
@@ -241,7 +244,7 @@ def _constant(raw: Collected, what: str) -> Any:
 
 
 def require_same(topic: str, what: str, i: int, sample: Sample, first: Sample) -> None:
-    """Raises `RecordingError` where the field `what` of sample i is not the first's."""
+    """Raise `RecordingError` where the field `what` of sample i is not the first's."""
     want, got = getattr(first, what), getattr(sample, what)
     if got != want:
         raise RecordingError(f"{topic!r}: {what} changes at message {i}, {want!r} -> {got!r}")

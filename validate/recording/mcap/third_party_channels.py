@@ -1,4 +1,4 @@
-"""Third-party channels of an MCAP file as streams: known types, and numbers that the user names.
+"""Third-party channels of an MCAP file as streams: known types, and numbers by name.
 
 Of a type that is not known a field becomes a signal by `--map /topic.field.sub=UNIT`. Samples are
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.
@@ -58,7 +58,7 @@ class Gathered:
 
 
 def gatherers(verified: Verified, options: Options) -> tuple[dict[int, Gathered], dict[str, str]]:
-    """A gatherer for every foreign channel that means something, and why others do not.
+    """Return a gatherer for every foreign channel that means something, and why others do not.
 
     Raises `UsageError` for a field asked for of a topic that the file does not have.
     """
@@ -171,7 +171,8 @@ class ForeignStreams:
 
 
 def found_streams(gathered: Mapping[int, Gathered], options: Options) -> ForeignStreams:
-    """The streams of all gatherers; one whose samples do not make a stream is told, not raised.
+    """Return the streams of all gatherers; one whose samples do not make a stream is told, not
+    raised.
 
     Raises `UsageError` for a wrong `m_per_px`.
     """

@@ -1,4 +1,4 @@
-"""A verified MCAP file: its content, and its messages by the index that verification made."""
+"""Verified MCAP file: its content, and its messages by index."""
 
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
@@ -47,7 +47,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class Verified:
-    """What the check found in a file; times are int64 ns, in file order, by channel id."""
+    """Result of the check of a file; times are int64 ns, in file order, by channel id."""
 
     source: Source
     header: Header

@@ -1,4 +1,4 @@
-"""A recording as an MCAP file: same bytes for the same recording, whole or not at all.
+"""Writer of a recording as MCAP: deterministic bytes, complete or not at all.
 
 Messages are in order of time; log time = publish time = stamp. Stamps are whole nanoseconds, so
 times on that grid return exactly up to 26 days (2^51 ns); zero of time on return is the earliest

@@ -1,4 +1,4 @@
-"""C3D, the file of motion capture: labelled points, analog channels, residuals.
+"""Reader of C3D motion capture: labelled points, analog channels, residuals.
 
 The file's own words are taken: labels, unit, rate. A residual is the mean distance of the rays that
 meet in a point, not a standard deviation: it is told, never used as one.
@@ -34,7 +34,7 @@ Found = tuple[dict[str, Stream], dict[str, str]]  # streams, and why others are 
 
 
 def names_of(found: Held) -> tuple[str, ...]:
-    """A name for everything among the points."""
+    """Return a name for everything among the points."""
     return distinct(found["labels"].tolist(), found["points"].shape[1])
 
 

@@ -1,4 +1,4 @@
-"""What a C3D file holds, as plain arrays. The only file that imports ezc3d."""
+"""Arrays of a C3D file. The only file that imports ezc3d."""
 
 import tempfile
 from collections.abc import Iterator
@@ -29,7 +29,8 @@ _Span = tuple[int, int, int]  # from, to, and the bytes of a number
 
 
 def turned(path: Path, copy: Path) -> Path:
-    """The path itself, or where its numbers stand the other way round a `copy` that is Intel's.
+    """Return the path itself, or where its numbers stand the other way round a `copy` that is
+    Intel's.
 
     C3D user guide: header, parameter section, data. Whole numbers and floats are turned each in
     its place, so that a file of whole numbers stays one.

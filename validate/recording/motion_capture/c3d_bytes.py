@@ -1,5 +1,7 @@
-"""How a C3D file lies in bytes: what its header says of its length, and files of over 65535 frames,
-which no header counts, in parts that one does."""
+"""Byte layout of a C3D file: declared length, and files of more than 65535 frames in parts.
+
+A header counts at most 65535 frames; a longer file is read in parts that a header can count.
+"""
 
 import struct
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Logs of NDI's trackers as CSV text: position (mm) and quaternion of each tool, line by line.
+"""Reader of NDI tracker logs (CSV): position (mm) and quaternion of each tool.
 
 Columns are told by their names: three of position and four of a quaternion beside each other, in
 either order, with a state before them or none. A tool that was not seen has seven zeros, blank

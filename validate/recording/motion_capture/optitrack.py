@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV: a line of keys and values, lines of types, names and columns, rows."""
+"""Reader of OptiTrack Motive CSV."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

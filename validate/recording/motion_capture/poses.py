@@ -1,5 +1,7 @@
-"""Poses of a tracked tool as signals: `<tool>/rotation` (nt, 9), row by row, `<tool>/translation`
-(nt, 3) m, with samples only where the tool was seen."""
+"""Poses of a tracked tool as signals: `<tool>/rotation` (nt, 9), `<tool>/translation` (nt, 3) m.
+
+Rotations are stored row by row. Samples exist only where the tool was tracked.
+"""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Qualisys Track Manager's text: keys and values, then a row a frame of coordinates in mm.
+"""Reader of Qualisys Track Manager text (coordinates in mm, one row per frame).
 
 Of bodies (6D) it has 16 columns each: X Y Z, three angles whose convention is a setting of the
 program, the residual (-1: not seen), and the rotation column by column, which alone is read.

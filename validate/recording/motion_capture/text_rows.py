@@ -1,4 +1,4 @@
-"""Tables of coordinates as motion capture and trackers write them: rows of cells and numbers.
+"""Text tables of coordinates from motion capture and trackers: rows of cells and numbers.
 
 A blank cell, `nan`, `NULL` or `-` is "not seen". Where no number has a point a comma is one.
 Programs that log write line by line: where one was ended the last line is cut. It is left out then,
@@ -49,8 +49,8 @@ class TextRows:
 
 
 def text_rows(path: Path) -> TextRows:
-    """The file split at tabs, semicolons or commas, whichever most of its first lines have; before
-    commas the others, beside which a comma is a number's; at spaces, where they have none.
+    """Return the file split at tabs, semicolons or commas, whichever most of its first lines have;
+    before commas the others, beside which a comma is a number's; at spaces, where they have none.
 
     Raises `UsageError` for a file that cannot be read, `RecordingError` for one that is no text.
     """
@@ -137,7 +137,7 @@ def _pointed(cell: str) -> str:
 
 
 def as_number(cell: str) -> float | None:
-    """A number with either sign of decimals; none where it is no number."""
+    """Return a number with either sign of decimals; none where it is no number."""
     try:
         return float(_pointed(cell))
     except ValueError:
@@ -152,7 +152,7 @@ def without_zeros(x: Floats) -> tuple[Floats, int]:
 
 
 def told_zeros(count: int) -> dict[str, str]:
-    """The record's entry about points that are three zeros; none where none is."""
+    """Return the record's entry about points that are three zeros; none where none is."""
     return {ZEROS: f"{count} points, taken as missing"} if count else {}
 
 
@@ -214,5 +214,5 @@ def cut_lines(records: Iterable[Mapping[str, str]]) -> list[str]:
 
 
 def told_left(left: Sequence[str]) -> dict[str, str]:
-    """The record's entry about what was left out; none where nothing was."""
+    """Return the record's entry about what was left out; none where nothing was."""
     return {LEFT_OUT: "; ".join(left)} if left else {}

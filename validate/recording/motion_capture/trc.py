@@ -1,4 +1,4 @@
-"""TRC, the marker trajectories of OpenSim and of motion capture: tabs or commas."""
+"""Reader of TRC marker trajectories (OpenSim, motion capture): tabs or commas."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Vicon's CSV: one block of lines for trajectories, devices and models each.
+"""Reader of Vicon CSV: blocks of trajectories, devices and models.
 
 A block is its title, its rate in Hz, a line of names, one of columns, one of units, then a row a
 frame (devices: a row a sub-frame) until a blank line.

@@ -1,4 +1,4 @@
-"""Outlines of inclusions in images: found, followed, or drawn by others.
+"""Outlines of inclusions in images: extracted, tracked, or from third parties.
 
 Start with `outline`.
 """

@@ -1,4 +1,4 @@
-"""Where a dark closed region lies in an image, roughly: discs against the sectors of a ring."""
+"""Rough search for dark closed regions in an image: discs against the sectors of a ring."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,8 @@ class Candidate:
 
 
 def candidates(image: Floats, m_per_px: tuple[float, float], most: int = 4) -> list[Candidate]:
-    """The best dark discs of an image (h, w), the best first, none inside another one's middle.
+    """Return the best dark discs of an image (h, w), the best first, none inside another one's
+    middle.
 
     A disc's score is how much darker its mean is than the third darkest of eight sectors around it
     (so two may lie in a shadow), in standard deviations of the image, times the root of its radius.
@@ -40,8 +41,9 @@ def candidates(image: Floats, m_per_px: tuple[float, float], most: int = 4) -> l
 
 
 def scanned(image: Floats) -> Floats:
-    """The image (h, w) with the grey of what was scanned in place of what was not: all of one level
-    from a corner on, as outside of a sector probe's fan. A search would find that first."""
+    """Return the image (h, w) with the grey of what was scanned in place of what was not: all of
+    one level from a corner on, as outside of a sector probe's fan. A search would find that
+    first."""
     parts, _ = label(image == image.min())
     corners = {int(parts[i, j]) for i in (0, -1) for j in (0, -1)} - {0}
     outside = np.isin(parts, sorted(corners))

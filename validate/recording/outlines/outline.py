@@ -1,5 +1,4 @@
-"""The outline of an anechoic inclusion in a B-mode image, with its uncertainty, or the reason why
-there is none.
+"""Outline of an anechoic inclusion in a B-mode image, with uncertainty or a reason for refusal.
 
 No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
 (`discs`), unless a centre and radius are given; the wall is the closed path in polar
@@ -53,7 +52,7 @@ class Quality:
 
 
 def quality(grey: Grey, wall: Wall) -> Quality:
-    """How well a path parts dark from bright.
+    """Return the contrast of a path between dark and bright.
 
     gcnr is 1 - overlap of the two grey level distributions (generalised contrast-to-noise ratio,
     Rodriguez-Molares et al. 2020): 0 for alike, 1 for apart, whatever the grey scale. `closed` is
@@ -179,7 +178,7 @@ def extract_outline(
     shape: Shape = "free",
     bright: bool = False,
 ) -> Outline:
-    """The outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
+    """Return the outline of the dark (`bright`: bright) closed region in an image (h, w) uint8.
 
     `centre` (2,) m and `radius` m may be given roughly (a radius within a third of the true one);
     m_per_px is (x, y). `shape` "free" follows the wall, the others fit it. Raises `RecordingError`
@@ -254,7 +253,7 @@ def outlines_of(
     bright: bool = False,
     images: str = "",
 ) -> Contours:
-    """The outline of every image; sd is the root mean square of all.
+    """Return the outline of every image; sd is the root mean square of all.
 
     `images` is the topic of the frames, kept with the outlines. Other options as in
     `extract_outline`. Raises `RecordingError` naming the first image without one and how many there

@@ -72,7 +72,8 @@ class FollowedOutline:
 def followed(
     frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None, least: float = 0.0
 ) -> FollowedOutline:
-    """The outline in the `frames` of topic `images`; sd m is that of distances to experts' lines.
+    """Return the outline in the `frames` of topic `images`; sd m is that of distances to experts'
+    lines.
 
     A region beside the centre that was said lowers no confidence. Raises `RecordingError` where the
     first search finds nothing, where over half of the images have no outline, and where rivals

@@ -1,4 +1,4 @@
-"""A dark region's wall in polar coordinates: speckle statistics, closed path, place of the wall.
+"""Wall of a dark region in polar coordinates: speckle statistics, closed path, wall position.
 
 Every pixel weighs in by how much likelier it is inside than outside (Gaussian grey levels of the
 region and of its surroundings, the latter from ray to ray, so that a shadow weighs little), divided
@@ -126,7 +126,7 @@ def speckle_area(image: Floats, m_per_px: tuple[float, float]) -> float:
 
 
 def trace(grey: Grey, centre: Floats, radius: float, rounds: int = len(_SURROUND)) -> Wall:
-    """The wall of the dark region about a rough centre (2,) m and radius m.
+    """Return the wall of the dark region about a rough centre (2,) m and radius m.
 
     Each round finds the path for the levels beside the last one; two tell a region from none.
     """
@@ -147,7 +147,7 @@ def trace(grey: Grey, centre: Floats, radius: float, rounds: int = len(_SURROUND
 
 
 def recentred(centre: Floats, path: Floats) -> tuple[Floats, Floats]:
-    """The path about its own centroid: new centre, new radii (RAYS,)."""
+    """Return the path about its own centroid: new centre, new radii (RAYS,)."""
     points = centre + path[:, None] * DIRECTIONS
     area = path**2
     shift = (2 / 3) * (area[:, None] * path[:, None] * DIRECTIONS).sum(axis=0) / area.sum()

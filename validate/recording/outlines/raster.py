@@ -1,4 +1,4 @@
-"""The share of every pixel that lies inside a closed outline."""
+"""Area fraction of every pixel inside a closed outline."""
 
 import numpy as np
 

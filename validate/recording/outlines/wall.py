@@ -1,4 +1,4 @@
-"""The place of a blurred wall, corrected for blur.
+"""Position of a blurred wall, corrected for blur.
 
 A path between grey levels lies inward of the wall, because the logarithm lifts the skirt of the
 point spread. The wall of the scatterers is where half of the power is left: 3.01 dB below the level
@@ -33,7 +33,7 @@ class Placed:
 
 
 def placed(grey: Grey, wall: Wall, bright: bool) -> Placed:
-    """The wall's points moved from the path to where half of the power is left."""
+    """Return the wall's points moved from the path to where half of the power is left."""
     points = wall.centre + wall.radius[:, None] * DIRECTIONS
     normals = _normals(points)
     s = np.linspace(-_SPAN, _SPAN, _SAMPLES) * float(wall.radius.mean())

@@ -1,1 +1,1 @@
-"""Exports of testing machines: text of any language as a force-displacement recording."""
+"""Exports of testing machines: text in any language as a force-displacement recording."""

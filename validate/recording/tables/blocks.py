@@ -1,4 +1,4 @@
-"""Text of an export as tables: header blocks, names, units and rows, one or several in a file.
+"""Parser of text exports: header blocks, names, units and rows; one or several tables.
 
 A table begins with a line of names that rows follow. Tables much shorter than the others (results,
 statistics) are kept as header lines and named in the notes. Blank lines may stand anywhere.
@@ -52,7 +52,7 @@ class Fitted:
 
 
 def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
-    """The lines below `names` as rows of its length.
+    """Return the lines below `names` as rows of its length.
 
     Short rows are filled up where many rows lack these columns, or where a group of columns ends.
     Raises `RecordingError` with the line for every other row that is too short or too long, for
@@ -101,7 +101,7 @@ def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
 
 
 def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
-    """Raises `RecordingError` for words that stand amid samples."""
+    """Raise `RecordingError` for words that stand amid samples."""
     raise RecordingError(
         f"line {line}: text '{' '.join(words).strip()[:60]}' between the rows; export one test "
         f"per file and correct this line"
@@ -149,7 +149,8 @@ def refuse_cut(rows: Sequence[Line]) -> None:
 
 
 def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
-    """The table without first rows that are written twice, and what was left out in its notes.
+    """Return the table without first rows that are written twice, and what was left out in its
+    notes.
 
     First rows count as repeated when they stand again below themselves cell by cell, time among
     them. `keep` is the user's: of rows that only share their time the `first` or the `last` is

@@ -1,4 +1,4 @@
-"""Lines of text as cells: which separator, which lines are rows, names or units."""
+"""Lines of text as cells: separator, and lines of rows, names or units."""
 
 import csv
 import math
@@ -35,7 +35,7 @@ _FORMS = {".": _form(".", ","), ",": _form(",", ".")}
 
 
 def looks_numeric(cell: str) -> bool:
-    """Whether the cell is a number in some notation."""
+    """Return whether the cell is a number in some notation."""
     return _LOOSE.fullmatch(_plain_minus(cell)) is not None
 
 
@@ -67,7 +67,8 @@ def decimal_sign(cells: Iterable[tuple[int, str]]) -> str:
 
 
 def number(cell: str, decimal: str) -> float | None:
-    """The finite number in the cell, or None: empty, text, NaN, infinite or wrongly grouped."""
+    """Return the finite number in the cell, or None: empty, text, NaN, infinite or wrongly
+    grouped."""
     found = _FORMS[decimal].fullmatch(_plain_minus(cell))
     if found is None or not looks_numeric(cell):
         return None
@@ -77,7 +78,7 @@ def number(cell: str, decimal: str) -> float | None:
 
 
 def decimals(cell: str) -> int:
-    """How many digits follow the last decimal or thousands sign; 0 for whole numbers."""
+    """Return the number of digits after the last decimal or thousands sign; 0 for integers."""
     found = re.search(r"[.,]([0-9]*)[^.,]*$", cell)
     return len(found[1]) if found else 0
 
@@ -127,7 +128,7 @@ class Split:
 
 
 def split_lines(raw: Sequence[str]) -> Split:
-    """The lines split at the separator that gives most numbers.
+    """Return the lines split at the separator that gives most numbers.
 
     Raises `RecordingError` when none gives a table.
     """
@@ -164,13 +165,13 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def is_row(cells: Sequence[str], least: int = 1) -> bool:
-    """Whether at least `least` cells and half of the filled ones are numbers."""
+    """Return whether at least `least` cells and half of the filled ones are numbers."""
     numbers = sum(looks_numeric(cell) or cell.lower() in NOTHING for cell in cells)
     return len(cells) >= 2 and numbers >= least and 2 * numbers >= sum(map(bool, cells))
 
 
 def is_data(cells: Sequence[str]) -> bool:
-    """A row of a table, not a `key,number` line of a header block."""
+    """Return a row of a table, not a `key,number` line of a header block."""
     return is_row(cells, least=2)
 
 
@@ -187,7 +188,7 @@ def _longest_run(lines: Sequence[Line]) -> tuple[int, int]:
 
 
 def is_unit_row(cells: Sequence[str]) -> bool:
-    """Whether most cells are units or stand in brackets, and the others are as short."""
+    """Return whether most cells are units or stand in brackets, and the others are as short."""
     filled = [c for c in cells if c]
     if filled and holds(filled[0], UNIT_LABELS) and not _UNIT_CELL.fullmatch(filled[0]):
         filled = filled[1:]
@@ -197,7 +198,8 @@ def is_unit_row(cells: Sequence[str]) -> bool:
 
 
 def is_names(cells: Sequence[str]) -> bool:
-    """Whether the cells may name columns: two words or more, no numbers before the first gap."""
+    """Return whether the cells may name columns: two words or more, no numbers before the first
+    gap."""
     words = any(
         len(named) >= 2 and not any(looks_numeric(c) or c.lower() in NOTHING for c in named)
         for named in ([c for c in cells if c], [c for c in cells[: _gap(cells)] if c])
@@ -212,7 +214,7 @@ def _gap(cells: Sequence[str]) -> int:
 
 
 def is_remark(cells: Sequence[str]) -> bool:
-    """Whether the line begins with a word, as lines of header blocks do and rows do not."""
+    """Return whether the line begins with a word, as lines of header blocks do and rows do not."""
     first = next(c for c in cells if c)
     word = re.search(r"[^\W\d_]{2}|[^\W\d_\x00-\u2e7f]", first)
     return bool(word) and not looks_numeric(first) and first.lower() not in NOTHING

@@ -1,4 +1,4 @@
-"""Which columns of a force-displacement table are time, displacement and force; what the user says.
+"""Columns of time, displacement and force in a table, by name, unit or `--map`.
 
 Words are in `vocabulary`; where one word names a length on one machine and a strain on another, the
 column's unit decides.
@@ -85,7 +85,8 @@ class Pick:
 
 
 def parse_mapping(mapping: Mapping[str, str], table: Table) -> dict[str, Said]:
-    """The mapping's entries by role, see `read_instron`; raises `UsageError` naming the nearest."""
+    """Return the mapping's entries by role, see `read_instron`; raises `UsageError` naming the
+    nearest."""
     roles = (*NEEDED, *DERIVED)
     return {key: _said(key, text, table) for key, text in mapping.items() if key in roles}
 
@@ -121,12 +122,12 @@ def _nearest(text: str, table: Table) -> str:
 
 
 def columns_called(role: str, table: Table) -> list[Column]:
-    """The columns of a role that hold numbers."""
+    """Return the columns of a role that hold numbers."""
     return [c for c in table.columns if role_of(c) == role and not _without_numbers(c)]
 
 
 def role_of(column: Column) -> str | None:
-    """The role of a column by its name and unit, None for a column of no interest here."""
+    """Return the role of a column by its name and unit, None for a column of no interest here."""
     role = role_of_name(column.name)
     if column.name == LABVIEW_X and _measures(column, "time"):
         return "time"
@@ -136,7 +137,7 @@ def role_of(column: Column) -> str | None:
 
 
 def time_column(table: Table) -> Column | None:
-    """The one column of time; None where there is none or several."""
+    """Return the one column of time; None where there is none or several."""
     found = [column for column in table.columns if role_of(column) == "time"]
     return found[0] if len(found) == 1 else None
 
@@ -150,7 +151,7 @@ def _measures(column: Column, quantity: str) -> bool:
 
 
 def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
-    """The column of a needed role in SI.
+    """Return the column of a needed role in SI.
 
     A column that cannot be of the role, by its unit or without numbers, is no rival of one that
     can. Raises `RecordingError` when no column has the role, several differ, the unit is missing or
@@ -186,7 +187,7 @@ def _by_unit(role: str, table: Table) -> str:
 
 
 def unnamed_column(role: str, table: Table) -> str:
-    """The advice where a column that no known word names has the unit of a needed role."""
+    """Return the advice where a column that no known word names has the unit of a needed role."""
     found = [c for c in table.columns if not role_of(c) and _measures(c, QUANTITY[role])]
     if not found:
         return ""
@@ -194,7 +195,7 @@ def unnamed_column(role: str, table: Table) -> str:
 
 
 def said_pick(role: str, table: Table, said: Said) -> Pick:
-    """The column that the user names; raises as `needed_pick`."""
+    """Return the column that the user names; raises as `needed_pick`."""
     named = _named(said.column, table)
     if len(named) != 1:
         raise UsageError(
@@ -205,7 +206,8 @@ def said_pick(role: str, table: Table, said: Said) -> Pick:
 
 
 def derived_pick(role: str, table: Table) -> Pick | None:
-    """The strain or stress column that checks the others; None when there is no single sure one."""
+    """Return the strain or stress column that checks the others; None when there is no single sure
+    one."""
     found = [c for c in table.columns if role_of(c) == role and not _uncompared(role, c, table)]
     if len(found) > 1:
         found = [c for c in found if re.search(r"engineering|nominal", c.name, re.IGNORECASE)]
@@ -213,7 +215,8 @@ def derived_pick(role: str, table: Table) -> Pick | None:
 
 
 def left_columns(table: Table, used: Collection[str]) -> list[str]:
-    """The columns of interest that cannot be used, each with why, and those without numbers."""
+    """Return the columns of interest that cannot be used, each with why, and those without
+    numbers."""
     found = {c.label: _left(c, table) for c in table.columns if c.label not in used}
     return [f"column '{label}': {why}" for label, why in found.items() if why]
 
@@ -256,7 +259,7 @@ def _without_numbers(column: Column) -> str:
 
 
 def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
-    """The column in SI; raises as `needed_pick`."""
+    """Return the column in SI; raises as `needed_pick`."""
     if said is not None:
         _refuse_derived(role, column)
     unit = (said.unit if said else None) or column.unit
@@ -326,7 +329,7 @@ def _same(a: Floats, b: Floats) -> bool:
 
 
 def timed_pick(role: str, table: Table, said: Said | None) -> Pick:
-    """The column of a needed role, or times of the constant step that the user says.
+    """Return the column of a needed role, or times of the constant step that the user says.
 
     Raises as `needed_pick`, and `UsageError` for a step that is none.
     """

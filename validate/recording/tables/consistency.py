@@ -1,4 +1,4 @@
-"""What a force-displacement table must satisfy before it is believed.
+"""Consistency checks of a force-displacement table.
 
 Strain and stress columns are used here only: they are derived from displacement and force, so they
 must agree with them. All arrays are (n,) and in SI.
@@ -66,7 +66,7 @@ def check_derived(base: Pick, derived: Pick, divisor: float, lines: Sequence[int
 
 
 def check_speed(time: Pick, displacement: Pick, declared: float) -> None:
-    """Raises `RecordingError` when the motion is 10^k or 60 times the declared speed (m/s)."""
+    """Raise `RecordingError` when the motion is 10^k or 60 times the declared speed (m/s)."""
     if time.unit_is_said or displacement.unit_is_said or declared <= 0:
         return
     steps = np.abs(np.diff(displacement.values) / np.diff(time.values))
@@ -83,7 +83,7 @@ def check_speed(time: Pick, displacement: Pick, declared: float) -> None:
 def check_swapped(
     time: Pick, displacement: Pick, force: Pick, strain: Pick | None, stress: Pick | None
 ) -> None:
-    """Raises `RecordingError` when force moves as a displacement does, and the reverse.
+    """Raise `RecordingError` when force moves as a displacement does, and the reverse.
 
     Two signs: the strain column follows force and the stress column displacement; or force is a
     straight ramp in time while displacement is not or goes back and forth. A load-controlled test
@@ -107,7 +107,7 @@ def check_swapped(
 
 
 def check_height(displacement: Pick, closing: Floats, height: float) -> None:
-    """Raises `RecordingError` when the plates close (m) by more than the specimen's height (m)."""
+    """Raise `RecordingError` when the plates close (m) by more than the specimen's height (m)."""
     most = float(np.max(closing - closing[0]))
     if most >= height and not displacement.unit_is_said:
         raise RecordingError(

@@ -1,4 +1,4 @@
-"""Which way compression points in a force-displacement table, and which columns to flip for it."""
+"""Sign of compression in a force-displacement table, and columns to invert."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -92,7 +92,7 @@ class Signs:
 def signs(
     displacement: Pick, force: Pick, kind: Kind | None, strain: Pick | None, stress: Pick | None
 ) -> Signs:
-    """The flips that make compression positive in both signals.
+    """Return the flips that make compression positive in both signals.
 
     Signs are those of the largest change since the first sample. `kind` is the stated one; None:
     strain and stress that go negative decide; displacement and force that do tell nothing, as a
@@ -161,7 +161,8 @@ def _by_strain(d: int, f: int, strain: Pick | None, stress: Pick | None) -> Kind
 
 
 def excursion(x: Floats) -> int:
-    """The sign of the largest change since the first sample; 0 when nothing stands out of noise."""
+    """Return the sign of the largest change since the first sample; 0 when nothing stands out of
+    noise."""
     moved = x - x[0]
     largest = float(moved[np.argmax(np.abs(moved))])
     noise = float(np.median(np.abs(np.diff(x, 2)))) if len(x) > 2 else 0.0

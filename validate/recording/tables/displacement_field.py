@@ -1,4 +1,4 @@
-"""Displacement fields, as programs of digital image correlation export them.
+"""Reader of displacement fields exported by digital image correlation.
 
 A row is a point of a grid and all rows are one instant. A recording has no stream for that: read
 over time, the rows would be one point that jumps from place to place.
@@ -68,7 +68,7 @@ def _kind(name: str) -> str:
 
 
 def is_grid(places: Floats) -> bool:
-    """Whether different places (n, 2 or more) fill a grid: every x with (nearly) every y."""
+    """Return whether different places (n, 2 or more) fill a grid: every x with (nearly) every y."""
     x, y = (len(np.unique(places[:, i])) for i in (0, 1))
     different = len(np.unique(places[:, :2], axis=0)) == len(places)
     return different and min(x, y) > 2 and 9 <= x * y <= 1.5 * len(places)

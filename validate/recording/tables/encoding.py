@@ -1,4 +1,4 @@
-"""Bytes of a text file as text: the encoding is chosen by evidence, and the evidence is told.
+"""Text encoding of a file, chosen by evidence that the recording lists.
 
 UTF-8 and UTF-16 prove themselves. Older encodings do not: nearly every byte is a letter in each of
 them. So each candidate is decoded, and the one in which the words of testing machines appear wins
@@ -44,7 +44,7 @@ class _Reading:
 
 
 def decode(data: bytes, said: str | None = None) -> Text:
-    """The text of a file; `said` is an encoding the user gives, which is then believed.
+    """Return the text of a file; `said` is an encoding the user gives, which is then believed.
 
     Raises `RecordingError` for empty, oversized and binary files, and for bytes that no encoding
     known here can hold; `UsageError` for an unknown `said`.
@@ -70,7 +70,8 @@ def decode(data: bytes, said: str | None = None) -> Text:
 
 
 def whole_file(path: Path) -> bytes:
-    """The bytes of a text of bounded size; raises `RecordingError` where it cannot be read."""
+    """Return the bytes of a text of bounded size; raises `RecordingError` where it cannot be
+    read."""
     return read_bytes(path, MAX_BYTES)
 
 

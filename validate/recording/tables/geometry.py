@@ -55,7 +55,8 @@ def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
 
 
 def loaded_area(specimen: Mapping[str, float], test: str = "") -> float | None:
-    """The area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not known.
+    """Return the area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not
+    known.
 
     A strip that is pulled has width and thickness. Which two of three sides a pressed block stands
     on is known only beside its height: a thickness may be the height, too.

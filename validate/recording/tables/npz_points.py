@@ -1,4 +1,4 @@
-"""Tracked points in NumPy archives: positions over states of a test, no times, no clock.
+"""Reader of tracked points in NumPy archives: positions over load steps, without times.
 
 The unit stands at the end of the file's name (`points3d_mm.npz`), or is asked for. Archives are
 read without pickles: they hold arrays and nothing else.

@@ -1,4 +1,4 @@
-"""Which columns of a table are points, by its lines of names: coordinates, times, labels, units.
+"""Columns of points in a table, by names: coordinates, times, labels, units.
 
 A line of names, as `time (s), tip_x (mm), ...`; DeepLabCut's three or four lines, a column a cell.
 """
@@ -64,7 +64,7 @@ class PointLayout:
 
 
 def layout_of(held: TextRows) -> PointLayout | None:
-    """The first lines that name points; none where none do."""
+    """Return the first lines that name points; none where none do."""
     if found := _of_deeplabcut(held.rows):
         return found
     for i, row in enumerate(held.rows[:_DEEPEST]):

@@ -1,4 +1,4 @@
-"""Tables of points as one's own scripts write them: a column a coordinate, or a row a point.
+"""Reader of point tables: one column per coordinate, or one row per point.
 
 `time (s), tip_x (mm), tip_y (mm), tip_z (mm), ...` are markers over time; `name, x, y, z` are
 landmarks at one instant; with a time or a frame in each row, and a name in several, markers again.

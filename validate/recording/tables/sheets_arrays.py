@@ -1,4 +1,4 @@
-"""The sheets of workbooks other than .xlsx as text. The only file that imports python_calamine."""
+"""Sheets of workbooks other than .xlsx as text. The only file that imports python_calamine."""
 
 from pathlib import Path
 from typing import Any

@@ -16,8 +16,8 @@ __all__ = ["ALL", "every_specimen"]
 
 
 def every_specimen(reader: Reader, path: Path, options: Options) -> list[Recording]:
-    """A recording of each specimen, named by its label; raises as the reader, and `UsageError` for
-    one of another format."""
+    """Return a recording of each specimen, named by its label; raises as the reader, and
+    `UsageError` for one of another format."""
     if reader in (XLSX, SHEETS):
         chosen = specimens_in_book(path, options)
     elif reader is INSTRON:

@@ -1,4 +1,4 @@
-"""Several specimens in one export: side by side, below each other, or told apart by a column."""
+"""Several specimens in one export: adjacent, stacked, or labelled by a column."""
 
 import re
 from collections.abc import Mapping, Sequence

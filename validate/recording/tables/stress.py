@@ -1,4 +1,4 @@
-"""Force and displacement of a table that holds stress, strain or stretch: by sizes that are said.
+"""Force and displacement from stress, strain or stretch, by declared specimen sizes.
 
 With the length L and the area A of the specimen before the test, and the stretch s = 1 + e of an
 engineering strain e: displacement e L, force (engineering stress) A. A true strain is ln s; a true
@@ -61,7 +61,7 @@ class Sized:
 
 
 def sizes_of(mapping: Mapping[str, str], specimen: Mapping[str, float], kind: Kind | None) -> Sizes:
-    """The user's sizes, else the header's: its area, and in compression its height.
+    """Return the user's sizes, else the header's: its area, and in compression its height.
 
     A header's length is not taken: that of a whole specimen is not the one strain is measured on.
     Raises `UsageError` for a size without a unit and a measure that is neither.
@@ -81,7 +81,7 @@ def sizes_of(mapping: Mapping[str, str], specimen: Mapping[str, float], kind: Ki
 
 
 def with_sizes(specimen: Mapping[str, float], mapping: Mapping[str, str]) -> dict[str, float]:
-    """The header's sizes and those that the user gives, who is believed."""
+    """Return the header's sizes and those that the user gives, who is believed."""
     names = {"area": "area_m2", "length": "height_m"}  # a header's length is the whole specimen's
     return {**specimen, **{names[k]: _size(k, mapping[k]) for k in names if k in mapping}}
 
@@ -98,7 +98,7 @@ def _size(key: str, text: str) -> float:
 
 
 def is_derived(role: str, table: Table, said: Mapping[str, Said]) -> bool:
-    """Whether a force or displacement has to be made of stress, strain or stretch."""
+    """Return whether a force or displacement has to be made of stress, strain or stretch."""
     sources = _FROM.get(role, ())
     own = role in said or bool(columns_called(role, table))
     return not own and any(s in said or _candidates(s, table) for s in sources)
@@ -149,7 +149,7 @@ def _displacement(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Ki
 
 
 def require_left(sized: Sized, closing: Floats, length: float) -> None:
-    """Raises `RecordingError` where nothing is left of the specimen (closing, length in m)."""
+    """Raise `RecordingError` where nothing is left of the specimen (closing, length in m)."""
     most = float(np.max(closing)) / length
     if most >= 1:
         label = sized.pick.column.label

@@ -1,4 +1,4 @@
-"""Nominal stress against stretch as text: one curve of a material, or a plane of two stretches."""
+"""Reader of nominal stress against stretch: one curve, or a plane of two stretches."""
 
 import hashlib
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ def read_stretch_stress(path: Path, unit: str | None = None) -> Recording:
 
 
 def signals_of(curve: Curve) -> dict[str, Signal]:
-    """The curve as signals; row numbers for times."""
+    """Return the curve as signals; row numbers for times."""
     t = np.arange(len(curve.stretch), dtype=np.float64)
     return {
         "stretch": Signal(t, curve.stretch, "1", 0.0, "specimen"),

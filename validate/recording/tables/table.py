@@ -1,4 +1,4 @@
-"""One table of a testing machine's export: header block, columns with units, cells as written.
+"""Table of a testing machine's export: header block, columns with units, cells as text.
 
 Knows no quantities. Units may stand in the column names, as `(mm)`, `[mm]`, `/mm`, `in mm` or
 `_mm`, or in a row of their own.
@@ -99,13 +99,13 @@ class Table:
         object.__setattr__(self, "header", MappingProxyType(dict(self.header)))
 
     def take(self, rows: Sequence[int], *notes: str) -> "Table":
-        """The table with these rows only, and notes that say why."""
+        """Return the table with these rows only, and notes that say why."""
         columns = tuple(replace(c, cells=tuple(c.cells[i] for i in rows)) for c in self.columns)
         lines = tuple(self.lines[i] for i in rows)
         return replace(self, columns=columns, lines=lines, notes=(*self.notes, *notes))
 
     def numbers(self, column: Column) -> Floats:
-        """The column's values (rows,) in its own unit.
+        """Return the column's values (rows,) in its own unit.
 
         Raises `RecordingError` with the line of the first cell that is empty or not a number.
         """

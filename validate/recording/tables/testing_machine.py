@@ -61,7 +61,8 @@ _UNITS = {"force": "N", "displacement": "m"}
 def alone(
     path: Path, data: bytes, table: Table, mapping: Mapping[str, str], label: str, written_as: str
 ) -> Recording:
-    """The one signal that the user did not say to be absent, with the sign that it is written with.
+    """Return the one signal that the user did not say to be absent, with the sign that it is
+    written with.
 
     Raises `UsageError` where both are said to be, and as `needed_pick` does.
     """
@@ -162,7 +163,7 @@ def recording_of(
     label: str,
     written_as: str = "text file",
 ) -> Recording:
-    """The recording of the table of one specimen; `data` are the bytes of the file."""
+    """Return the recording of the table of one specimen; `data` are the bytes of the file."""
     _require_test(table)
     if NONE in (mapping.get("force"), mapping.get("displacement")):
         return alone(path, data, table, mapping, label, written_as)

@@ -1,4 +1,4 @@
-"""The words of testing machines' exports, in the languages they are written in.
+"""Vocabulary of testing machines' exports in several languages.
 
 Kept without accents and in lower case (`plain`): exports lose accents, and a text decoded with the
 wrong table shows other letters. Chinese and Japanese words are looked for inside a text, the others
@@ -129,25 +129,26 @@ def plain(text: str) -> str:
 
 
 def words(text: str) -> frozenset[str]:
-    """The words of a text, plain."""
+    """Return the words of a text, plain."""
     return frozenset(re.findall(r"[^\W\d_]+", plain(text)))
 
 
 @cache
 def terms(text: str) -> frozenset[str]:
-    """The plain words of a vocabulary entry."""
+    """Return the plain words of a vocabulary entry."""
     return frozenset(plain(word) for word in text.split())
 
 
 def holds(text: str, vocabulary: str) -> bool:
-    """Whether one of the vocabulary's words is in the text."""
+    """Return whether one of the vocabulary's words is in the text."""
     wanted = terms(vocabulary)
     inside = plain(text)
     return bool(words(text) & wanted) or any(w in inside for w in wanted if is_ideographic(w))
 
 
 def kind_word(text: str, kind: str) -> str | None:
-    """The first word that begins as one of a kind's does, plain; an ideographic one anywhere."""
+    """Return the first word that begins as one of a kind's does, plain; an ideographic one
+    anywhere."""
     inside = _NO_KIND.sub(" ", " ".join(text.casefold().split()))
     stems = tuple(terms(kind))
     first = (w for w in re.findall(r"[^\W\d_]+", plain(inside)) if w.startswith(stems))
@@ -156,7 +157,7 @@ def kind_word(text: str, kind: str) -> str | None:
 
 
 def tells_a_stop(text: str) -> bool:
-    """Whether it says that a test was ended before its end."""
+    """Return whether it says that a test was ended before its end."""
     if holds(text, NEGATED) or re.search(r"[:=]\s*0\b", text):
         return False
     return holds(text, STOPPED) or bool(_BY_HAND.search(plain(text)))
@@ -167,7 +168,7 @@ def is_ideographic(word: str) -> bool:
 
 
 def role_of_name(name: str) -> str | None:
-    """The role that a column's name gives it, None for a column of no interest here.
+    """Return the role that a column's name gives it, None for a column of no interest here.
 
     A column has a role when its name holds one of the role's words and none of the words that make
     it something else; roles are tried from the top.
@@ -180,7 +181,7 @@ def role_of_name(name: str) -> str | None:
 
 
 def of_the_deformed(name: str) -> str:
-    """A name without the words that say true stress or strain."""
+    """Return a name without the words that say true stress or strain."""
     return " ".join(w for w in re.findall(r"[^\W\d_]+", plain(name)) if w not in terms(TRUE))
 
 

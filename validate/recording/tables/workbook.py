@@ -1,5 +1,7 @@
-"""Testing machines' exports as workbooks (.xlsx, .xls, .ods): the sheet with the test, read as text
-is."""
+"""Reader of testing machines' workbooks (.xlsx, .xls, .ods): the sheet with the test, as text.
+
+The sheet is read with the same parser as text exports.
+"""
 
 import zipfile
 from collections.abc import Mapping
@@ -43,8 +45,8 @@ class _Sheet:
 
 
 def read_xlsx(path: Path, options: Options) -> Recording:
-    """The sheet of a workbook that holds displacement and force, as `instron.read_instron` reads
-    text, with its options and `sheet` (a name) where several hold a test.
+    """Return the sheet of a workbook that holds displacement and force, as `instron.read_instron`
+    reads text, with its options and `sheet` (a name) where several hold a test.
 
     The other sheets are named in the notes. Raises as it does, `UsageError` for an unknown sheet
     and without the library, `RecordingError` where no sheet holds a table, or several hold a test

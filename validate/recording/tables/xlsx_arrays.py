@@ -1,4 +1,4 @@
-"""The sheets of a workbook as text. The only file that imports openpyxl."""
+"""Sheets of a workbook as text. The only file that imports openpyxl."""
 
 import csv
 import io
@@ -35,7 +35,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def require_unpacked(path: Path) -> None:
-    """Raises `RecordingError` for what unpacks to more than is sensible."""
+    """Raise `RecordingError` for what unpacks to more than is sensible."""
     with zipfile.ZipFile(path) as packed:
         size = sum(member.file_size for member in packed.infolist())
     if size > MOST_BYTES:

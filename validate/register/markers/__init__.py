@@ -1,4 +1,4 @@
-"""Tracked markers: fitted to their layout, followed in a run, judged.
+"""Tracked markers: fit to their layout, displacements in a run, quality of registration.
 
 Start with `markers`.
 """

@@ -1,4 +1,4 @@
-"""The rigid fit of markers whose noise differs between directions, and its covariance.
+"""Rigid fit of markers with anisotropic noise, and its covariance.
 
 Noise of covariance C lies in the source: the maximum-likelihood fit minimises the sum of
 r^T C^-1 r with r_i = x_i - R^T (y_i - t), by Gauss-Newton over a small turn w and shift d of the

@@ -1,4 +1,4 @@
-"""Displacements measured at many points of a body at one instant, as of tracked particles."""
+"""Displacements of many points of a body at one instant, as from particle tracking."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -57,7 +57,7 @@ class DisplacementObservation:
         return np.asarray(from_rest(run.t[run.at], moved, self.t)[-1] - self.u.ravel())
 
     def anew(self, left: Floats, draw: AnyDraw) -> "DisplacementObservation":
-        """The points as far as `left` (k d,) m has them, noise drawn."""
+        """Return the points as far as `left` (k d,) m has them, noise drawn."""
         exact = self.u + left.reshape(self.u.shape)
         return replace(self, u=exact + draw.white(self.sd, exact.shape))
 

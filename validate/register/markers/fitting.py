@@ -1,4 +1,4 @@
-"""How markers are fitted to their layout: the card that every experiment with markers shares."""
+"""Settings of the fit of markers to their layout."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -20,5 +20,5 @@ class MarkerFit:
     robust: bool = quantity(False, "1", "leave outliers out of the fit, still compared")
 
     def noise(self, recorded: float) -> float | tuple[float, ...]:
-        """The noise m that is used: one for all axes, or one for each."""
+        """Return the noise m that is used: one for all axes, or one for each."""
         return self.sd if len(self.sd) > 1 else (*self.sd, recorded)[0]

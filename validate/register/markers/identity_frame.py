@@ -1,4 +1,4 @@
-"""Markers that are already in the body's frame: nothing is fitted, any number of them will do."""
+"""Markers that are recorded in the body's frame, without a fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class AsDeclared(Registration):
 
 
 def as_declared(names: Sequence[str], places: Floats, sd: float) -> AsDeclared:
-    """The markers at places (k, 3) m of both frames, with noise `sd` m per axis."""
+    """Return the markers at places (k, 3) m of both frames, with noise `sd` m per axis."""
     return AsDeclared(
         Similarity(np.eye(3), np.zeros(3)), tuple(names), places, np.zeros_like(places), sd,
         "rigid", Reflection(0.0, np.inf), Scale(1.0, 0.0),

@@ -1,4 +1,4 @@
-"""Two clouds of the same particles, unlinked: which one is which.
+"""Correspondence of two unlinked clouds of the same particles.
 
 Nobody moves at first by less than half a spacing: where most neighbours agree on their nearest
 partner, links are taken. From there a front walks on: an unlinked particle is predicted by the

@@ -1,4 +1,4 @@
-"""Tracked markers: registered at rest, read from a run where they sit in the body."""
+"""Tracked markers: registered at rest, interpolated from a run at their material points."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ BEYOND = 6.0  # standard deviations per axis that noise does not explain
 def require_steady_labels(
     names: tuple[str, ...], rest: Floats, x: Floats, t: Floats, sd: float
 ) -> None:
-    """Raises `RegistrationError` naming markers of x (nt, k, 3) m that changed places.
+    """Raise `RegistrationError` naming markers of x (nt, k, 3) m that changed places.
 
     A compressed body moves its surface nearly affinely: rest (k, 3) m is carried to every instant
     by the affine map that fits best, and each marker must lie nearest to its own image, unless the
@@ -136,8 +136,8 @@ class MarkerObservation:
         return self.positions
 
     def within(self, mesh: Mesh) -> "MarkerObservation":
-        """The markers that lie in a mesh of part of the body (within 0.1 mm); the registration
-        stays that of all of them."""
+        """Return the markers that lie in a mesh of part of the body (within 0.1 mm); the
+        registration stays that of all of them."""
         rows = barycentric_rows(mesh, self.rest)
         kept = np.flatnonzero(rows.outside <= _INSIDE)
         return replace(
@@ -179,8 +179,8 @@ class MarkerObservation:
         return History(self.name, self.t, self.names, measured, simulated, "m", self.sd, each=True)
 
     def anew(self, left: Floats, draw: AnyDraw) -> "MarkerObservation":
-        """The markers where `left` (nt k d,) m has them; registration, which all samples share,
-        clock and noise drawn."""
+        """Return the markers where `left` (nt k d,) m has them; registration, which all samples
+        share, clock and noise drawn."""
         nt, _, d = self.x.shape
         exact = (self.x + left.reshape(self.x.shape)).reshape(nt, -1)
         x = shifted(self.t, exact, draw.lateness(self.sd_t)).reshape(self.x.shape)
@@ -290,8 +290,8 @@ def observe_markers(
     stands: float = 0.0,
     registration: Registration | None = None,
 ) -> MarkerObservation:
-    """Registers the markers' first instant (rest) to their layout (3,) m; frozen for the rest.
-    A `registration` that is known already is taken as it is.
+    """Register the markers' first instant (rest) to their layout (3,) m; frozen for the rest. A
+    `registration` that is known already is taken as it is.
 
     `up` is one direction in the markers' frame and in the scene's: without it a planar set that
     was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane

@@ -1,4 +1,4 @@
-"""How good a point registration is: errors at the markers, at the target, mirrors and outliers.
+"""Quality measures of a point registration: FRE, TRE, mirror images and outliers.
 
 FLE is the localisation error of one marker, FRE the residual at the markers, TRE the error at a
 point of interest; all are rms distances in m over all d axes. FRE is no accuracy: it does not know
@@ -53,12 +53,13 @@ class Outlier(NamedTuple):
 
 
 def least_squares(scaled: bool) -> Fit:
-    """The rigid fit, or the one with a scale."""
+    """Return the rigid fit, or the one with a scale."""
     return fit_similarity if scaled else fit_rigid
 
 
 def chi_square_bound(dof: int, p: float = P_EXCESS) -> float:
-    """The value that a chi-square with `dof` degrees of freedom exceeds with probability p."""
+    """Return the value that a chi-square with `dof` degrees of freedom exceeds with probability
+    p."""
     return float(chdtri(dof, p))
 
 
@@ -120,7 +121,7 @@ def looks_mirrored(found: Reflection, bound: float) -> bool:
 
 
 def fitted_scale(source: Floats, target: Floats, noise: float) -> Scale:
-    """The scale of points (k, d) m with noise m per axis in the source, unbiased by it.
+    """Return the scale of points (k, d) m with noise m per axis in the source, unbiased by it.
 
     Fitted onto the source, where the noise is; sd of a relative scale as in `target_covariance`.
     """

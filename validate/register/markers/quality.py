@@ -1,4 +1,4 @@
-"""Registration of named markers: the fit, its quality, and what looks wrong with the points.
+"""Registration of named markers: fit, quality, and suspicious points.
 
 Fit on the rest state once, rigid, then freeze: refitting at every step, or fitting a free matrix,
 absorbs the deformation that is to be compared. Nothing is dropped or relabelled in silence: markers

@@ -1,4 +1,4 @@
-"""Do the names fit the points? Relabelling by iterated closest assignment.
+"""Check of marker names: relabelling by iterated closest assignment.
 
 Given labels are never changed: a better labelling is only reported. With points alone, labels that
 are wrong by a symmetry of the marker set (a regular grid turned by half a turn) fit as well as the
@@ -38,7 +38,8 @@ class Relabelling:
 
 
 def relabellings(source: Floats, target: Floats, fit: Fit, noise: float) -> tuple[Relabelling, ...]:
-    """The best labelling found, followed by others equally good; points (k, d) m, noise m per axis.
+    """Return the best labelling found, followed by others equally good; points (k, d) m, noise m
+    per axis.
 
     Starts from the given labels; unless moving fewer than half of them explains the excess
     (`label_fault`), also from the principal axes of both sets, with `TURNS` rotations about the
@@ -62,7 +63,7 @@ def relabellings(source: Floats, target: Floats, fit: Fit, noise: float) -> tupl
 def label_fault(
     names: Sequence[str], source: Floats, target: Floats, fit: Fit, noise: float
 ) -> str | None:
-    """What is wrong with the labels, in one line, or None.
+    """Return the fault of the labels in one line, or None.
 
     A labelling explains an excess when it lowers the rms residual of the markers it moves
     `CLEARLY` times, down to the declared noise or below `NEAR` of the marker spacing (unrelated

@@ -1,4 +1,4 @@
-"""Marker displacements since rest: errors of the layout cancel; a wrong rotation does not."""
+"""Marker displacements since rest: layout errors cancel; a wrong rotation does not."""
 
 from dataclasses import replace
 
@@ -14,8 +14,8 @@ from validate.scene.mesh import Mesh
 
 
 def rested(markers: Markers, still: float) -> tuple[Markers, tuple[str, ...], int]:
-    """The markers with their mean over the first `still` s as the first sample, those that were
-    not seen then, and the fewest samples such a mean is of.
+    """Return the markers with their mean over the first `still` s as the first sample, those that
+    were not seen then, and the fewest samples such a mean is of.
 
     Raises `RegistrationError` where none of them was seen.
     """
@@ -46,7 +46,8 @@ def noise(markers: Markers) -> float:
 def since_rest(
     whole: MarkerObservation, mesh: Mesh, sd: float, samples: int, stands: float
 ) -> MarkerObservation:
-    """The registered markers from where they stood at rest, a mean of so many samples; `sd` m.
+    """Return the registered markers from where they stood at rest, a mean of so many samples; `sd`
+    m.
 
     Raises `RegistrationError` for one that stands off the body by more than `stands` m, with the
     factor where its unit is another one.

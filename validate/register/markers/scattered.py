@@ -1,4 +1,4 @@
-"""Values known at scattered points: local polynomials through the nearest of them."""
+"""Interpolation of scattered values: local polynomials through the nearest points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

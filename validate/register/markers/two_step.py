@@ -1,4 +1,4 @@
-"""The two-step least-squares registration of planar markers of paper 000.
+"""Two-step least-squares registration of planar markers (paper 000).
 
 Gosline, Salcudean, Yan, "Haptic simulation of linear elastic media with fluid pockets" (2004),
 section 4.5: the undeformed markers are fitted to a plane, then linear least squares compensates
@@ -41,7 +41,7 @@ class Plane(NamedTuple):
 
 
 def fit_plane(points: ArrayLike, name: str = "points", up: ArrayLike | None = None) -> Plane:
-    """The total least squares plane of points (k, 3) m, its normal on the side of `up` (3,).
+    """Return the total least squares plane of points (k, 3) m, its normal on the side of `up` (3,).
 
     Raises `RegistrationError` for degenerate sets, a set without a plane (third over second rms
     spread above `PLANAR`) and an `up` within the plane.

@@ -1,4 +1,4 @@
-"""A circle through a measured outline, with the uncertainty of its centre and radius."""
+"""Circle fit of a measured outline, with the uncertainty of its centre and radius."""
 
 from dataclasses import dataclass
 

@@ -42,7 +42,7 @@ def angular_points(outline: Floats, angles: Floats) -> Floats:
 
 
 def outline_places(angles: Floats) -> tuple[str, ...]:
-    """Names of places at polar angles (a,) rad."""
+    """Return the names of places at polar angles (a,) rad."""
     return tuple(f"outline at {deg:.0f} deg" for deg in np.rad2deg(angles))
 
 
@@ -62,7 +62,7 @@ def ray_points(outline: Floats, angles: Floats) -> Floats:
 
 
 def at_normals(outline: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """The outline's vertices nearest to points (m, 2) m, and the outward normals there."""
+    """Return the outline's vertices nearest to points (m, 2) m, and the outward normals there."""
     nearest = cdist(points, outline).argmin(axis=1)
     across = normals(outline)
     middle = enclosed(outline)[1]

@@ -1,4 +1,4 @@
-"""Where the inclusion is: its rest outline in the image, checked against the declared sweep."""
+"""Pose of an inclusion: its rest outline in the image, checked against the declared sweep."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Outlines seen in an image plane, against the section of the deformed wall with that plane."""
+"""Outlines in an image plane, against the section of the deformed wall with that plane."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -71,11 +71,11 @@ class OutlineObservation:
     sds: Floats | None = None
 
     def simulated(self, u: Floats) -> Floats:
-        """The section (k, 2) m of the deformed wall with the image plane."""
+        """Return the section (k, 2) m of the deformed wall with the image plane."""
         return section(self.wall.deformed(u), self.wall.triangles, self.pose)
 
     def measured(self, t: float) -> Floats:
-        """The outline (k, 2) m nearest in time."""
+        """Return the outline (k, 2) m nearest in time."""
         return self.outlines[nearest_sample(self.t, t, self.name)]
 
     def _sd_at(self, *times: float) -> float:
@@ -132,7 +132,8 @@ class OutlineObservation:
         )
 
     def anew(self, left: Floats, draw: AnyDraw) -> "OutlineObservation":
-        """The outlines where `left` (2 k,) m has them; clock and noise (along normals) drawn."""
+        """Return the outlines where `left` (2 k,) m has them; clock and noise (along normals)
+        drawn."""
         ends = np.cumsum([len(o) for o in self.outlines])[:-1]
         moves = np.split(left.reshape(-1, 2), ends)
         exact = [o + move for o, move in zip(self.outlines, moves, strict=True)]

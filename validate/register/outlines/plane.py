@@ -1,4 +1,4 @@
-"""Image planes: poses, and the section of a deformed surface with the plane of an image."""
+"""Image planes: poses, and the section of a deformed surface with an image plane."""
 
 from dataclasses import dataclass
 
@@ -88,7 +88,7 @@ def from_image(pose: Floats, points: Floats) -> Floats:
 
 
 def require_rigid(pose: Floats, name: str) -> None:
-    """Raises `RegistrationError` when a pose is not a proper rotation and translation."""
+    """Raise `RegistrationError` when a pose is not a proper rotation and translation."""
     R = pose[:3, :3]
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > 1e-6 or np.linalg.det(R) < 0 or not np.allclose(pose[3], [0, 0, 0, 1]):
@@ -99,7 +99,8 @@ def require_rigid(pose: Floats, name: str) -> None:
 
 
 def section(points: Floats, triangles: Ints, pose: Floats) -> Floats:
-    """The closed outline (k, 2) m, image coordinates, where a surface crosses the image plane.
+    """Return the closed outline (k, 2) m, image coordinates, where a surface crosses the image
+    plane.
 
     Raises `RegistrationError` when the plane misses the surface.
     """

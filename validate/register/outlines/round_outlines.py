@@ -1,4 +1,4 @@
-"""Outlines of a round body, image by image: its diameter, against that of a rigid circle."""
+"""Diameter of a round body's outlines, image by image, against a rigid circle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -63,7 +63,7 @@ class RoundOutlines:
         return {self.name: "m"}
 
     def left(self, run: Simulated) -> Floats:
-        """The body's diameter less those of the circles (nt,) m."""
+        """Return the body's diameter less those of the circles (nt,) m."""
         return self._lengths(run)[np.clip(np.searchsorted(run.t, self.t), 0, len(run.t) - 1)] - (
             self.diameters
         )

@@ -1,4 +1,4 @@
-"""From a sweep of parallel images to the inclusion's surface (paper 000, section 4.4).
+"""Surface of an inclusion from a sweep of parallel images (paper 000, section 4.4).
 
 The paper takes images at 2 mm steps across the inclusion's long axis and reads centre and radius
 off each by hand. Here each slice keeps its free outline beside, because the circle is an assumption
@@ -59,8 +59,8 @@ class Stack:
 
 
 def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
-    """The stack of outlines whose image plane lay at positions (m,) m along its normal at times t
-    (m,) s; `sweep.pose` is that at position 0.
+    """Return the stack of outlines whose image plane lay at positions (m,) m along its normal at
+    times t (m,) s; `sweep.pose` is that at position 0.
 
     Raises `RegistrationError` for fewer than 3 slices, two at one place, one missing between
     others, neighbours that share no point, outlines far from a circle, or an inclusion that is
@@ -229,7 +229,8 @@ def _end(at: Floats, radii: Floats, step: float) -> float:
 
 
 def surface_of(stack: Stack, free: float = 0.0) -> SlicedShape:
-    """The inclusion's surface in scene coordinates: circles as in the paper (0), the outlines (1),
+    """Return the inclusion's surface in scene coordinates: circles as in the paper (0), the
+    outlines (1),
 
     smoothed, or what lies between and beyond. Every section keeps its area.
     """

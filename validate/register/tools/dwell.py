@@ -1,4 +1,4 @@
-"""Where a tracked tip stands still: dwells, and the place of each with its uncertainty.
+"""Dwells of a tracked tip: intervals at rest, and the position of each with uncertainty.
 
 A tip that stands on a point while its stylus is turned wanders: the offset of the tip is known only
 so well, and a tracker is distorted. That wander is no noise, and its mean over a dwell is not
@@ -41,8 +41,8 @@ class Dwell:
         return rms(self.x - self.centre) / float(np.sqrt(3))
 
     def touch(self, seconds: float, within: float) -> "Dwell":
-        """The first `seconds` in which the tip holds `within` m of its mean; of a tip that never
-        does, those in which it wanders least."""
+        """Return the first `seconds` in which the tip holds `within` m of its mean; of a tip that
+        never does, those in which it wanders least."""
         step = float(np.median(np.diff(self.t)))
         k = min(max(round(seconds / step), 1), len(self.t))
         smooth = median_filter(self.x, (_SPIKE, 1), mode="nearest")

@@ -1,4 +1,4 @@
-"""Where the image plane of a tracked probe lies, from points that were seen in its images.
+"""Image-plane calibration of a tracked probe, from points that are visible in its images.
 
 A point at pixel (u, v) of image k lies at R_k (T (s_x u, s_y v, 0)) + t_k in the tracker's frame, T
 the rigid transform from the image to the probe, (R_k, t_k) the tracked pose of the probe. It must
@@ -103,7 +103,7 @@ class ImagePlane:
 
 
 def image_plane(seen: SeenPoints) -> ImagePlane:
-    """Raises `RegistrationError` for too few points, and for ones that leave a motion of the plane
+    """Raise `RegistrationError` for too few points, and for ones that leave a motion of the plane
     open, as wires seen from one direction do."""
     pose, scale, J = _fitted(seen)
     off = _misses(seen, pose, scale)

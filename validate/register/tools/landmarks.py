@@ -1,5 +1,4 @@
-"""Landmarks of a rigid body that a tracked tip touched: its pose, and each landmark predicted from
-the others.
+"""Landmarks of a rigid body from a tracked tip: pose, and leave-one-out prediction.
 
 What the pose was fitted on is no evidence of it. Left out one by one, every landmark is.
 """
@@ -43,7 +42,7 @@ class Match:
     rms: float
 
     def has(self, known: tuple[int, int, int], seen: Ints) -> bool:
-        """Whether those landmarks are at those places."""
+        """Return whether those landmarks are at those places."""
         at = dict(zip(self.known.tolist(), self.seen.tolist(), strict=True))
         return bool([at.get(k) for k in known] == seen.tolist())
 

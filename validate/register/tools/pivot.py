@@ -1,4 +1,4 @@
-"""Pivot calibration: the tip of a tracked tool, from poses while the tip stands on a point.
+"""Pivot calibration: tip of a tracked tool from rotations about a fixed point.
 
 R_i p + T_i = c for every pose i: the tip p in the tool's frame and the point c follow by linear
 least squares (the algebraic one step of Yaniv, "Which pivot calibration?", Proc. SPIE 9415, 2015);
@@ -42,7 +42,7 @@ class Pivot:
 
 
 def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
-    """The tip from rotations R (n, 3, 3) and places T (n, 3) m; `point` (n,) counts from 0.
+    """Return the tip from rotations R (n, 3, 3) and places T (n, 3) m; `point` (n,) counts from 0.
 
     Poses that lie beyond four standard deviations of the others, while the tip came or left, are
     not used. The standard deviation is found by leaving out parts in time, so that noise that lasts

@@ -1,4 +1,4 @@
-"""Charts as pictures: axes, looks, heats, intervals.
+"""Charts as figures: axes, line styles, heat maps, intervals.
 
 Start with `chart`.
 """

@@ -1,4 +1,4 @@
-"""One axes of a chart: lines, points, bands, named levels, and ticks that can be read."""
+"""One axes of a chart: lines, points, bands, named levels, and readable ticks."""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -52,7 +52,7 @@ def fill_axes(ax: Axes, chart: Chart, drawn: Sequence[Drawn]) -> None:
 
 
 def levels(chart: Chart) -> list[tuple[str, float]]:
-    """The levels that the axis can show, the lowest first."""
+    """Return the levels that the axis can show, the lowest first."""
     shown = [(name, y) for name, y in chart.levels if y > 0 or "y" not in chart.log]
     return sorted(shown, key=lambda pair: pair[1])
 
@@ -99,14 +99,14 @@ def floor_of(chart: Chart) -> float:
 
 
 def beneath(chart: Chart) -> tuple[str, ...]:
-    """The names of what lies there altogether."""
+    """Return the names of what lies there altogether."""
     floor = floor_of(chart)
     low = [s for s in chart.series if floor and s.style != "band" and (s.y < floor).all()]
     return tuple(dict.fromkeys(s.name for s in low))
 
 
 def cut_dips(ax: Axes, chart: Chart) -> None:
-    """Ends a logarithmic axis below where lines only pass through zero, and above rounding."""
+    """End a logarithmic axis below where lines only pass through zero, and above rounding."""
     floor = floor_of(chart)
     if not floor:
         return

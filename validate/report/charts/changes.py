@@ -1,4 +1,4 @@
-"""Relative changes of scores as a picture: one line a score, read without colour."""
+"""Relative changes of scores as a figure: one line per score, readable without colour."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""A chart as a picture: all lines on one axes, or one axes a line where they could not be followed.
+"""Chart as a figure: all lines on one axes, or one axes per line where they would overlap.
 
 The legend lies below the axes. What lies below rounding on a logarithmic axis is named and not
 drawn.
@@ -46,7 +46,7 @@ _NAME = 60  # letters of a legend's entry in one line
 
 
 def picture(result: HasMethods, chart: Chart) -> Picture:
-    """The chart drawn; series named after a method have its colour of all other figures."""
+    """Return the chart drawn; series named after a method have its colour of all other figures."""
     pixels = draw(*drawing(result, chart))
     names = "; ".join(dict.fromkeys(s.name for s in chart.series))
     scale = {"x": " Logarithmic x.", "y": " Logarithmic y.", "xy": " Logarithmic axes."}
@@ -76,7 +76,7 @@ def _floor(chart: Chart) -> str:
 
 
 def drawing(result: HasMethods, chart: Chart) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     labels = panel_labels(chart)
     if labels:
         return _one_each(result, chart, labels)

@@ -1,4 +1,4 @@
-"""Two channels on one clock in one chart: do they show the same motion at the same time?"""
+"""Chart of two channels on one clock, for a visual check of their alignment."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""Pictures as files and as data URIs: PNG and GIF in the folder, the smaller WebP in the page."""
+"""Encoding of figures: PNG and GIF files, and smaller WebP data URIs for the page."""
 
 import base64
 from dataclasses import dataclass
@@ -33,8 +33,8 @@ def encoded(picture: Picture) -> EncodedPicture: ...
 @overload
 def encoded(picture: Picture | Animation) -> EncodedPicture | EncodedAnimation: ...
 def encoded(picture: Picture | Animation) -> EncodedPicture | EncodedAnimation:
-    """The picture as a PNG for the folder and a lossless WebP for the page (lossy for a photo), an
-    animation as a GIF for both."""
+    """Return the picture as a PNG for the folder and a lossless WebP for the page (lossy for a
+    photo), an animation as a GIF for both."""
     if isinstance(picture, EncodedPicture | EncodedAnimation):
         return picture
     own = vars(picture)
@@ -45,7 +45,7 @@ def encoded(picture: Picture | Animation) -> EncodedPicture | EncodedAnimation:
 
 
 def png(picture: Picture) -> bytes:
-    """A PNG; line art in 256 colours, which it does not exceed visibly."""
+    """Return a PNG; line art in 256 colours, which it does not exceed visibly."""
     image = Image.fromarray(picture.pixels)
     if not picture.photo:
         image = image.quantize(256, dither=Image.Dither.NONE)
@@ -55,7 +55,7 @@ def png(picture: Picture) -> bytes:
 
 
 def gif(animation: Animation) -> bytes:
-    """An endless GIF in one palette, so that only what moves is stored again."""
+    """Return an endless GIF in one palette, so that only what moves is stored again."""
     frames = [Image.fromarray(f) for f in animation.frames]
     palette = frames[0].quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
     first, *others = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames]
@@ -68,7 +68,7 @@ def gif(animation: Animation) -> bytes:
 
 
 def uri(picture: Picture | Animation) -> str:
-    """A data URI: GIF of what moves, else WebP, lossless for line art."""
+    """Return a data URI: GIF of what moves, else WebP, lossless for line art."""
     return encoded(picture).uri
 
 

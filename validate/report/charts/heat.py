@@ -1,4 +1,4 @@
-"""Numbers over two axes as coloured squares, each with its number where there is room."""
+"""Heat map: numbers over two axes as coloured squares, labelled where there is room."""
 
 import matplotlib as mpl
 import numpy as np
@@ -19,7 +19,7 @@ _EMPTY = "#BDBDBD"
 
 
 def picture(heat: Heat) -> Picture:
-    """The heat drawn; squares without a number are grey."""
+    """Return the heat drawn; squares without a number are grey."""
     rows, columns = heat.values.shape
     turn = "" if heat.centre is None else f" White is {heat.centre:g}."
     scale = " Logarithmic colours." if _logarithmic(heat.values) else ""
@@ -35,7 +35,7 @@ def picture(heat: Heat) -> Picture:
 
 
 def drawing(heat: Heat) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     rows, columns = heat.values.shape
     width = min(max(columns * _CELL[0], 3.0), _LARGEST[0])
     height = min(max(rows * _CELL[1], 1.6), _LARGEST[1])

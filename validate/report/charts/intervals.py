@@ -1,4 +1,4 @@
-"""Errors with their intervals against their limits as one picture: a line for each check."""
+"""Error intervals against their limits as one figure, one line per check."""
 
 from textwrap import fill
 
@@ -18,7 +18,7 @@ _COLOURS = {"good enough": PALETTE[2], "not distinguishable": PALETTE[2],
 
 
 def picture(shown: Intervals) -> Picture:
-    """The intervals drawn, at most `_MOST`: the largest shares of their limits."""
+    """Return the intervals drawn, at most `_MOST`: the largest shares of their limits."""
     _, _, of = shares(shown)
     order = _order(shown)
     left = len(shown.labels) - len(order)
@@ -35,7 +35,7 @@ def picture(shown: Intervals) -> Picture:
 
 
 def drawing(shown: Intervals) -> Drawing:
-    """What fills the figure, and its width and height in inches."""
+    """Return the function that fills the figure, and its width and height in inches."""
     high = _ROOM + _LINE * max(1, len(_order(shown)))
     return lambda f: _fill(f, shown), WIDTH, high
 

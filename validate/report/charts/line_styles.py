@@ -37,7 +37,7 @@ class Drawn:
 
 
 def panel_labels(chart: Chart) -> tuple[str, ...]:
-    """The labels that get axes of their own; none where one axes shows all lines apart."""
+    """Return the labels that get axes of their own; none where one axes shows all lines apart."""
     lines = [s for s in chart.series if s.style == "line" and not is_given(s)]
     labels = tuple(dict.fromkeys(s.label for s in lines))
     jagged = sum(is_jagged(s) for s in lines)
@@ -132,7 +132,7 @@ def _known(result: HasMethods) -> Mapping[str, Style]:
 
 
 def is_given(one: Series) -> bool:
-    """A line named a reference; points that say measured."""
+    """Return a line named a reference; points that say measured."""
     if one.style == "line":
         return one.label.lower().startswith("reference")
     return one.style == "points" and "measured" in one.label.lower()
@@ -144,6 +144,6 @@ def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
 
 
 def is_jagged(series: Series) -> bool:
-    """A line that turns so often that dashes could not be told from its turns."""
+    """Return a line that turns so often that dashes could not be told from its turns."""
     turns = np.count_nonzero(np.diff(np.sign(np.diff(series.y))))
     return bool(turns > max(_TURNS, 0.1 * len(series.y)))

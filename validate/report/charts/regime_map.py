@@ -1,4 +1,4 @@
-"""What happens over a logarithmic axis and rows, as coloured squares: one panel a method.
+"""Regime map: outcomes over a logarithmic axis as coloured squares, one panel per method.
 
 Colours, hatches and words tell regimes apart; the predicted border is a line, named settings are
 marks.
@@ -26,7 +26,7 @@ _SIGNS = ("o", "s", "D", "^", "v", "P")
 
 
 def picture(shown: RegimeMap) -> Picture:
-    """The map drawn; its caption explains line and marks."""
+    """Return the map drawn; its caption explains line and marks."""
     columns = min(_COLUMNS, len(shown.panels))
     rows = -(-len(shown.panels) // columns)
     height = _PANEL + _ROW * len(shown.rows)

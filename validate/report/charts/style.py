@@ -1,4 +1,4 @@
-"""How figures look: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
+"""Figure style: Okabe-Ito colours, fonts, rasterising without matplotlib's global state.
 
 Figures are `WIDTH` wide where they can be: a telephone and a printed page show that much with
 letters that can be read.
@@ -62,7 +62,7 @@ class Style:
 
 
 class NamedMethod(Protocol):
-    """What figures ask of a method."""
+    """Attributes of a method that figures use."""
 
     @property
     def name(self) -> str: ...
@@ -95,7 +95,7 @@ def looks(result: HasMethods) -> dict[str, Style]:
 
 
 def free_look(i: int, colour: str) -> Style:
-    """The look of line i that is no method: the first solid, the others dashed in turn."""
+    """Return the look of line i that is no method: the first solid, the others dashed in turn."""
     if i == 0:
         return Style(colour, "-", "o", 1.5)
     return Style(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
@@ -138,7 +138,7 @@ def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels
 
 
 def painted(paint: Callable[[Figure], None], width: float, height: float) -> Figure:
-    """The figure itself, laid out and drawn."""
+    """Return the figure itself, laid out and drawn."""
     settings: Any = dict(_SETTINGS)
     with mpl.rc_context(settings):
         figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
@@ -161,14 +161,14 @@ def panels(figure: Figure, count: int, columns: int) -> tuple[list[Axes], list[A
 
 
 def legend_below(figure: Figure, ax: Axes, width: float = WIDTH) -> Legend:
-    """The legend of an axes below the whole figure."""
+    """Return the legend of an axes below the whole figure."""
     handles, labels = ax.get_legend_handles_labels()
     columns = legend_columns(labels, width)
     return figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def legend_columns(labels: Sequence[str], width: float = WIDTH) -> int:
-    """How many columns of a legend of these labels fit below a figure."""
+    """Return the number of legend columns that fit below a figure."""
     widest = max(len(line) for label in labels for line in label.splitlines())
     return max(1, min(len(labels), int(width / (_HANDLE + _LETTER * widest))))
 

@@ -1,1 +1,1 @@
-"""Results for other programs: tables, Parquet, NetCDF, ParaView, JUnit, LaTeX."""
+"""Export of results: tables, Parquet, NetCDF, ParaView, JUnit, LaTeX."""

@@ -1,4 +1,4 @@
-"""Fields and traces of runs as NetCDF-4 files, one a method and recording, read back by xarray.
+"""NetCDF-4 files of fields and traces, one per method and recording, read back by xarray.
 
 from validate.report import open_fields
 u = open_fields("reports/silicone_beam", "newmark").u  # (frame, node, axis), m

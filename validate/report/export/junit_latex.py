@@ -22,7 +22,7 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 
 
 def junit(content: Json) -> str:
-    """A suite for the verdict over all checks, one a method, one for printed figures.
+    """Return a suite for the verdict over all checks, one a method, one for printed figures.
 
     It fails where `validate run` does: a requirement that is not met, and, where nothing is
     required, a difference from zero; one that differs by itself but not after Holm's correction
@@ -124,7 +124,7 @@ def _clean(text: str) -> str:
 
 
 def tabular(table: NumberTable, remark: str = "") -> str:
-    """A table as LaTeX's `tabular` (no package is needed), entries as a page shows them."""
+    """Return a table as LaTeX's `tabular` (no package is needed), entries as a page shows them."""
     words = word_columns(table)
     columns = "".join("l" if i in words else "r" for i in range(len(table.headings)))
     rows = [" & ".join(map(_entry, map(_text, row))) for row in table.rows]

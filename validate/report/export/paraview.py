@@ -1,4 +1,4 @@
-"""Runs as ParaView opens them: a collection (.pvd) of bodies (.vtu) and measured markers (.vtp)."""
+"""ParaView files: a collection (.pvd) of bodies (.vtu) and measured markers (.vtp)."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tables of numbers: how an entry reads on the page, and tables and charts as CSV files."""
+"""Tables of numbers: format of entries on the page, and tables and charts as CSV files."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,7 @@ _SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
 
 
 def shown(entry: Entry | TableCell) -> str:
-    """An entry as read: three significant digits, whole numbers whole, a dash for None."""
+    """Return an entry as read: three significant digits, whole numbers whole, a dash for None."""
     if isinstance(entry, TableCell):
         return _SIGNS.get(entry.emphasis, "") + (entry.text or _measured(entry.value, entry.unit))
     if entry is None:
@@ -28,18 +28,19 @@ def _measured(value: Entry, unit: str) -> str:
 
 
 def unit_cell(unit: str) -> TableCell:
-    """An SI unit in a table whose numbers are SI: it reads as the unit that they are shown in."""
+    """Return an SI unit in a table whose numbers are SI: it reads as the unit that they are shown
+    in."""
     return TableCell(unit, text=shown_unit(unit))
 
 
 def word_columns(table: NumberTable) -> tuple[int, ...]:
-    """The columns that hold text; the others hold numbers."""
+    """Return the columns that hold text; the others hold numbers."""
     columns = list(zip(*table.rows, strict=True))
     return tuple(i for i, c in enumerate(columns) if any(isinstance(plain(v), str) for v in c))
 
 
 def across(table: NumberTable) -> tuple[int, ...]:
-    """The columns beside each other: all but the one whose texts stand below the rows."""
+    """Return the columns beside each other: all but the one whose texts stand below the rows."""
     return tuple(i for i, h in enumerate(table.headings) if not table.below or h != table.below)
 
 

@@ -1,4 +1,4 @@
-"""Messages in Foxglove's well-known schemas, in Protobuf. Owns foxglove-schemas-protobuf.
+"""Messages in Foxglove's well-known schemas, in Protobuf, by foxglove-schemas-protobuf.
 
 Lengths m, colours 0..1, rotations x y z w.
 """
@@ -88,7 +88,7 @@ def _transform(ns: int, parent: str, child: str, pose: Floats) -> FrameTransform
 
 
 def picture(ns: int, frame: str, png: bytes) -> bytes:
-    """An image as PNG."""
+    """Return an image as PNG."""
     return _encoded(CompressedImage(timestamp=_time(ns), frame_id=frame, data=png, format="png"))
 
 
@@ -98,7 +98,7 @@ def scene_update(*entities: Entity) -> bytes:
 
 
 def outline(ns: int, frame: str, name: str, points: Floats, colour: Rgba, **notes: str) -> Entity:
-    """The closed line through points (k, 2) m in the plane z = 0 of `frame`."""
+    """Return the closed line through points (k, 2) m in the plane z = 0 of `frame`."""
     line = LinePrimitive(
         type=LinePrimitive.LINE_LOOP,
         pose=_AT_ORIGIN,

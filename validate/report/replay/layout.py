@@ -1,4 +1,4 @@
-"""replay.layout.json: which panels show a replay, to be imported in Foxglove or Lichtblick.
+"""replay.layout.json: panels of a replay for Foxglove or Lichtblick.
 
 The form is that in which both export a layout: panels by id, and a tree of splits. One recording:
 its bodies, outlines and markers beside its images and one plot a signal, measured and simulated;
@@ -23,7 +23,7 @@ Shown = Sequence[tuple[ReplayView, Sequence[Track]]]
 
 
 def layout(shown: Shown) -> str:
-    """The layout of the topics of every recording, as JSON."""
+    """Return the layout of the topics of every recording, as JSON."""
     panels: dict[str, Json] = {}
     tabs = [{"title": _title(view), "layout": _recording(view, tracks, panels)}
             for view, tracks in shown if tracks]  # fmt: skip

@@ -1,4 +1,4 @@
-"""replay.mcap: measurement and simulation in one timeline, to be opened in Foxglove or Rerun.
+"""replay.mcap: measurement and simulation in one timeline for Foxglove or Rerun.
 
 Topics, after /<recording> where there are several; X is `measured` or `simulated`:
 

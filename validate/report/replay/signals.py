@@ -1,4 +1,4 @@
-"""Topics of a replay that are no geometry: signals and images over time."""
+"""Topics of a replay over time: signals and images."""
 
 from dataclasses import replace
 
@@ -84,10 +84,10 @@ def _images(view: ReplayView, topic: str, frames: Frames) -> Track:
 
 
 def one_in(count: int, most: int) -> int:
-    """The step that leaves at most `most` of `count`."""
+    """Return the step that leaves at most `most` of `count`."""
     return max(1, -(-count // max(1, most)))
 
 
 def thinned(every: int, count: int, what: str) -> str:
-    """What a step left out, in words; empty when nothing."""
+    """Return the share of kept samples in words, "one in 3"; empty for all of them."""
     return f"one in {every} of {count} {what}" if every > 1 else ""

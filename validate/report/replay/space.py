@@ -1,4 +1,4 @@
-"""Topics of a replay that lie in space: outlines, markers, the simulated surface, transforms.
+"""Topics of a replay in space: outlines, markers, the simulated surface, transforms.
 
 Numbers (`validate.Contour`, `validate.Markers`) are those of the comparison, at the measured times
 and at the loads; `.../scene` and `.../points` are to look at and add interpolated instants: the

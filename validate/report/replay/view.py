@@ -1,4 +1,4 @@
-"""What a replay is made from: one recording with one run, and the topics that come of it."""
+"""Input of a replay: one recording with one run, and the topics made from it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ class ReplayView:
         return recorded.frame if recorded else "machine"
 
     def local(self, name: str) -> str:
-        """The name of a frame of this recording only, never the scene's."""
+        """Return the name of a frame of this recording only, never the scene's."""
         named = f"{self.prefix[1:]}/{name}" if self.prefix else name
         return f"{named} as recorded" if named == self.frame else named
 
@@ -83,7 +83,7 @@ class ReplayView:
         note: str = "",
         records: Records = (),
     ) -> Track:
-        """A topic (its prefix added) at times (n,) s: message(ns, i) is that of number i."""
+        """Return a topic (its prefix added) at times (n,) s: message(ns, i) is that of number i."""
         named = self.prefix + topic
         ns = stamps_ns(self.recording.t0_ns, np.asarray(t, dtype=np.float64), named)
         return Track(named, schema, ns, lambda i: message(int(ns[i]), i), note, records)
@@ -105,12 +105,12 @@ class ReplayView:
 
 
 def over_time(view: ReplayView) -> bool:
-    """The run's fields are output frames at their own times, not those at loads."""
+    """Return whether fields are output frames at their own times, not at load steps."""
     return view.run is not None and not holds(view.registered)
 
 
 def load_of(instant: Instant) -> str:
-    """The load of an instant in words, or its time."""
+    """Return the load of an instant in words, or its time."""
     if instant.hold:
         return spaced(instant.hold.label)
     if instant.computed:
@@ -119,5 +119,5 @@ def load_of(instant: Instant) -> str:
 
 
 def pose_records(topic: str, pose: Floats) -> Records:
-    """The record in which our readers find T_frame_from_image (4, 4) of a topic."""
+    """Return the record in which our readers find T_frame_from_image (4, 4) of a topic."""
     return ((POSE + topic, {POSE_KEY: " ".join(repr(v) for v in pose.ravel().tolist())}),)

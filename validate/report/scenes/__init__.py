@@ -1,4 +1,4 @@
-"""Pictures of the body and of what was measured on it: renders, outlines, markers.
+"""Figures of the body and its measurements: renders, outlines, markers.
 
 Start with `bodies`.
 """

@@ -1,4 +1,4 @@
-"""The outline through the load: the measured one over the simulated one, moving."""
+"""Animation of an outline over the load: measured over simulated."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -34,7 +34,8 @@ class _Shot:
 
 
 def moving_outline(method: MethodResult) -> tuple[Animation, ...]:
-    """The last load first, as the still; then from rest through all loads. None without loads."""
+    """Return the last load first, as the still; then from rest through all loads. None without
+    loads."""
     seen = outline_seen(method)
     count = min(len(holds(method.registered[0])), len(method.run.u)) if method.registered else 0
     if seen is None or count < 2:
@@ -71,7 +72,7 @@ def _shot(simulated: Floats, measured: Floats, instant: Instant) -> _Shot:
 
 
 def closed(points: Floats) -> Floats:
-    """An outline (k, 2) m as a closed line (k + 1, 2) mm."""
+    """Return an outline (k, 2) m as a closed line (k + 1, 2) mm."""
     return np.asarray(_MM * np.vstack([points, points[:1]]))
 
 

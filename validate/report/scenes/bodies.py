@@ -1,4 +1,4 @@
-"""The section that shows the simulated body: rendered where GL is, else drawn."""
+"""Report section of the simulated body: rendered where OpenGL is available, else drawn."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ _M, _MM = 1e-3, 1e3
 
 
 def body(result: Result) -> Exhibit | None:
-    """Renders of the accepted method at the last load; None when there is no 3-D body."""
+    """Render of the accepted method at the last load; None when there is no 3-D body."""
     shown = shown_body(result)
     if shown is None:
         return None

@@ -28,7 +28,7 @@ from validate.scene.scene import Scene, Weight
 
 
 def flattest(points: Floats) -> tuple[list[int], int | None]:
-    """The two axes that points (k, d) spread over most, and the one across; None in 2-D."""
+    """Return the two axes that points (k, d) spread over most, and the one across; None in 2-D."""
     spread = np.ptp(points, axis=0)
     across = int(np.argmin(spread)) if len(spread) == 3 else None
     return [i for i in range(len(spread)) if i != across], across
@@ -102,7 +102,7 @@ class ShownBody:
 
 
 def shown_body(result: Result) -> ShownBody | None:
-    """The accepted method's body at its last load, or where a run over time moves it most.
+    """Return the accepted method's body at its last load, or where a run over time moves it most.
 
     None in 2-D or when nothing finished.
     """

@@ -1,4 +1,4 @@
-"""Whether this machine can render off-screen, found out without risk.
+"""Safe test for off-screen rendering on this machine.
 
 Without GL libraries VTK ends the process with a segmentation fault at its first window, so the
 first window is opened in a process of its own. `VALIDATE_NO_GL=1` answers no at once.
@@ -31,7 +31,7 @@ _KNOWN: list[str] = []  # the window class that opens, "" for none, once that is
 
 
 def ask() -> None:
-    """Begins to find out beside what comes next, for `available` to answer at once later."""
+    """Begin to find out beside what comes next, for `available` to answer at once later."""
     Thread(target=available, daemon=True).start()
 
 
@@ -60,7 +60,7 @@ def known() -> tuple[str, ...]:
 
 
 def learn(known: tuple[str, ...]) -> None:
-    """Takes over what another process of this machine found out."""
+    """Take over what another process of this machine found out."""
     _KNOWN[:] = known or _KNOWN
 
 

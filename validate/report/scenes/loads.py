@@ -1,4 +1,4 @@
-"""The simulation between its loads: a run keeps displacements at its output frames only.
+"""Displacements between output frames: interpolation of a run at its load steps.
 
 Where these are the loads, u is interpolated between them; a run over time keeps enough of them.
 Between two loads u is interpolated linearly in the drive. That is exact for a model that is linear
@@ -35,7 +35,7 @@ class Instant:
 
 
 def held(registered: Registered, run: Run) -> tuple[Instant, ...]:
-    """The instants that the run computed, in order of time."""
+    """Return the instants that the run computed, in order of time."""
     if not holds(registered):
         times = run.t[run.at]
         rows = zip(times.tolist(), driven(registered, times).tolist(), run.u, strict=True)

@@ -1,4 +1,4 @@
-"""Numbers at the nodes: their common ranges and, for machines that cannot render, flat drawings."""
+"""Nodal maps: common ranges and, for machines that cannot render, flat drawings."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -23,12 +23,13 @@ TOWARD_EYE = np.array([0.62, -1.0, 0.62]) / np.linalg.norm([0.62, -1.0, 0.62])
 
 
 def values(shown: NodeMap) -> Floats:
-    """The numbers (n,) in the unit that readers see."""
+    """Return the numbers (n,) in the unit that readers see."""
     return scale(shown.unit) * shown.values
 
 
 def legible(maps: Iterable[NodeMap]) -> tuple[NodeMap, ...]:
-    """The maps; one too faint to be read in the colours of its scale has colours of its own."""
+    """Return the maps; one too faint to be read in the colours of its scale has colours of its
+    own."""
     shown = tuple(maps)
     largest: dict[str, float] = {}
     for m in shown:
@@ -47,7 +48,8 @@ def _own(shown: NodeMap) -> NodeMap:
 
 
 def ranges(maps: Iterable[NodeMap]) -> dict[str, Range]:
-    """The colour range of every scale, in the unit shown; of two signs, symmetric about zero."""
+    """Return the colour range of every scale, in the unit shown; of two signs, symmetric about
+    zero."""
     found: dict[str, Range] = {}
     for one in maps:
         key, v = one.scale or one.name, values(one)
@@ -70,7 +72,7 @@ def colours(span: Range) -> str:
 
 
 def words(shown: NodeMap, span: Range) -> str:
-    """The caption: what, its unit, its extremes and what the colours span."""
+    """Return the caption: what, its unit, its extremes and what the colours span."""
     v, unit = values(shown), shown_unit(shown.unit) or "no unit"
     common = f" Colours as in the other maps of {shown.scale}." if shown.scale else ""
     title = shown.title.removesuffix(".")
@@ -85,7 +87,8 @@ def bar_title(shown: NodeMap) -> str:
 
 
 def drawn(shown: NodeMap, span: Range) -> Picture:
-    """The map by matplotlib: a planar mesh as it is, a body's surface seen from one corner."""
+    """Return the map by matplotlib: a planar mesh as it is, a body's surface seen from one
+    corner."""
     pixels = draw(lambda f: _axes(f, shown, span), WIDTH, 4.3)
     said = words(shown, span)
     return Picture(f"map_{shown.name}", said, "Map: " + said, pixels, photo=True)

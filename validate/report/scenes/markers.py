@@ -1,4 +1,4 @@
-"""Markers at the loads: vectors and positions in their plane, and what they do across it."""
+"""Figures of markers at the load steps: vectors, in-plane positions, out-of-plane motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where a body is held, loaded and watched: its surface from two corners, nodes on it."""
+"""Figure of supports, loads and probes: the body's surface from two corners."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -23,7 +23,7 @@ _LOOKS = ((MEASURED, "o"), (PALETTE[1], "s"), (PALETTE[0], "^"), (PALETTE[2], "D
 def node_sets_picture(
     name: str, caption: str, mesh: Mesh, sets: Mapping[str, Ints], named: Mapping[str, int]
 ) -> Picture:
-    """Sets of nodes (k,) by what they are, up to four, and single nodes by name, on a body.
+    """Return sets of nodes (k,) by what they are, up to four, and single nodes by name, on a body.
 
     A node is drawn in a view where a facet that faces it has the node: those on the far side are in
     the other view, those inside the body in none.

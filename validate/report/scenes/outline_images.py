@@ -1,5 +1,4 @@
-"""The images of a recording with what was found in them: the outline, the circle through a round
-one, and the section that a run has there."""
+"""Images of a recording with outlines, fitted circles and simulated sections."""
 
 from dataclasses import dataclass
 from textwrap import fill
@@ -80,9 +79,9 @@ def outlines_over(
     simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
     marks: tuple[PlaceSaid, ...] = (),
 ) -> Picture:
-    """The images nearest to the holds in time, with outlines, with circles where the first outline
-    is round, with what was `simulated` at the holds, and with `marks` in the first; `which` they
-    are, and `words` on what they are for, stand in the caption."""
+    """Return the images nearest to the holds in time, with outlines, with circles where the first
+    outline is round, with what was `simulated` at the holds, and with `marks` in the first; `which`
+    they are, and `words` on what they are for, stand in the caption."""
     circles = _circles(contours, holds)
     lines = [
         [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]

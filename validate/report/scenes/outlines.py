@@ -1,4 +1,4 @@
-"""Outlines of a cavity in the image, measured and simulated."""
+"""Figures of a cavity's outlines in the image, measured and simulated."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Points, a path and small errors in space."""
+"""Figures of points, a path and small errors in space."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,7 +32,8 @@ def points_picture(
     places: Sequence[Place],
     longer: float,
 ) -> Picture:
-    """A path (n, 3) mm, its parts, and places with errors `longer` times as long as they are."""
+    """Return a path (n, 3) mm, its parts, and places with errors `longer` times as long as they
+    are."""
     pixels = draw(lambda f: _fill(f, path, parts, places, longer), WIDTH + 0.8, WIDTH)
     alt = f"Path of {len(path)} samples in space with {len(parts)} dwells and {len(places)} points."
     return Picture(name, caption, alt, pixels)

@@ -1,4 +1,4 @@
-"""Off-screen renders of the simulated body, and of numbers at the nodes, by pyvista.
+"""Off-screen renders of the simulated body and of nodal values, by pyvista.
 
 Import only after `gl.available()`.
 """
@@ -332,7 +332,7 @@ def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:
 
 
 def rendered(shown: NodeMap, span: Range) -> Picture:
-    """The map on the undeformed surface, from a camera that only the mesh moves."""
+    """Return the map on the undeformed surface, from a camera that only the mesh moves."""
     said = words(shown, span)
     return Picture(
         f"map_{shown.name}",

@@ -1,4 +1,4 @@
-"""The registration's residual at every marker as an arrow, magnified as far as there is room."""
+"""Registration residual at every marker as an arrow, magnified to the available space."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""The surface of a mesh as triangles to be looked at: outside and cavity walls, thinned if large.
+"""Surface of a mesh as triangles for display: outside and cavity walls, decimated if large.
 
 Quadratic facets are drawn by their corners. Thinning lays a grid over the surface and joins the
 vertices in one of its boxes to the one nearest their mean, so every vertex drawn is a node and
@@ -31,7 +31,8 @@ class SurfacePart:
 
 
 def skins(scene: AnyScene, most: int) -> tuple[SurfacePart, ...]:
-    """The outside and every cavity wall, about `most` triangles in all; none of a 2-D mesh."""
+    """Return the outside and every cavity wall, about `most` triangles in all; none of a 2-D
+    mesh."""
     mesh = scene.mesh
     if mesh.dimension != 3:
         return ()

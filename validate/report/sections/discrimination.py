@@ -1,4 +1,4 @@
-"""Which effects a recording can distinguish: errors against noise, effects against sensors."""
+"""Distinguishable effects of a recording: errors and effects against sensor noise."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -82,7 +82,7 @@ class NoiseRow:
 
 
 def over_noise(result: Result) -> tuple[Picture, ...]:
-    """The picture; none where nothing with noise was compared."""
+    """Return the picture; none where nothing with noise was compared."""
     rows = noise_rows(result)
     if not rows:
         return ()
@@ -108,7 +108,7 @@ def over_noise(result: Result) -> tuple[Picture, ...]:
 
 
 def noise_rows(result: Result) -> list[NoiseRow]:
-    """A row for every quantity that has noise."""
+    """Return a row for every quantity that has noise."""
     done = finished(result)
     quantities = dict.fromkeys(r.quantity for m in done for r in m.residuals.values() if r.sd > 0)
     return [_row(done, quantity) for quantity in quantities]

@@ -1,4 +1,4 @@
-"""The recorded motion in words: what moves most, how far, how fast, and when it is at rest."""
+"""Recorded motion in words: largest motion, distance, speed, and intervals at rest."""
 
 from validate.errors import ComparisonError
 from validate.identify.recorded_motion import RecordedMotion, motion_in

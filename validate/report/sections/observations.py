@@ -1,4 +1,4 @@
-"""Observations of a registered recording for sections and replays, and the methods shown.
+"""Observations of a registered recording for sections and replays, and the displayed methods.
 
 Nothing else in this package opens a `Registered`.
 """
@@ -38,18 +38,18 @@ class Held:
 
 
 def drive(registered: Registered) -> SignalObservation:
-    """The first signal that drives."""
+    """Return the first signal that drives."""
     return registered.drives[0]
 
 
 def driven(registered: Registered, t: Floats | float) -> Floats:
-    """The first drive (SI) at times s, interpolated."""
+    """Return the first drive (SI) at times s, interpolated."""
     return np.asarray(np.interp(t, registered.t, registered.inputs[:, 0]))
 
 
 def holds(registered: Registered) -> tuple[Held, ...]:
-    """The single instants at which everything was measured, in time; none of a run over time,
-    which may begin at rest, too.
+    """Return the single instants at which everything was measured, in time; none of a run over
+    time, which may begin at rest, too.
 
     Where there are any, the output frames of a run are at them.
     """
@@ -81,22 +81,22 @@ def shown_loads(method: MethodResult) -> tuple[tuple[Held, ...], tuple[int, ...]
 
 
 def signals(registered: Registered) -> tuple[SignalObservation, ...]:
-    """The signals that a run's traces predict."""
+    """Return the signals that a run's traces predict."""
     return registered.of(SignalObservation)
 
 
 def outline(registered: Registered) -> OutlineObservation | None:
-    """The first stream of outlines."""
+    """Return the first stream of outlines."""
     return next(iter(registered.of(OutlineObservation)), None)
 
 
 def markers(registered: Registered) -> MarkerObservation | None:
-    """The first set of markers."""
+    """Return the first set of markers."""
     return next(iter(registered.of(MarkerObservation)), None)
 
 
 def axis_label(scene: AnyScene, axis: int) -> str:
-    """An axis of the scene's frame with its unit, and which drive moves along it."""
+    """Return an axis of the scene's frame with its unit, and which drive moves along it."""
     along = [d.name for d in scene.drives if abs(d.direction[axis]) > _ALONG]
     return f"{'xyz'[axis]}{f' (along {along[0]})' if along else ''} / mm"
 
@@ -111,27 +111,29 @@ def finished(result: Result) -> tuple[MethodResult, ...]:
 
 
 def shown_method(result: Result) -> MethodResult | None:
-    """The accepted method, or without one the first that finished; None when none did."""
+    """Return the accepted method, or without one the first that finished; None when none did."""
     return next(iter(finished(result)), None)
 
 
 def outline_seen(method: MethodResult) -> OutlineObservation | None:
-    """The outlines with the wall of the method's own mesh; None without them or a whole run."""
+    """Return the outlines with the wall of the method's own mesh; None without them or a whole
+    run."""
     return outline(method.registered[0]) if method.registered and method.run.finished else None
 
 
 def markers_seen(method: MethodResult) -> MarkerObservation | None:
-    """The markers with the rows of the method's own mesh; None without them or a whole run."""
+    """Return the markers with the rows of the method's own mesh; None without them or a whole
+    run."""
     return markers(method.registered[0]) if method.registered and method.run.finished else None
 
 
 def timed(run: Run) -> StepTimes | None:
-    """The run's step times; None when not one step succeeded: a refusal has no rate."""
+    """Return the run's step times; None when not one step succeeded: a refusal has no rate."""
     return run.step_s if len(run.t) else None
 
 
 def last_residual(method: MethodResult, quantity: str) -> Residual | None:
-    """The residual of a quantity at its last load."""
+    """Return the residual of a quantity at its last load."""
     found = [r for r in method.residuals.values() if r.quantity == quantity]
     return found[-1] if found else None
 

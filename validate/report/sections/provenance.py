@@ -1,4 +1,4 @@
-"""Where the numbers come from: recordings, their streams and clocks, parameters, environment."""
+"""Provenance section: recordings, streams, clocks, parameters, environment."""
 
 from collections.abc import Iterator
 

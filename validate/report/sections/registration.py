@@ -1,4 +1,4 @@
-"""How the measurement was brought into the scene's frame, and what that leaves."""
+"""Registration section: transform to the scene's frame and its residuals."""
 
 from collections.abc import Iterator, Mapping
 

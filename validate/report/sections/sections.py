@@ -1,4 +1,4 @@
-"""What every report shows, in order: views of the long table, and parts drawn from the result."""
+"""Order of the report's sections: views of the long table, and parts drawn from the result."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
@@ -81,8 +81,8 @@ class Begun:
 
 
 def parts(result: Result, table: LongTable) -> tuple[Begun | Exhibit, ...]:
-    """The sections, and the experiment's own exhibits and views after the checks, with the views
-    that plug-ins and scripts added."""
+    """Return the sections, and the experiment's own exhibits and views after the checks, with the
+    views that plug-ins and scripts added."""
     known = {view.name: view for view in VIEWS}
     found: list[Begun | Exhibit] = []
     for s in SECTIONS:

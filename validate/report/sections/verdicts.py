@@ -1,4 +1,4 @@
-"""The verdict in words: over all checks, as declared, and what u_input rests on (ASME V&V 20)."""
+"""Verdict in words: over all checks, as declared, with the basis of u_input (ASME V&V 20)."""
 
 from collections.abc import Iterator, Mapping
 
@@ -21,7 +21,7 @@ _BANDS = {
 
 
 def band(result: Result) -> tuple[str, str]:
-    """The colour class of the sentence and the word that says the same."""
+    """Return the colour class of the sentence and the word that says the same."""
     colour, word = _BANDS[result.overall.word]
     return (
         ("open", f"{word}, with warnings")
@@ -31,8 +31,8 @@ def band(result: Result) -> tuple[str, str]:
 
 
 def verdicts(result: Result) -> Exhibit | None:
-    """The verdict over all checks in words, and where the ranges behind u_input come from; None
-    where there is no check."""
+    """Return the verdict over all checks in words, and where the ranges behind u_input come from;
+    None where there is no check."""
     if not result.checks:
         return None
     checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)

@@ -1,4 +1,4 @@
-"""Folders of results: written, exchanged, compared with what was there, read again.
+"""Result folders: written, replaced, compared with earlier ones, read again.
 
 Start with `folder`.
 """

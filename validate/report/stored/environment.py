@@ -1,4 +1,4 @@
-"""The machine and the versions that made a result: no user, no host, no path."""
+"""Machine and versions behind a result, without user, host or path."""
 
 import contextlib
 import os
@@ -69,7 +69,7 @@ def _version(distribution: str) -> str:
 
 
 def file_name(text: str) -> str:
-    """The last part of a path of either system: reports name files, not places."""
+    """Return the last part of a path of either system: reports name files, not places."""
     return PureWindowsPath(PurePosixPath(text).name).name if text else text
 
 

@@ -1,5 +1,4 @@
-"""Exhibits in results.json (tables whole, charts thinned, maps by their extremes), what is read of
-them again, and every number in them as a row.
+"""Report items in results.json: tables in full, charts thinned, maps by extremes; as rows.
 
 The numbers stay in results.json, their only home; rows are made where `part` asks for them.
 """
@@ -158,5 +157,5 @@ def thinned(y: Floats, most: int) -> Ints:
 
 
 def rounded(values: Floats) -> list[float]:
-    """The numbers to seven significant digits, which a file of text writes short."""
+    """Return the numbers to seven significant digits, which a file of text writes short."""
     return [float(f"{v:.{_DIGITS}g}") for v in values.tolist()]

@@ -1,4 +1,4 @@
-"""Folders of results: written beside their place, synced, and exchanged with it when complete.
+"""Result folders: written beside their place, synced, and exchanged when complete.
 
 One process writes a folder at a time, by a lock that ends with it. What an interrupted process left
 is put back or removed by the next one that takes the lock.
@@ -55,7 +55,7 @@ def try_results(folder: Path, keep: tuple[str, ...]) -> None:
 
 
 def replace_folder(folder: Path, fill: Callable[[Path], None], keep: tuple[str, ...]) -> Path:
-    """Replaces `folder` by what `fill` writes, but for entries whose names match `keep`.
+    """Replace `folder` by what `fill` writes, but for entries whose names match `keep`.
 
     The old folder stays until the new one is complete and on the disk; after any failure nothing of
     the new one is left. Returns the folder's whole path. Raises `UsageError` when it holds
@@ -163,7 +163,7 @@ _HOLDING: dict[Path, int] = {}  # folders that this process has locked, and how 
 
 @contextmanager
 def locked(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Keeps other processes from writing `folder`, or, `shared`, from replacing it.
+    """Keep other processes from writing `folder`, or, `shared`, from replacing it.
 
     What interrupted processes left beside it is put back or removed first. A process may lock a
     folder again. That of a study shares the report's folder that it lies in. Raises `UsageError`

@@ -1,4 +1,4 @@
-"""What a report folder held before: a line of JSON for every run that a newer one replaced.
+"""History of a report folder: a line of JSON for every replaced run.
 
 The line is what the run's long table says in short, so that a folder of any age has a history. A
 run is carried over unless all that made it (code, files, parameters) is equal.
@@ -28,7 +28,7 @@ _CHECK = ("method", "name", "value", "raw", "limit", "u_val", "u_num", "unit", "
 
 
 def line_of(table: LongTable) -> Json:
-    """A run in short; raises `KeyError` or `TypeError` for what is no table of a run."""
+    """Return a run in short; raises `KeyError` or `TypeError` for what is no table of a run."""
     head = table.head
     return {
         **{key: head[key] for key in _WHOLE if key in head},
@@ -43,7 +43,8 @@ def line_of(table: LongTable) -> Json:
 
 
 def carried(folder: Path, content: Json) -> list[str]:
-    """The lines of the folder that the run `content` is about to replace, that of its run last."""
+    """Return the lines of the folder that the run `content` is about to replace, that of its run
+    last."""
     lines = _texts(folder)
     old = current(folder)
     if old is not None and not _alike(old, line_of(long_table(content, folder.name))):
@@ -58,7 +59,8 @@ def write_lines(lines: list[str], folder: Path) -> None:
 
 
 def replaced(folder: Path, created: str) -> Json | None:
-    """The run that gave way to the one created then; None where that replaced none, or its like."""
+    """Return the run that gave way to the one created then; None where that replaced none, or its
+    like."""
     lines = _texts(folder)
     last = unsealed(json_value(lines[-1])) if lines else {}
     return last if last.get("replaced") == created else None
@@ -78,8 +80,8 @@ def lines_of(folder: Path) -> list[Json]:
 
 
 def current(folder: Path) -> Json | None:
-    """The line of the run that lies there; None for a folder without one, or, with a warning, one
-    that is not believed."""
+    """Return the line of the run that lies there; None for a folder without one, or, with a
+    warning, one that is not believed."""
     if not (folder / MARK).exists():
         return None
     try:

@@ -15,7 +15,7 @@ _NUMBERS_ONLY = re.compile(r"\[\s+(-?[\d.eE+-]+(?:,\s+-?[\d.eE+-]+)*)\s+\]")
 
 
 def recorded(value: object) -> Any:
-    """The value as JSON can hold it; the fields of a dataclass by their names."""
+    """Return the value as JSON can hold it; the fields of a dataclass by their names."""
     if is_dataclass(value):
         return members(value)
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""Provenance of a run: its command, the commit of its code, and the files that it read."""
+"""Provenance of a run: its command, the commit of its code, and its input files."""
 
 import hashlib
 import os
@@ -85,7 +85,8 @@ def _used(role: str, path: Path) -> UsedFile:
 
 
 def commit_of(paths: Sequence[Path]) -> Commit | None:
-    """The commit of files or folders that lie in one clone; None where git tracks the first not."""
+    """Return the commit of files or folders that lie in one clone; None where git tracks the first
+    not."""
     if not paths:
         return None
     folder = paths[0] if paths[0].is_dir() else paths[0].parent

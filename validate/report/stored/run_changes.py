@@ -199,7 +199,7 @@ def _shown(run: PastRun, beside: PastRun) -> dict[str, str]:
 
 
 def with_unit(value: Any, unit: str) -> str:
-    """A parameter's value in SI as text."""
+    """Return a parameter's value in SI as text."""
     return _plain(value) if unit == "1" else f"{_plain(value)} {unit}"
 
 

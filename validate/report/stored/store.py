@@ -42,14 +42,14 @@ class _Share:
 
 
 def schema() -> Json:
-    """The JSON Schema of results.json that ships with the package."""
+    """Return the JSON Schema of results.json that ships with the package."""
     text = files("validate.report").joinpath("results.schema.json").read_text(encoding="utf-8")
     loaded: Json = json.loads(text)
     return loaded
 
 
 def document(result: Result, created: str, made: Made | None = None) -> Json:
-    """The content of results.json. Numbers that are not finite become null with a `why`."""
+    """Return the content of results.json. Numbers that are not finite become null with a `why`."""
     share = _share(result)
     return {
         "schema_version": SCHEMA_VERSION,
@@ -186,7 +186,7 @@ def _made(made: Made) -> Json:
 
 
 def overall_members(found: Overall) -> Json:
-    """The verdict over all checks; names of those that decide it."""
+    """Return the verdict over all checks; names of those that decide it."""
     return {
         "verdict": found.word,
         "evidence": found.evidence,
@@ -202,8 +202,8 @@ def overall_members(found: Overall) -> Json:
 
 
 def check_members(check: Check) -> Json:
-    """A check that compared nothing has no error and no uncertainty. `verdict` is the answer that
-    decides."""
+    """Return a check that compared nothing has no error and no uncertainty. `verdict` is the answer
+    that decides."""
     parts = ("value", "raw", "noise", "u_val", "u_D", "u_num", "u_input")
     found = {k: v for k, v in members(check).items() if k != "ratio"}
     found |= {"verdict": check.verdict, "margin": check.margin}
@@ -211,7 +211,8 @@ def check_members(check: Check) -> Json:
 
 
 def figure_members(figure: Published) -> Json:
-    """A printed figure with its verdict of today, and why the claim does not stand, if so."""
+    """Return a printed figure with its verdict of today, and why the claim does not stand, if
+    so."""
     judged = {
         "verdict": figure.verdict, "reason": figure.why, "fault": figure.fault,
         "result": figure.result,

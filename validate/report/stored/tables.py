@@ -1,4 +1,4 @@
-"""Queries over the tables of all stored runs below a folder, read one run at a time.
+"""Queries over the tables of all stored runs below a folder, one run in memory at a time.
 
 from validate.report import open_store
 open_store("reports").where(part="score", quantity="marker.*", statistic="rms").to_pandas()

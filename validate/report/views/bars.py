@@ -1,4 +1,4 @@
-"""An error, its uncertainty and its limit as one bar of characters."""
+"""Error, uncertainty and limit as one bar of characters."""
 
 import math
 import sys
@@ -8,7 +8,7 @@ _LIMIT = 10  # of them up to the limit
 
 
 def bar(error: float, doubt: float, limit: float) -> str:
-    """An error, `doubt` above it, and a limit, all in one unit, as characters.
+    """Return an error, `doubt` above it, and a limit, all in one unit, as characters.
 
     The limit always stands at the same place; what goes beyond the bar ends in ">". An error or a
     doubt that is not finite fills the bar.

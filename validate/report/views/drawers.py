@@ -1,4 +1,4 @@
-"""Drawers: a filled view, or any exhibit, as a file, static figures, a page, text for a terminal.
+"""Output of views and report items: files, static figures, HTML, terminal text.
 
 Each takes an exhibit, and the run whose methods have their colours.
 """
@@ -106,7 +106,7 @@ def drawable(found: Exhibit) -> tuple[Chart | Heat | Intervals, ...]:
 
 
 def figure_of(part: Chart | Heat | Intervals, run: "HasMethods") -> "Figure":
-    """A chart, a heat or intervals as a matplotlib figure."""
+    """Return a chart, a heat or intervals as a matplotlib figure."""
     from validate.report.charts import chart as charts
     from validate.report.charts import heat, intervals
     from validate.report.charts.style import painted
@@ -124,7 +124,7 @@ def figure_of(part: Chart | Heat | Intervals, run: "HasMethods") -> "Figure":
 
 
 def page(found: Exhibit, run: "HasMethods") -> str:
-    """The exhibit as a page of its own in HTML: one text without a request."""
+    """Return the exhibit as a page of its own in HTML: one text without a request."""
     from validate.report.exhibits import draw_all
     from validate.report.html import fragment
 
@@ -132,7 +132,7 @@ def page(found: Exhibit, run: "HasMethods") -> str:
 
 
 def part(found: Exhibit, run: "HasMethods") -> str:
-    """The exhibit in HTML for a page that has a head and a style of its own."""
+    """Return the exhibit in HTML for a page that has a head and a style of its own."""
     from validate.report.exhibits import draw_all
     from validate.report.html import sections
 
@@ -143,7 +143,7 @@ def part(found: Exhibit, run: "HasMethods") -> str:
 
 
 def terminal(found: Exhibit, width: int) -> list[str]:
-    """The exhibit in lines of at most `width` characters, its title first."""
+    """Return the exhibit in lines of at most `width` characters, its title first."""
     lines = [*wrapped(found.title, width)]
     for text in found.words:
         lines += wrapped(text, width, "  ")

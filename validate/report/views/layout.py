@@ -1,4 +1,4 @@
-"""Tables and sentences in a given width: words stay whole, lines end where their text does."""
+"""Tables and sentences in a given width, with unbroken words."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ def wrapped(text: str, width: int, indent: str = "") -> list[str]:
 
 
 def laid(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[str]:
-    """A table as lines, as flat as the width allows.
+    """Return a table as lines, as flat as the width allows.
 
     Columns of sentences share what the others leave. Where that is too little, the last of them
     goes below its row; where even names and numbers have no room, each row becomes a paragraph.

@@ -1,4 +1,4 @@
-"""Numbers as people read them: SI in, mm, mm², ms, N and Pa out, three significant digits."""
+"""Number format: SI in; mm, mm², ms, N and Pa out, with three significant digits."""
 
 import math
 
@@ -12,7 +12,7 @@ MISSING = "–"
 
 
 def shown_unit(unit: str) -> str:
-    """The unit that readers see for an SI unit; empty for pure numbers."""
+    """Return the unit that readers see for an SI unit; empty for pure numbers."""
     return _SHOWN.get(unit, (unit, 1.0))[0]
 
 
@@ -47,7 +47,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number already in its shown unit with fixed decimals and a true minus sign."""
+    """Return a number already in its shown unit with fixed decimals and a true minus sign."""
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
@@ -57,14 +57,14 @@ def fixed_with_unit(value: float, unit: str, decimals: int) -> str:
 
 
 def rate(hz: float | None) -> str:
-    """A rate in Hz or kHz, whichever reads better; a dash for None."""
+    """Return a rate in Hz or kHz, whichever reads better; a dash for None."""
     if hz is None or not math.isfinite(hz):
         return MISSING
     return f"{significant(1e-3 * hz)} kHz" if hz >= 1000 else f"{significant(hz)} Hz"
 
 
 def duration(seconds: float | None) -> str:
-    """A time in µs, ms or s, whichever reads better; a dash for None."""
+    """Return a time in µs, ms or s, whichever reads better; a dash for None."""
     if seconds is None or not math.isfinite(seconds):
         return MISSING
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
@@ -79,7 +79,7 @@ def at_load(label: str) -> str:
 
 
 def spaced(label: str) -> str:
-    """A load label such as "9mm" as text: "9 mm"."""
+    """Return a load label such as "9mm" as text: "9 mm"."""
     number = label.rstrip("abcdefghijklmnopqrstuvwxyzNP%")
     unit = label[len(number) :].replace("pct", "%")
     return f"{number} {unit}".strip()

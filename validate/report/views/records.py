@@ -1,4 +1,4 @@
-"""Tables and charts declared over records: under a heading the attribute that it shows.
+"""Tables and charts declared over records: a heading and the attribute of each column.
 
 table("costs", "Time of a step", rows, {"mesh": "level", "p50 / us": "step.p50"})
 chart("cost", "Cost", ("cells / 1", "cells"), ("time / us", "step.p50"), grouped(rows, "solver"))

@@ -1,4 +1,4 @@
-"""The views of every run, by the names that `validate show` and `.plot` call them.
+"""Standard views of every run, with their names in `validate show` and `.plot`.
 
 VIEWS.add(View("late_error", "Error at the last markers", {"part": "score"}, x="method", by="name"))
 """
@@ -133,7 +133,7 @@ VIEWS: Registry[View] = Registry("views", STANDARD, lambda view: view.name, view
 
 
 def view_of(name: str) -> View:
-    """The view of that name; raises `UsageError` where there is none."""
+    """Return the view of that name; raises `UsageError` where there is none."""
     known = {view.name: view for view in VIEWS}
     if name not in known:
         raise UsageError(f"no view '{name}'; {nearest_names(name, set(known))}")

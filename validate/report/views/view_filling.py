@@ -1,4 +1,4 @@
-"""A view filled with the rows of a table: number tables, charts, heats, intervals, sentences.
+"""Filling of a view with rows of a table: number tables, charts, heat maps, sentences.
 
 These are plain data that every drawer takes; nothing here draws.
 """
@@ -47,7 +47,7 @@ Grid = dict[tuple[str, ...], dict[str, list[LongRow]]]
 
 
 def filled(view: View, table: LongTable) -> Exhibit:
-    """The view as an exhibit of its name and title; empty where no row fits.
+    """Return the view as an exhibit of its name and title; empty where no row fits.
 
     Raises `ComparisonError` where several rows are in one cell and the view does not say which
     counts, where units of one chart are mixed, or the unit to show is of another kind.

@@ -1,4 +1,4 @@
-"""An upright cylinder: of hexahedra, or of tetrahedra that a quarter's mirror images make."""
+"""Upright cylinders: hexahedra, or tetrahedra from mirror images of a quarter."""
 
 from dataclasses import replace
 

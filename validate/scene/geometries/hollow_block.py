@@ -1,4 +1,4 @@
-"""A planar block with rectangular cavities in a row, as the geometry of a scene.
+"""Planar block with rectangular cavities in a row.
 
     HollowBlock(cells=40)                                          one cavity of 10 mm in 50 mm
     HollowBlock(cells=40, cavities=Cavities(2, septum="5 mm"))     two, with a wall between them
@@ -47,8 +47,8 @@ class HollowBlock:
         take_units(self)
 
     def resolved(self, folder: Path) -> Mesh:
-        """The mesh. Raises `SceneError` for cavities that touch each other or the outside, or do
-        not fall on whole squares."""
+        """Return the mesh. Raises `SceneError` for cavities that touch each other or the outside,
+        or do not fall on whole squares."""
         h = self.width / self.cells
         nx, ny = self.cells, _whole(self.height, h, "body.height")
         solid = np.ones((nx, ny), dtype=bool)

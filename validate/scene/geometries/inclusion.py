@@ -1,4 +1,4 @@
-"""A block with an inclusion-shaped hole: tetrahedra inside are removed, the wall is projected.
+"""Block with an inclusion-shaped hole: cells inside are removed, the wall is projected.
 
 The construction of paper 000, section 4.4: a regular mesh of the block, elements with a node in
 the inclusion removed, the nodes of the hole moved onto the measured shape. Departures: the grid
@@ -244,7 +244,7 @@ class Capsule:
             )
 
     def foot(self, points: Floats) -> Floats:
-        """The nearest point of the axis segment for every point (n, 3)."""
+        """Return the nearest point of the axis segment for every point (n, 3)."""
         half = self.length / 2 - self.radius
         foot = np.tile(np.array(self.centre), (len(points), 1))
         i = self.axis

@@ -1,4 +1,4 @@
-"""Blocks and cylinders below an indenter: hexahedra that are small where it presses.
+"""Blocks and cylinders below an indenter, with small hexahedra at the contact.
 
 A body that is pressed in its middle along z is a quarter, where nothing but its force is judged.
 """

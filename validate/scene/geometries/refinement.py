@@ -34,8 +34,8 @@ _WITHIN = 0.05  # of the coarse edge: how far the surface may lie off
 
 
 def coarser(mesh: Mesh, times: int = 1) -> Mesh:
-    """The body in linear tetrahedra with edges about twice as long, of a large mesh thrice; twice
-    as long again for each further one of `times`.
+    """Return the body in linear tetrahedra with edges about twice as long, of a large mesh thrice;
+    twice as long again for each further one of `times`.
 
     A facet set is of the facets next to those of the set on the own mesh; one that lies inside the
     body is left out. Raises `SceneError` for a mesh that is not 3-D, and what `filled` does.
@@ -136,7 +136,7 @@ _HALVES = ((0, 2), (2, 1))  # of a quadratic edge
 
 
 def linear(mesh: Mesh) -> Mesh:
-    """The mesh of its vertices alone; linear ones as they are."""
+    """Return the mesh of its vertices alone; linear ones as they are."""
     if mesh.order == 1:
         return mesh
     d = mesh.dimension
@@ -179,7 +179,7 @@ def _cut(cells: Ints, parts: Sequence[tuple[int, ...]]) -> Ints:
 
 
 def of_element(scene: Scene, element: str) -> Scene:
-    """The scene in elements "P1", "MD" (P1, nodal mean dilatation), "P2", "H8" or "Q4"."""
+    """Return the scene in elements "P1", "MD" (P1, nodal mean dilatation), "P2", "H8" or "Q4"."""
     mesh = linear(scene.mesh)
     if element in ("H8", "Q4"):
         shaped = any(drive.shape is not None for drive in scene.drives)  # node by node

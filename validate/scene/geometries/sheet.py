@@ -1,4 +1,4 @@
-"""A rectangular sheet with two pads: a 2-D geometry for sheets that pads pull or hold.
+"""Rectangular sheet with two pads that pull or hold it, in 2-D.
 
     Sheet("100 mm", "50 mm", pad_length="8 mm", pad_width="8 mm", gap="30 mm")
 

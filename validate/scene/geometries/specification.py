@@ -1,4 +1,4 @@
-"""Geometries: what a body's mesh is made from, resolved late.
+"""Geometries: declared shapes that are meshed when a scene is resolved.
 
     Box(("4 mm", "4 mm", "7 mm"), cells=(4, 4, 7))                 a block from the origin Box(...,
     element="hex27", symmetry=("x", "y"), grading=3.0)    a quarter of it Cylinder("30 mm", "20 mm",
@@ -47,14 +47,14 @@ class Geometry(Protocol):
     def resolved(self, folder: Path) -> Mesh: ...
 
     def scaled(self, share: float) -> "Geometry":
-        """The similar one with about `share` of the cells along every edge."""
+        """Return the similar one with about `share` of the cells along every edge."""
         ...
 
     def __hash__(self) -> int: ...
 
 
 def cell_size(mesh: Mesh) -> float:
-    """The edge m of a cube (in 2-D a square) as large as a mean cell."""
+    """Return the edge m of a cube (in 2-D a square) as large as a mean cell."""
     return float(np.abs(cell_volumes(mesh)).mean() ** (1 / mesh.dimension))
 
 

@@ -16,8 +16,8 @@ _TURN = [0, 2, 1, 3]
 
 
 def filled(path: Path, unit: str, edge: float = 0.0, within: float = 1e-3) -> ForeignBody:
-    """The body inside a surface with lengths in `unit`, of edges of about `edge` m (0: a twentieth
-    of its diagonal).
+    """Return the body inside a surface with lengths in `unit`, of edges of about `edge` m (0: a
+    twentieth of its diagonal).
 
     Its surface lies `within` that share of the diagonal of the given one; both volumes are told,
     and how many triangles were the wrong way round. Two fillings of one surface are two meshes.

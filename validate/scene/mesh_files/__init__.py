@@ -1,4 +1,4 @@
-"""Meshes from files of other programs, each format or library behind one module.
+"""Third-party mesh files, each format or library behind one module.
 
 Start with `third_party_meshes`.
 """

@@ -1,4 +1,4 @@
-"""An Abaqus .inp as plain arrays: the one part with solid elements, as its instance stands.
+"""Arrays of an Abaqus .inp: the one part with solid elements, in its instance's position.
 
 Node sets, surfaces (by element and face) and what Gmsh writes of faces become sets by name.
 Materials, steps and loads are not taken, nor is what stands beside the solid: it is counted.

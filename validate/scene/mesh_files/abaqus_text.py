@@ -1,4 +1,4 @@
-"""The blocks of an Abaqus input file: keyword, parameters, rows, and where they stand.
+"""Parser of the blocks of an Abaqus input file: keyword, parameters, rows, line numbers.
 
 A flat file has no parts; one by Abaqus/CAE has parts, and an assembly with their instances. Rows of
 other files in the deck's folder (`*Include`, `input=`) stand in their place; rows that make nodes
@@ -88,8 +88,8 @@ class Deck:
 
 
 def files_named(path: Path) -> tuple[Path, ...]:
-    """The file itself, and of a deck those of its folder that it names, and that they name, as far
-    as they are there."""
+    """Return the file itself, and of a deck those of its folder that it names, and that they name,
+    as far as they are there."""
     found: list[Path] = []
     left = [path]
     while left and len(found) <= _TIMES:
@@ -112,7 +112,7 @@ def _beside(path: Path, name: str) -> Path | None:
 
 
 def words_of(text: str) -> tuple[str, dict[str, str]]:
-    """A keyword in capitals and its parameters, their keys in capitals."""
+    """Return a keyword in capitals and its parameters, their keys in capitals."""
     head, _, rest = text[1:].partition(",")
     found = {}
     for word in re.findall(r'[^,"]*(?:"[^"]*")?[^,"]*', rest):
@@ -195,8 +195,8 @@ class KeywordBlock:
             raise self.wrong(str(error)) from None
 
     def floats(self, row: str) -> list[float]:
-        """The numbers of a row, with Fortran's exponents, too; an empty place before the last
-        number is 0. Raises as `wholes` does."""
+        """Return the numbers of a row, with Fortran's exponents, too; an empty place before the
+        last number is 0. Raises as `wholes` does."""
         try:
             return [
                 float(w.replace("D", "E").replace("d", "e") or 0)

@@ -1,4 +1,4 @@
-"""Meshes as files: npz of plain arrays, read without pickle, sizes bounded before memory is taken.
+"""Mesh files as npz of plain arrays, read without pickle, with bounded sizes.
 
 Arrays: "kind" (text), "nodes" (n, d) float64 m, "cells" (e, k) int32, one "facets.<set>" (f, m)
 int32 per facet set, and "provenance" (text), which is for people.
@@ -40,8 +40,8 @@ def write_mesh(mesh: Mesh, path: Path, provenance: str = "") -> None:
 
 
 def read_mesh(path: Path, unit: str | None = None) -> Mesh:
-    """The mesh of a file that `write_mesh` wrote, or of one of `foreign_mesh` with lengths in
-    `unit`.
+    """Return the mesh of a file that `write_mesh` wrote, or of one of `foreign_mesh` with lengths
+    in `unit`.
 
     Raises `SceneError`, one line that names the file, for one that is missing, damaged, too large
     or no such mesh, for inverted elements, without a unit that it needs, with one that it does not

@@ -1,4 +1,4 @@
-"""What files of bodies hold, as plain arrays. The only file that imports meshio."""
+"""Arrays of mesh files read by meshio. The only file that imports meshio."""
 
 import io
 from contextlib import redirect_stderr, redirect_stdout

@@ -53,7 +53,8 @@ def cells_of(mesh: Mesh, words: str, named: Mapping[str, Ints]) -> NDArray[np.bo
 
 
 def only(mesh: Mesh, chosen: NDArray[np.bool_]) -> Mesh:
-    """The chosen cells with their nodes, and what of the facet sets lies on their outside."""
+    """Return the chosen cells with their nodes, and what of the facet sets lies on their
+    outside."""
     used = np.unique(mesh.cells[chosen])
     at = np.full(len(mesh.nodes), -1)
     at[used] = np.arange(len(used))
@@ -111,7 +112,7 @@ def metres(name: str, unit: str) -> float:
 
 
 def require_readable(path: Path) -> None:
-    """Raises `SceneError` for a file that is missing, empty or too large."""
+    """Raise `SceneError` for a file that is missing, empty or too large."""
     size = path.stat().st_size if path.is_file() else -1
     if not 0 < size <= _MOST:
         why = "no such file" if size < 0 else f"{size} bytes; 1 to {_MOST} are read"
@@ -119,8 +120,8 @@ def require_readable(path: Path) -> None:
 
 
 def read_foreign(path: Path, unit: str, part: str | None = None) -> ForeignBody:
-    """The body, lengths in `unit`; of several the `part` of that name or number (1: the largest);
-    nodes that no element has are left out.
+    """Return the body, lengths in `unit`; of several the `part` of that name or number (1: the
+    largest); nodes that no element has are left out.
 
     Elements whose nodes are told the other way round are turned, but in .inp, whose order has a
     meaning. Raises `SceneError` for a file that is missing, too large or damaged, several parts of

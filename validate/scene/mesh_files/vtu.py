@@ -1,5 +1,4 @@
-"""Meshes as VTK's unstructured grids in plain text, for programs of others: the order of nodes and
-cells is kept, and numbers have all their digits."""
+"""Writer of VTK unstructured grids (.vtu, text): nodes and cells in order, full precision."""
 
 from pathlib import Path
 
@@ -19,7 +18,7 @@ _HEAD = (
 
 
 def write_vtu(mesh: Mesh, path: Path) -> None:
-    """Raises `SceneError` for a kind of cell that is not carried."""
+    """Raise `SceneError` for a kind of cell that is not carried."""
     if mesh.kind not in CELL_TYPES:
         raise SceneError(f"cells of kind {mesh.kind}: a .vtu carries {', '.join(CELL_TYPES)}")
     number = CELL_TYPES[mesh.kind]

@@ -1,4 +1,4 @@
-"""Fields of one grid over time as other programs write them: VTK's .vtu files, listed in a .pvd.
+"""Reader of fields over time on one grid: VTK's .vtu files, listed in a .pvd.
 
 Read in a process of its own. Text, binary, appended and compressed arrays alike, by meshio.
 """

@@ -1,4 +1,4 @@
-"""Implicit dynamics: Newmark, modes, Newton in time.
+"""Implicit dynamics: Newmark, modal superposition, Newton.
 
 Start with `newmark`; `linear` holds what linear schemes share.
 """

@@ -45,8 +45,8 @@ class FromEquilibrium:
     preload: tuple[float, ...] = quantity((), "1", "inputs at which the body rests at 0 s, SI")
 
     def prepare(self, system: System) -> "FromEquilibriumStepper":
-        """Raises `SceneError` for a linear law, cavities, a missing density, or a preload of
-        another number of inputs."""
+        """Raise `SceneError` for a linear law, cavities, a missing density, or a preload of another
+        number of inputs."""
         require_handled(system.scene, self)
         inputs = np.zeros(len(system.scene.inputs))
         if self.preload:

@@ -76,7 +76,7 @@ class NewtonDynamics:
             )
 
     def prepare(self, system: System) -> "ImplicitStepper":
-        """Raises `SceneError` for a linear law, cavities, or a missing density."""
+        """Raise `SceneError` for a linear law, cavities, or a missing density."""
         scene = system.scene
         require_handled(scene, self)
         N = len(system.moves)

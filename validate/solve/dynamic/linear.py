@@ -1,4 +1,4 @@
-"""What linear schemes with inertia share: fields, traces and the forces of drives."""
+"""Common parts of linear schemes with inertia: fields, traces and forces of drives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Reactions:
         return self.named(self.K @ u + self.C @ v + self.M @ a - self.loads @ loads)
 
     def named(self, forces: Floats) -> Mapping[str, float]:
-        """The forces (k,) N of the mesh as those on the whole body, by trace name."""
+        """Return the forces (k,) N of the mesh as those on the whole body, by trace name."""
         return {
             f"{name}.force": self.copies * float(force)
             for name, force in zip(self.names, forces, strict=True)
@@ -75,7 +75,7 @@ class InertialStepper:
         return {f"{name}.force": "N" for name in self.reactions.names}
 
     def forces(self, u: Floats, v: Floats, a: Floats, inputs: Inputs) -> Mapping[str, float]:
-        """The drives' forces at u, v, a (m,) of the free unknowns."""
+        """Return the drives' forces at u, v, a (m,) of the free unknowns."""
         if not self.reactions.names:
             return {}
         driven = inputs.q, inputs.rate, inputs.acceleration

@@ -1,4 +1,4 @@
-"""Modal superposition: u = sum of mode shapes times coordinates, plus statics of what is cut off.
+"""Modal superposition with static correction for truncated modes.
 
 Every mode is q'' + c q' + w^2 q = f, stepped on its own: exactly for a force that is linear or
 constant within the step, or by the rules of `newmark_rule` (all modes then equal Newmark itself).
@@ -149,7 +149,7 @@ class Modal:
             raise SceneError(f"{self.modes} modes: expected at least 1")
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for laws at large strain, cavities, damping that couples modes."""
+        """Raise `SceneError` for laws at large strain, cavities, damping that couples modes."""
         require_handled(system.scene, self)
         modes = modes_of(system, self.modes)
         exact = self.propagate in ("linear", "constant")
@@ -219,7 +219,7 @@ class ModalStepper(InertialStepper):
         return State(0, ModalState(zeros, zeros, zeros, self.excitation.rest(), signal))
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The state at the end of a step; `inputs` are those there, loads included."""
+        """Return the state at the end of a step; `inputs` are those there, loads included."""
         last: ModalState = state.inner
         k, a, old = state.k + 1, last.a, last.signal
         moved = self.excitation.moved(k, inputs, last.inputs)

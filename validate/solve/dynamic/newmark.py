@@ -95,7 +95,8 @@ class Newmark:
 
     @staticmethod
     def steppings() -> tuple[Stepping, ...]:
-        """The rules, average acceleration with lumped masses, too, and paper 002's printed one."""
+        """Return the rules, average acceleration with lumped masses, too, and paper 002's printed
+        one."""
         average = "average acceleration, {} mass"
         return (
             Stepping(
@@ -155,7 +156,7 @@ class Newmark:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
+        """Raise `SceneError` for a law at large strain, cavities, or missing densities."""
         require_handled(system.scene, self)
         rule = rule_of(self.rule, self.dt, self.rho_inf)
         terms = self.damping_terms
@@ -176,7 +177,7 @@ class NewmarkStepper(MovingStepper):
     misprinted: bool = False
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The state at the end of a step; `inputs` are those there, loads included."""
+        """Return the state at the end of a step; `inputs` are those there, loads included."""
         last: Moving = state.inner
         u, v, k = last.u, last.v, state.k + 1
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)

@@ -45,16 +45,17 @@ class Rule:
         return v + (h * self.g0) * a + (h * self.g1) * a_new, a_new
 
     def weighted(self, new: Floats, old: Floats) -> Floats:
-        """A force, u or v at the instant of the balance: `new` itself unless af > 0."""
+        """Return a force, u or v at the instant of the balance: `new` itself unless af > 0."""
         return new if self.af == 0 else (1 - self.af) * new + self.af * old
 
     def weighted_a(self, new: Floats, old: Floats) -> Floats:
-        """An acceleration at the instant of the balance: `new` itself unless am != 0."""
+        """Return an acceleration at the instant of the balance: `new` itself unless am != 0."""
         return new if self.am == 0 else (1 - self.am) * new + self.am * old
 
 
 def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
-    """The rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside 0..1."""
+    """Return the rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside
+    0..1."""
     if not (np.isfinite(dt) and dt > 0):
         raise SceneError(f"time step {dt:g} s: expected a positive number")
     if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
@@ -92,7 +93,7 @@ class Propagation:
         return self.solver.solve(self.history(u, v, a) + f)
 
     def history(self, u: Floats, v: Floats, a: Floats) -> Floats:
-        """A u + L v + M_a a (m,) N, by one product with M and one with C."""
+        """Return a u + L v + M_a a (m,) N, by one product with M and one with C."""
         (mu, mv, ma), (cu, cv, ca), ku = of_history(self.rule)
         damped = cu * u + cv * v if ca == 0 else cu * u + cv * v + ca * a
         total = self.M @ (mu * u + mv * v + ma * a) + self.C @ damped
@@ -126,7 +127,8 @@ def propagation(
     terms: DampingTerms = "full",
     tolerance: float = TOLERANCE,
 ) -> Propagation:
-    """The step's matrices over the free unknowns, with J factorised or as the solver takes it.
+    """Return the step's matrices over the free unknowns, with J factorised or as the solver takes
+    it.
 
     Raises `SceneError` for missing densities, or a J that is not positive definite.
     """
@@ -152,7 +154,7 @@ def of_system(rule: Rule) -> tuple[float, float, float]:
 
 
 def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerms = "full") -> None:
-    """Refuses a0 = M^-1 f with generalised alpha where damping acts within the step.
+    """Refuse a0 = M^-1 f with generalised alpha where damping acts within the step.
 
     The rule then carries the vanished a0 on for 1/(1 - rho_inf) steps, which leaves an offset in u:
     10 % of the static displacement of paper 001's block at rho_inf = .8, five times it at 0.

@@ -1,4 +1,4 @@
-"""Release of a body: its swing under constant loads, and the state in which it comes to rest.
+"""Release of a body: free vibration under constant loads, and its final state of rest.
 
 The swing is stepped by `NewtonDynamics`, its loads in full from 0 s on; rest is `StaticNewton`'s,
 of the relaxed law, at the last instant: what lies between is not stepped through.

@@ -117,7 +117,7 @@ class CentralDifference:
         return self.dt / self.substeps
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for what has no explicit form, a missing density, cavities."""
+        """Raise `SceneError` for what has no explicit form, a missing density, cavities."""
         require_handled(system.scene, self)
         beta = self._beta(system.scene)
         still = np.zeros(len(system.moves))
@@ -314,7 +314,7 @@ class CentralStepper:
         return whole - free + (min(free, ratio**2 * kinetic) if ratio < 1 else 0.0)
 
     def limited(self, past: Past) -> Past:
-        """The critical step of the body as it is deformed now, if that has changed much."""
+        """Return the critical step of the body as it is deformed now, if that has changed much."""
         u, size = past.motion["u"], float(np.ptp(self.scene.mesh.nodes, axis=0).max())
         if np.isfinite(past.limit) and np.abs(u - past.limit_u).max() < _DEFORMED * size:
             return past

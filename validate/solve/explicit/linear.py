@@ -1,4 +1,4 @@
-"""Explicit linear dynamics of paper 002, section V.B: Newmark's family with beta = 0, gamma = 1/2.
+"""Explicit linear dynamics (paper 002, section V.B): Newmark with beta = 0, gamma = 1/2.
 
 u' = u + h v + h^2/2 a, (M + h/2 C) a' = f' - K u' - C (v + h/2 a), v' = v + h/2 (a + a'). Lumped
 masses and C = alpha M make that a division; all else is one solve with a matrix factorised once.
@@ -91,7 +91,7 @@ class ExplicitLinear:
         return f"{self.mass} mass, {self.update} C = {C}"
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a law at large strain, cavities, or missing densities."""
+        """Raise `SceneError` for a law at large strain, cavities, or missing densities."""
         require_handled(system.scene, self)
         free, terms = system.free, self.damping_terms
         matrices = mass_of(system, self.mass), damping_of(system, self.mass, terms), system.K
@@ -121,8 +121,8 @@ def _solver(J: sparse.csr_array, node: Ints, places: Floats) -> Solver:
 
 
 def stable_step(system: System, settings: ExplicitLinear) -> float:
-    """The critical step s, exact: 2/w for C in the matrix; (sqrt(c^2 + 4 w^2) - c)/w^2 for lagged C
-    with c = alpha + beta w^2; w is the highest frequency with the mass in use.
+    """Return the critical step s, exact: 2/w for C in the matrix; (sqrt(c^2 + 4 w^2) - c)/w^2 for
+    lagged C with c = alpha + beta w^2; w is the highest frequency with the mass in use.
 
     Regions that are damped differently get their largest alpha and beta: a safe bound.
     """
@@ -163,7 +163,7 @@ class ExplicitStepper(MovingStepper):
     size: float
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The state at the end of a step; `inputs` are those there, loads included."""
+        """Return the state at the end of a step; `inputs` are those there, loads included."""
         last: Moving = state.inner
         h, k = self.settings.dt, state.k + 1
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)

@@ -95,7 +95,7 @@ def _number_array(array: NDArray[Any], name: str) -> Floats:
 
 
 def regular(path: Path, most: int) -> Path:
-    """The path of an ordinary file of so many bytes: no link, pipe or device is opened."""
+    """Return the path of an ordinary file of so many bytes: no link, pipe or device is opened."""
     try:
         found = path.lstat()
     except OSError:
@@ -138,7 +138,7 @@ class ExternalAnswer:
 
 
 def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
-    """Raises `NoAnswerError` with the reason where there is no answer to this job."""
+    """Raise `NoAnswerError` with the reason where there is no answer to this job."""
     said = _document(folder)
     name = (
         f"{_text(said, 'name') or 'external simulator'} {_text(said, 'version') or '(no version)'}"

@@ -38,7 +38,7 @@ class ExternalJob:
 def write_job(
     folder: Path, scene: Scene, t: Floats, inputs: Floats, inertia: bool, tolerance: float
 ) -> ExternalJob:
-    """Writes mesh and job; raises `SceneError` for what a job does not carry."""
+    """Write mesh and job; raises `SceneError` for what a job does not carry."""
     _require_carried(scene, t)
     write_vtu(scene.mesh, folder / "mesh.vtu")
     digest = sha256((folder / "mesh.vtu").read_bytes()).hexdigest()

@@ -1,4 +1,4 @@
-"""Runs the program that follows within limits, ends as it did, and tells its peak of memory.
+"""Wrapper that runs a program within limits and reports its exit code and peak memory.
 
 python limits.py MEMORY_BYTES FILE_BYTES PEAK_FILE COMMAND [ARGUMENT ...]
 

@@ -60,7 +60,7 @@ SIMULATORS: Registry[Simulator] = Registry(
 
 
 def simulator_of(command: str) -> Simulator | None:
-    """The simulator of this name, or that of this command; None where there is none."""
+    """Return the simulator of this name, or that of this command; None where there is none."""
     known = (command, _without_former_path(command))
     return next((s for s in SIMULATORS if s.name == command or s.command in known), None)
 
@@ -98,8 +98,9 @@ class Ended:
 
 
 def words(command: str) -> tuple[str, ...]:
-    """A command line, or the name of a simulator, as words: `python` is the one that runs this, and
-    files of the current folder stand by their whole path, else those that came with the package.
+    """Return a command line, or the name of a simulator, as words: `python` is the one that runs
+    this, and files of the current folder stand by their whole path, else those that came with the
+    package.
 
     Raises `UsageError` for a program that is not there.
     """
@@ -138,7 +139,7 @@ def _without_former_path(command: str) -> str:
 
 
 def run_program(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
-    """Runs a command with the folder as its last argument until it ends or a limit ends it.
+    """Run a command with the folder as its last argument until it ends or a limit ends it.
 
     Whatever of its process group is left then is ended too. The limit of memory is each process's;
     what it writes outside of the folder is not watched.

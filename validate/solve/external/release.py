@@ -1,4 +1,4 @@
-"""Release of a body in an external simulator: its swing from one job, its rest from another."""
+"""Release of a body in an external simulator: vibration by one job, final rest by another."""
 
 from dataclasses import dataclass, fields, replace
 

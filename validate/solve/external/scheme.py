@@ -1,4 +1,4 @@
-"""Any program as a scheme: a job's folder goes out, an answer comes back, and both are checked."""
+"""External simulator as a scheme: writes a job, reads the answer, checks both."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ def plain_questions(t: Floats, inputs: Floats) -> Asked:
 
 
 def changes(t: Floats, inputs: Floats) -> Asked:
-    """The times at t (nt,) s whose inputs (nt, l) are others than before."""
+    """Return the times at t (nt,) s whose inputs (nt, l) are others than before."""
     new = np.concatenate([[True], np.any(np.diff(inputs, axis=0) != 0, axis=1)])[: len(t)]
     kept = np.flatnonzero(new)
     return Asked(t[kept], inputs[kept], lambda run: _repeated(run, kept, t))
@@ -96,7 +96,7 @@ def _at_all(run: Run, t: Floats, u: Floats, traces: Mapping[str, Trace]) -> Run:
 
 
 def at_rest(scene: Scene) -> Scene:
-    """The scene whose stress has relaxed, where its statics stand for that."""
+    """Return the scene whose stress has relaxed, where its statics stand for that."""
     material = getattr(scene, "material", None)
     if material is None or material.prony.statics != "relaxed":
         return scene
@@ -171,7 +171,7 @@ def _unasked(why: str) -> Run:
 
 
 def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
-    """A run of what came back, or one without steps that says why there is none."""
+    """Return a run of what came back, or one without steps that says why there is none."""
     if ended.why:
         return _none(job, "invalid", f"{ended.why}{ended.said and ': '}{ended.said}", ended)
     try:

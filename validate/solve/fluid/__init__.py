@@ -1,4 +1,4 @@
-"""Fluid in cavities: pressure against volume, pressure control, the boundary swap of paper 000.
+"""Fluid in cavities: pressure-volume relation, pressure control, boundary swap of paper 000.
 
 Start with `cavities`.
 """

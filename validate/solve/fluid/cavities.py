@@ -1,4 +1,4 @@
-"""The pressure of a fluid in linear elastic cavities, from what ties it to their volumes.
+"""Pressure of a fluid in linear elastic cavities, from its relation to their volumes.
 
 All work on the response columns: u = sum_a z_a u_a with z = (drives, pressures), so a cavity's
 volume is a cubic polynomial in z (fixed normals: exact, not a series) and needs no facets. A fluid

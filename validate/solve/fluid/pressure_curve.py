@@ -1,4 +1,4 @@
-"""Pressure against volume of a cavity in a linear body: an exact cubic, its line, its slopes.
+"""Pressure-volume curve of a cavity in a linear body: exact cubic, linearisation, slopes.
 
 With fixed normals the volume is a polynomial in the amounts z of the response columns; along one
 pressure it is a cubic (a quadratic in the plane). Source: paper 000, section 3.3.
@@ -133,16 +133,16 @@ def root_of(
 
 
 def rises(a: float, b: float, c: float, P: float) -> bool:
-    """Whether a P^3 + b P^2 + c P + d grows with P all the way from 0 to P."""
+    """Return whether a P^3 + b P^2 + c P + d grows with P all the way from 0 to P."""
     turn = -b / (3 * a) if a else 0.0
     places = [0.0, P, *([turn] if min(P, 0.0) < turn < max(P, 0.0) else [])]
     return all((3 * a * x + 2 * b) * x + c > 0 for x in places)
 
 
 def least_slope(responses: Responses, z: Floats, softness: float = 0.0) -> float:
-    """The least dV_i/dP_i of any cavity, `softness` V0 m^3/Pa added, on the way t P, 0 <= t <= 1:
-    a quadratic in t, exactly. Of a negative softness it is what that leaves: less than 0 where a
-    pressure that grows with the volume outweighs the body."""
+    """Return the least dV_i/dP_i of any cavity, `softness` V0 m^3/Pa added, on the way t P, 0 <= t
+    <= 1: a quadratic in t, exactly. Of a negative softness it is what that leaves: less than 0
+    where a pressure that grows with the volume outweighs the body."""
     drives = responses.drives
     empty = z.copy()
     empty[drives + 1 :] = 0

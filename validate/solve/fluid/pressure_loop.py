@@ -1,4 +1,4 @@
-"""The paper's proportional pressure law and its relatives, side by side: what each update costs.
+"""Proportional pressure control of paper 000 and its variants, with the cost of each update.
 
 P <- P + G (1 - V/V0) until |1 - V/V0| <= tolerance (paper 000, eqs 9 and 10). They differ in G:
 
@@ -70,12 +70,12 @@ class PressureLoop:
         return (Rival(name, "condensed", lambda dt: PressureLoop(), stepped=False),)
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a line search on several cavities."""
+        """Raise `SceneError` for a line search on several cavities."""
         require_handled(system.scene, self)
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
-        """The scheme on columns that are there already."""
+        """Return the scheme on columns that are there already."""
         count = len(responses.volumes)
         if self.update in ("golden", "piecewise") and count > 1:
             raise SceneError(

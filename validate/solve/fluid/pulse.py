@@ -1,4 +1,4 @@
-"""Pressures prescribed in time: a pulse, or a constant one. Beyond paper 000, which names it only.
+"""Prescribed pressures over time: a pulse, or a constant. Beyond paper 000, which only names it.
 
 A pressure that is given needs no iteration: the volume follows. A linear model with fixed normals
 holds to some 30 % of volume (paper 000, section 3.3); what lies beyond is counted, not hidden.
@@ -59,7 +59,7 @@ class PulsePressure:
         return self.on(responses_of(system))
 
     def on(self, responses: Responses) -> Stepper:
-        """The scheme on columns that are there already."""
+        """Return the scheme on columns that are there already."""
         return PulseStepper(responses, condensed(responses), self)
 
 

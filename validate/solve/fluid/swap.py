@@ -1,4 +1,4 @@
-"""Force and displacement changing places on a condensed system (paper 000's boundary swap).
+"""Boundary swap of paper 000: force and displacement change places on a condensed system.
 
 For forces on all kept unknowns u = A f. An unknown whose displacement is given instead changes
 places with its force by a principal pivot, a rank-one update of the dense matrix. Rounding adds up
@@ -33,7 +33,7 @@ class Swapped:
         self._random = np.random.default_rng(seed)
 
     def swap(self, unknown: int) -> None:
-        """Gives the unknown's displacement instead of its force, or its force again.
+        """Give the unknown's displacement instead of its force, or its force again.
 
         Raises `SceneError` where the unknowns driven already hold it, or nothing moves it.
         """
@@ -58,7 +58,8 @@ class Swapped:
         return u, np.where(self.driven, found, given)
 
     def drift(self) -> float:
-        """The largest |u - A f| over the largest |u| of a random state: what rounding has left."""
+        """Return the largest |u - A f| over the largest |u| of a random state: what rounding has
+        left."""
         given = self._random.standard_normal(len(self.A))
         size = np.sqrt(np.diag(self.A))
         given *= np.where(self.driven, size, np.divide(1, size, out=np.zeros_like(size),
@@ -76,7 +77,8 @@ class Swapped:
 
 
 def mixed(A: Floats, driven: Ints) -> Floats:
-    """The matrix of `Swapped` at once: [[A_ff - A_fd X, X^T], [-X, A_dd^-1]], X = A_dd^-1 A_df."""
+    """Return the matrix of `Swapped` at once: [[A_ff - A_fd X, X^T], [-X, A_dd^-1]], X = A_dd^-1
+    A_df."""
     T = A.copy()
     if not len(driven):
         return T

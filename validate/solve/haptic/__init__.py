@@ -1,4 +1,4 @@
-"""Probes and needles at haptic rate on a body that is simulated at a rate of its own.
+"""Probes and needles at haptic rate on a body that is simulated at its own rate.
 
 Start with `loop`.
 """

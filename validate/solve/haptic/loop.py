@@ -1,4 +1,4 @@
-"""A probe at haptic rate on a body that is simulated at a rate of its own (paper 003, section 3.5).
+"""Haptic loop: a probe at haptic rate on a slower simulation (paper 003, section 3.5).
 
 The body is St. Venant-Kirchhoff (or another law at large strain) by central difference, with as
 many substeps as its critical step needs. It reads the probe at every n-th tick and answers by a
@@ -52,7 +52,8 @@ def answers_of(name: Extrapolation) -> int:
 
 
 def extrapolated(t: Floats, y: Floats, at: float) -> Floats:
-    """The polynomial through y (m, d) at distinct times t (m,) s, at the time `at` s: (d,)."""
+    """Return the polynomial through y (m, d) at distinct times t (m,) s, at the time `at` s:
+    (d,)."""
     return np.asarray(_weights(t, at) @ y)
 
 
@@ -81,7 +82,7 @@ def between_answers(y: Floats, every: int, late: int, name: Extrapolation) -> Fl
 
 
 def require_schedule(every: int, late: int) -> None:
-    """Raises `UsageError` for ticks between readings and of answers that do not fit."""
+    """Raise `UsageError` for ticks between readings and of answers that do not fit."""
     if not (every >= 1 and 0 <= late <= every):
         raise UsageError(
             f"a reading every {every} ticks that is answered {late} ticks later: expected at "
@@ -146,7 +147,7 @@ class HapticLoop:
             raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a scene without one probe, with drives, or held where it may be
+        """Raise `SceneError` for a scene without one probe, with drives, or held where it may be
         touched."""
         scene = system.scene
         require_handled(scene, self)
@@ -222,7 +223,7 @@ class Background:
         self.numbers.append(get_native_id())
 
     def result_of(self, job: Callable[[], Read]) -> Callable[[], Read]:
-        """Begins a job; what waits for its result."""
+        """Begin a job; what waits for its result."""
         return self._pool.submit(job).result
 
 

@@ -1,4 +1,4 @@
-"""A needle against a body with a fluid pocket, tick by tick (paper 000, section 5.2).
+"""Needle against a body with a fluid pocket, tick by tick (paper 000, section 5.2).
 
 Where the tip enters the surface, that point joins the working set: its displacement along the local
 axes at the needle is that of the tip, the rest of the body is condensed away. A change of contact
@@ -63,8 +63,8 @@ class Surface:
             raise SceneError(f"facets of {nodes} nodes in {d}-D: a needle touches simplices")
 
     def entered(self, x: Floats, start: Floats, end: Floats) -> Entry | None:
-        """The first crossing from outside on the way from `start` to `end` (d,) m, among corners at
-        x (n, d) m; None without one."""
+        """Return the first crossing from outside on the way from `start` to `end` (d,) m, among
+        corners at x (n, d) m; None without one."""
         d = self.dimension
         corners = self.facets[:, :d]
         search = _crossed_triangle if d == 3 else _crossed_edge
@@ -184,7 +184,7 @@ class NeedleLoop:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a scene without needle, a tip inside the body, several cavities,
+        """Raise `SceneError` for a scene without needle, a tip inside the body, several cavities,
         facets that are no simplices."""
         scene = system.scene
         require_handled(scene, self)
@@ -350,7 +350,7 @@ class NeedleStepper:
         return None if entry is None else self.hold(entry, tip)
 
     def hold(self, entry: Entry, tip: Floats) -> Touch:
-        """The contact of a tip at `tip` (d,) m with a point of the surface."""
+        """Return the contact of a tip at `tip` (d,) m with a point of the surface."""
         axes = _local_axes(self.tool, self.settings.imposes)
         node = int(entry.nodes[int(np.argmax(entry.shares))])
         imposed = tuple(
@@ -413,7 +413,7 @@ class NeedleStepper:
         return grip is not None and pulled > grip + _ROUNDING
 
     def hand(self, tick: Tick) -> Floats:
-        """The force (d,) N on the hand, before it is limited."""
+        """Return the force (d,) N on the hand, before it is limited."""
         if tick.touch is None:
             return np.zeros(len(self.tool.tip))
         touch, forces = tick.touch, tick.forces
@@ -429,7 +429,7 @@ class NeedleStepper:
         return np.asarray(-forces @ touch.axes)
 
     def energy(self, tick: Tick) -> float:
-        """What the body has stored, J (per metre in 2-D)."""
+        """Stored energy of the body, J (per metre in 2-D)."""
         if tick.touch is None:
             swelling = 3 * float(self._apart[0, 0, 1]) * tick.P if self.scene.cavities else 0.0
             return tick.P * swelling / 2

@@ -1,4 +1,4 @@
-"""Rates that hands and eyes need."""
+"""Rates of haptic and visual feedback."""
 
 from dataclasses import dataclass
 
@@ -56,7 +56,7 @@ class TickTimes:
         object.__setattr__(self, "seconds", given)
 
     def missed(self, deadline: float) -> int:
-        """How many took longer than `deadline` s."""
+        """Number of ticks that took longer than `deadline` s."""
         return int((self.seconds > deadline).sum())
 
     @property

@@ -1,4 +1,4 @@
-"""The probe of paper 004, section 3: a spring to the surface node nearest to it."""
+"""Spring probe of paper 004, section 3: a spring to the nearest surface node."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -50,7 +50,7 @@ class SpringProbe:
     slides: bool
 
     def follow(self, held: Hold | None, tip: Floats, u: Floats) -> Hold | None:
-        """The hold at this tick: taken, moved, let go or as it was."""
+        """Return the hold at this tick: taken, moved, let go or as it was."""
         if held is None:
             return self._taken(tip, u)
         if self.grip is not None and self._pulled(held, tip, u) > self.grip:
@@ -107,7 +107,7 @@ class SpringProbe:
         return self.shared(held, self.force(held, tip, u))
 
     def shared(self, held: Hold, force: Floats) -> Floats:
-        """A force (d,) N on the unknowns (m,), equal on the pad's nodes."""
+        """Return a force (d,) N on the unknowns (m,), equal on the pad's nodes."""
         f = np.zeros(self.body.places.shape)
         f[list(held.pad)] = force / len(held.pad)
         return np.asarray(f.ravel()[self.body.at])

@@ -1,4 +1,4 @@
-"""A body at large strain under the spring of a probe, stepped explicitly from reading to reading.
+"""Body at large strain under a spring probe, stepped explicitly between readings.
 
 The spring and the nodes that share it enter the compiled step of `CentralDifference` itself: as a
 stiffness of the body, and as a load that follows the probe. So it acts at every substep, on a probe
@@ -59,7 +59,7 @@ class TouchedBody:
     kept: dict[tuple[int, ...], CentralStepper]
 
     def rest(self, tip: Floats) -> Read:
-        """The body at rest and the probe at `tip` (d,) m."""
+        """Return the body at rest and the probe at `tip` (d,) m."""
         state = self.untouched.rest()
         past: Past = replace(state.inner, inputs=np.zeros(len(tip)))
         return self._read(replace(state, inner=past), None, tip)

@@ -1,4 +1,4 @@
-"""Displacements imposed on a condensed system on the fly: nodes, points of facets, local axes.
+"""Displacements imposed on a condensed system at run time: nodes, facet points, local axes.
 
 A tool that touches the body gives the displacement of a few combinations c . u of kept unknowns;
 their forces follow from a system as small as their number (paper 000, section 5.2: a contact adds
@@ -28,7 +28,7 @@ class Imposed:
 
 
 def along(node: int, axis: Floats) -> Imposed:
-    """The displacement of kept node number `node` along a unit vector (d,)."""
+    """Return the displacement of kept node number `node` along a unit vector (d,)."""
     d = len(axis)
     return Imposed(node * d + np.arange(d), np.asarray(axis, dtype=np.float64))
 
@@ -70,7 +70,7 @@ class WorkingSet:
         return WorkingSet(condensed, every, columns, coupling, bases)
 
     def without(self, index: int) -> "WorkingSet":
-        """The others, as if that one had never been."""
+        """Return the others, as if that one had never been."""
         kept = [i for i in range(len(self.rows)) if i != index]
         if not kept:
             return WorkingSet(self.condensed)

@@ -1,4 +1,4 @@
-"""Asynchronous regions of paper 004: a fast region around a touched place, slow ones elsewhere.
+"""Asynchronous regions (paper 004): a fast region around a touched place, slow ones elsewhere.
 
 Start with `scheme`.
 """

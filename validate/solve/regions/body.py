@@ -1,4 +1,4 @@
-"""A system's free unknowns as regions take them, and the regions around a place of its surface."""
+"""Free unknowns of a system by region, and regions around a place of its surface."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +18,7 @@ from validate.solve.regions.solvers import EXPLICIT, RegionMatrices, SolverName,
 
 
 def require_one_probe(system: System) -> None:
-    """Raises `SceneError` for a scene without one probe, with drives, or that can move rigidly."""
+    """Raise `SceneError` for a scene without one probe, with drives, or that can move rigidly."""
     scene = system.scene
     if len(scene.tools) != 1 or scene.drives:
         raise SceneError(
@@ -43,7 +43,7 @@ class RegionBody:
 
     @classmethod
     def of(cls, system: System) -> "RegionBody":
-        """Raises `SceneError` where all that may be touched is held, or K damps."""
+        """Raise `SceneError` where all that may be touched is held, or K damps."""
         scene, free = system.scene, system.free
         if any(m.stiffness_damping for m in scene.materials):
             raise SceneError(
@@ -115,7 +115,7 @@ class Regions:
         )
 
     def beyond(self, dt: float, rounding: float) -> str:
-        """The first explicit region whose period is above its critical one, in words."""
+        """Return the first explicit region whose period is above its critical one, in words."""
         for limit, ratio, name in self.limits:
             if ratio * dt > limit * (1 + rounding):
                 times = ratio * dt / limit
@@ -145,7 +145,7 @@ class RegionPlan:
     law: PrimaryLaw | None = None
 
     def around(self, pad: tuple[int, ...]) -> Around:
-        """The layers around the nodes `pad`."""
+        """Return the layers around the nodes `pad`."""
         if pad not in self.kept:
             contact = np.array(pad)
             layer = layers_from(self.of.graph, contact)

@@ -1,5 +1,4 @@
-"""A reduced model of a touched body: what regions (`solve.regions.scheme`) must beat on a linear
-one.
+"""Krylov-reduced model of a touched linear body, the benchmark of `solve.regions.scheme`.
 
 Displacements are sums of a few Krylov vectors, K^-1 f, K^-1 M K^-1 f, ... of a unit force at the
 contact in every direction; the first of them have its statics exactly. Steps are those of eq 3 of
@@ -62,7 +61,7 @@ class TouchedKrylov:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a scene without one probe, or whose surface is all held."""
+        """Raise `SceneError` for a scene without one probe, or whose surface is all held."""
         scene = system.scene
         require_handled(scene, self)
         require_one_probe(system)
@@ -177,8 +176,8 @@ class KrylovStepper:
 
 
 def krylov(factor: Factor | Fronts, m: Floats, f: Floats, count: int) -> Floats:
-    """An orthonormal basis (u, r) of K^-1 f, K^-1 M K^-1 f, ..., `count` blocks of f (u, d); m (u,)
-    kg. Directions that are in the others already are left out, so r is at most count d."""
+    """Return an orthonormal basis (u, r) of K^-1 f, K^-1 M K^-1 f, ..., `count` blocks of f (u, d);
+    m (u,) kg. Directions that are in the others already are left out, so r is at most count d."""
     pushed = f[:, np.abs(f).max(axis=0) > 0]  # what is held in a direction takes no force there
     V = last = _new(np.zeros((len(f), 0)), factor.solve(pushed))
     for _ in range(count - 1):

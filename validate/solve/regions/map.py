@@ -1,4 +1,4 @@
-"""Which node belongs to which region, and how often each region is solved (paper 004, section 5).
+"""Region of each node, and solve rate of each region (paper 004, section 5).
 
 Nodes are layered by graph distance from the contact: links are the entries of the stiffness matrix,
 so a layer is what one solve of its neighbour can feel. The first region is the primary one, at one

@@ -1,4 +1,4 @@
-"""Regions that see each other by displacements alone: the coupled map of one tick (paper 004, 5.2).
+"""Coupled step of regions that exchange displacements only (paper 004, 5.2).
 
 In a tick the primary region is solved first, then every other region that is due, outward; each
 has its own period T and its own history. What a region shows to the others between its solves is
@@ -103,7 +103,7 @@ class Coupled:
         return Motion(0, pieces, zero)
 
     def tick(self, last: Motion, f: Floats) -> Motion:
-        """The next tick under forces f (m,) N."""
+        """Return the next tick under forces f (m,) N."""
         k, pieces, visible = last.k + 1, list(last.pieces), last.visible.copy()
         for zone, piece in zip(self.zones[1:], pieces[1:], strict=True):
             visible[zone.own] = self._shown(zone, piece, zone.share(k))
@@ -167,7 +167,7 @@ class Coupled:
 def zone_of(
     body: RegionMatrices, wide: Ints, own: Ints, ratio: int, name: SolverName, dt: float
 ) -> Zone:
-    """A zone of the unknowns `own`, solved with `wide`, both in rising order."""
+    """Return a zone of the unknowns `own`, solved with `wide`, both in rising order."""
     shown = np.searchsorted(wide, own)
     solver = solver_of(name, body, wide, ratio * dt)
     return Zone(wide, own, shown, ratio, name, solver, _outside(body.K, wide))
@@ -183,7 +183,7 @@ def _outside(K: sparse.csr_array, at: Ints) -> sparse.csr_array:
 
 
 def carried(old: Coupled, motion: Motion, new: Coupled) -> Motion:
-    """The motion in other regions: what is seen stays, and so does every node's velocity.
+    """Return the motion in other regions: what is seen stays, and so does every node's velocity.
 
     A region keeps the histories of the nodes that it had. One that it takes over stands where it is
     shown until the region's next solve, with its velocity for that solve: no displacement jumps
@@ -214,7 +214,8 @@ def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) 
 
 
 def period_map(coupled: Coupled, forces: Callable[[Floats], Floats] | None = None) -> Floats:
-    """The map (s, s) of the state over a common period; `forces` gives f (m, q) from `visible`."""
+    """Return the map (s, s) of the state over a common period; `forces` gives f (m, q) from
+    `visible`."""
     if any(isinstance(z.solver, PrimarySolver) for z in coupled.zones):
         raise SceneError(
             "the step map of a primary region with a separate law has no spectral radius"

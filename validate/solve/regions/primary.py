@@ -1,4 +1,4 @@
-"""A primary region of another law than the rest: at large strain, or one that relaxes.
+"""Primary region with a law of its own: large strain or viscoelastic.
 
 What paper 004 names as future work. The body's own linear stiffness stays everywhere; the cells all
 of whose free nodes are in the primary region add what their law has beyond it, r(u) = f(u) - K u.
@@ -40,7 +40,8 @@ class UnsettledError(SceneError):
 
 
 class Response(Protocol):
-    """What the cells add to the linear body at an instant: forces (w,) N and tangent (w, w)."""
+    """Contribution of the cells to the linear body at an instant: forces (w,) N and tangent (w,
+    w)."""
 
     def force(self, u: Floats) -> Floats: ...
 
@@ -278,7 +279,7 @@ class PrimarySolver:
     kept: list[Factor | Fronts] = field(default_factory=list)
 
     def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
-        """A step of a region that remembers nothing."""
+        """Return a step of a region that remembers nothing."""
         return self.walk(u, before, f, self.law.rest())[0]
 
     def walk(self, u: Floats, before: Floats, f: Floats, memory: Any) -> tuple[Floats, Any]:

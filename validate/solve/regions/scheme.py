@@ -1,5 +1,4 @@
-"""Asynchronous regions around a touched place (paper 004): near nodes at the haptic rate, far ones
-at lower rates and by other solvers.
+"""Asynchronous regions (paper 004): haptic rate near a touched place, lower rates elsewhere.
 
 A probe whose path is given takes hold of the surface node nearest to it, as soon as that is within
 a threshold, by a spring; the force to the hand is the spring's after the tick (section 3). Regions
@@ -134,7 +133,7 @@ class AsyncRegions:
         return self.law != "linear" or bool(self.prony.g)
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a scene without one probe, or whose surface is all held."""
+        """Raise `SceneError` for a scene without one probe, or whose surface is all held."""
         scene = system.scene
         require_handled(scene, self)
         require_one_probe(system)

@@ -1,4 +1,4 @@
-"""The solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one.
+"""Solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one.
 
 All carry the displacements u now and u- one period T before. The other regions enter by their
 displacements on the right side (eq 7).
@@ -96,7 +96,7 @@ def semi_implicit(body: RegionMatrices, at: Ints, T: Floats) -> SemiImplicit:
 
 
 def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> RegionSolver:
-    """The named solver of the unknowns `at` (w,), once every T s."""
+    """Return the named solver of the unknowns `at` (w,), once every T s."""
     if name in ("semi_implicit", "static"):
         return semi_implicit(body, at, np.full(len(at), np.inf if name == "static" else T))
     kind = Explicit if name == "explicit" else ImplicitExplicit
@@ -107,7 +107,8 @@ def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> Reg
 def critical_period(
     name: SolverName, body: RegionMatrices, at: Ints, taut: sparse.csr_array | None = None
 ) -> float:
-    """The longest stable T s of an explicit region whose neighbours stand still; else infinite.
+    """Return the longest stable T s of an explicit region whose neighbours stand still; else
+    infinite.
 
     `taut` (w, w) N/m is what a law adds to K at once. Eq 5: 2/w, whatever the damping. Eq 6:
     w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.

@@ -1,4 +1,4 @@
-"""Static schemes: linear, Newton at large strain, contact, displacements without mechanics.
+"""Static schemes: linear, Newton at large strain, contact, interpolation without mechanics.
 
 Start with `quasi_static`, then `newton`.
 """

@@ -70,7 +70,7 @@ def contact_units(scene: Scene) -> dict[str, str]:
 
 
 def contact_numbers(parts: Candidates, scene: Scene, now: Touched) -> dict[str, float]:
-    """The numbers of `contact_units`, on the whole body; what presses is positive."""
+    """Return the numbers of `contact_units`, on the whole body; what presses is positive."""
     numbers: dict[str, float] = {}
     for k, part in enumerate(scene.contacts):
         found = _numbers(parts, scene.copies, k, now)
@@ -127,7 +127,7 @@ class ContactNewton:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for what is not handled, and for a body that nothing holds, counting
+        """Raise `SceneError` for what is not handled, and for a body that nothing holds, counting
         what touches at rest."""
         scene = system.scene
         require_handled(scene, self)

@@ -91,7 +91,8 @@ class Equilibrium:
         stresses: Floats | None = None,
         multipliers: Floats | None = None,
     ) -> Balance:
-        """The forces at u, P and the inputs, with volumes asked for as ratios `target` (c,)."""
+        """Return the forces at u, P and the inputs, with volumes asked for as ratios `target`
+        (c,)."""
         cavities = self.system.cavities
         x = self._places(u)
         ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
@@ -113,7 +114,7 @@ class Equilibrium:
         )  # fmt: skip
 
     def tangent(self, at: Balance) -> Tangent:
-        """Factorises A at a balance; `SceneError` where a pivot vanishes."""
+        """Factorise A at a balance; `SceneError` where a pivot vanishes."""
         free, moves = self.system.free, self.system.moves
         A = self._matrix(at)
         factor = factorise_indefinite(A[free][:, free], self.order)
@@ -147,11 +148,12 @@ class Equilibrium:
         return out
 
     def predicted(self, at: Balance, tangent: Tangent, move: Floats, target: Floats) -> Balance:
-        """The linear response to a change `move` (k + l,) of the inputs, forces not yet known."""
+        """Return the linear response to a change `move` (k + l,) of the inputs, forces not yet
+        known."""
         return self._moved(at, tangent, tangent.inputs @ move, target)
 
     def correction(self, at: Balance, tangent: Tangent, target: Floats) -> Balance:
-        """The Newton correction of an imbalance, forces not yet known."""
+        """Return the Newton correction of an imbalance, forces not yet known."""
         field = -self._solved(tangent.factor, at.residual[None])[0]
         return self._moved(at, tangent, field, target)
 
@@ -169,7 +171,7 @@ class Equilibrium:
 
 
 def equilibrium(system: System, constrained: bool) -> Equilibrium:
-    """Prepares the body and the elimination order, which holds for every tangent."""
+    """Prepare the body and the elimination order, which holds for every tangent."""
     mesh, free = system.scene.mesh, system.free
     require_held(system.scene, system.held)
     body = Body(system.scene)

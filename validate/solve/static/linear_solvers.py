@@ -1,4 +1,4 @@
-"""Ways to solve J x = b again and again for one J: what a step costs is mostly this choice.
+"""Solvers of J x = b for many b and one J, the main cost of a step.
 
 Iterative ones stop at a residual of `tolerance` |b|, which is no bound of the error: at 1e-6 the
 solution of a soft, nearly incompressible body is off by 6e-6 to 3e-3.
@@ -176,7 +176,7 @@ def solver_of(
     places: Floats,
     tolerance: float = TOLERANCE,
 ) -> Solver:
-    """The solver by name; unknown i belongs to node `node[i]` at `places[node[i]]` m.
+    """Return the solver by name; unknown i belongs to node `node[i]` at `places[node[i]]` m.
 
     Raises `SceneError` for a J that is not positive definite (the prefactored one sees it), or a
     dense one above 4000 unknowns.

@@ -1,4 +1,4 @@
-"""A static scheme solved on a grid of loads, and interpolated between them.
+"""Static scheme tabulated on a grid of loads, and interpolated between them.
 
 A body without memory is in one state per load, so a recorded stage that ramps and holds needs no
 solution per sample: cubic Lagrange interpolation between converged states is exact at the grid and
@@ -37,7 +37,7 @@ class Tabulated:
 
     @staticmethod
     def candidates(asked: Asked) -> tuple[Rival, ...]:
-        """A table of Newton's solutions over the load."""
+        """Return a table of Newton's solutions over the load."""
         if not isinstance(asked, StillBody):
             return ()
         spacing = asked.table
@@ -52,7 +52,7 @@ class Tabulated:
             raise SceneError(f"load grid of {self.step:g} m: expected a positive number")
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` unless the scene has exactly one drive."""
+        """Raise `SceneError` unless the scene has exactly one drive."""
         if len(system.scene.drives) != 1:
             raise SceneError(f"{len(system.scene.drives)} drives: a load grid supports one")
         inner = self.inner.prepare(system)
@@ -87,7 +87,8 @@ class TabulatedStepper:
         return self._at(0, self.table.states[0])
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The state at a drive (1,) m; a failure beyond the last load that has a solution."""
+        """Return the state at a drive (1,) m; a failure beyond the last load that has a
+        solution."""
         place = float(inputs[0]) / self.grid
         self._extend(max(int(np.ceil(place - _BEYOND)), _NODES - 1))
         table, last = self.table, len(self.table.states) - 1

@@ -1,5 +1,4 @@
-"""Static Newton for large strain: load steps with cut-back, whole corrections, reused
-factorisations, under drives, dead loads and the fluid in cavities.
+"""Static Newton at large strain: load steps with cut-back, reused factorisations, fluid cavities.
 
 The pressures of the volumetric law are unknowns of the iteration (`Body.extrapolated`). A
 correction of size d changes volumes by d^2, which near nu = .5 raises the residual of the
@@ -83,7 +82,7 @@ class StaticNewton:
             )
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a linear law or a body that can move rigidly."""
+        """Raise `SceneError` for a linear law or a body that can move rigidly."""
         scene = system.scene
         require_handled(scene, self)
         if not (scene.cavities or scene.inputs):

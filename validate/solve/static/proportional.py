@@ -1,4 +1,4 @@
-"""Statics under displacements alone: no modulus moves the field, and every force is proportional.
+"""Statics under prescribed displacements, where the modulus only scales the forces.
 
 One solution at E = 1 Pa, with the law's coefficients in proportion, therefore serves all moduli of
 a body: an identification of its modulus then costs one run.
@@ -38,7 +38,7 @@ class Proportional:
     inner: Scheme = part(QuasiStatic(), "the static scheme, for drives only")
 
     def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
-        """Raises `SceneError` for a scene with more than one material or anything that pushes back
+        """Raise `SceneError` for a scene with more than one material or anything that pushes back
         by itself, and what the inner scheme does not handle."""
         more = (scene.loads, scene.cavities, scene.foundations, scene.membranes, scene.regions)
         if any(more) or scene.tracked:
@@ -56,7 +56,7 @@ class Proportional:
 
 
 def in_proportion(m: Material, factor: float) -> Material:
-    """The material with its modulus and all coefficients in Pa times a factor."""
+    """Return the material with its modulus and all coefficients in Pa times a factor."""
     c = m.coefficients
     coefficients = replace(
         c, C01=factor * c.C01, C20=factor * c.C20, C30=factor * c.C30,

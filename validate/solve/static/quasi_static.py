@@ -1,4 +1,4 @@
-"""Statics at every step, K u = f: what a slow enough motion tends to. No mass is assembled."""
+"""Quasi-static scheme: K u = f at every step, without mass."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -117,7 +117,7 @@ class QuasiStatic:
         return (Rival(name, "static superposition", lambda dt: QuasiStatic(), stepped=False),)
 
     def prepare(self, system: System) -> Stepper:
-        """Raises `SceneError` for a law at large strain, cavities, or a body that can move."""
+        """Raise `SceneError` for a law at large strain, cavities, or a body that can move."""
         require_handled(system.scene, self)
         columns = np.hstack([system.moves, np.zeros_like(system.loads)])
         forces = np.hstack([-(system.K @ system.moves), system.loads])
@@ -142,7 +142,7 @@ class QuasiStaticStepper(InertialStepper):
         return State(0, np.zeros(len(self.columns)))
 
     def step(self, state: State, inputs: Floats) -> State:
-        """The static state under the inputs: drives in m, then loads in N."""
+        """Return the static state under the inputs: drives in m, then loads in N."""
         u = self.columns @ inputs
         r, loads = self.reactions, inputs[len(self.scene.drives) :]
         numbers = r.named(r.K @ u - r.loads @ loads + self.pressed @ inputs)

@@ -1,4 +1,4 @@
-"""A testing machine on a material point: stress against stretch, the whole record at once."""
+"""Testing machine on a material point: stress against stretch, the full record at once."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""Nodes against rigid bodies: which touch, and the constraints that hold them, without a penalty.
+"""Contact detection of nodes and rigid bodies, with constraints instead of a penalty.
 
 A node is open, sticks or slips. What touches loses the unknown along the normal, what sticks all of
 them: with u = T z + u_0 a Newton step is T^T K T z = -T^T (r + K u_0), and the contact forces are
@@ -70,7 +70,7 @@ class Candidates:
 
 
 def candidates(system: System) -> Candidates:
-    """The nodes of all contacts; quadratic faces by the middles of their edges."""
+    """Return the nodes of all contacts; quadratic faces by the middles of their edges."""
     scene, mesh = system.scene, system.scene.mesh
     nodes = [_touching(scene, part) for part in scene.contacts]
     areas = [scene.thickness * nodal_integrals(mesh, part.facets) for part in scene.contacts]
@@ -244,7 +244,7 @@ def _sparse(shape: tuple[int, int], *entries: tuple[Floats, Ints, Ints]) -> spar
 
 
 def entered(at: Frame, status: Ints, x: Floats, deep: float) -> Ints:
-    """The status (c,) with what lies deeper than `deep` m at x (c, d) m put in touch."""
+    """Return the status (c,) with what lies deeper than `deep` m at x (c, d) m put in touch."""
     parts, (gaps, normals) = at.parts, at.look(x)
     able = np.abs(normals * parts.free).max(axis=1, initial=0.0) > _FLAT
     kind = np.where(parts.friction > 0, STICK, SLIP)
@@ -254,7 +254,7 @@ def entered(at: Frame, status: Ints, x: Floats, deep: float) -> Ints:
 def updated(
     at: Frame, status: Ints, x: Floats, residual: Floats, small: float, deep: float
 ) -> Ints:
-    """The status (c,) that gaps below -`deep` m and forces beyond `small` N ask for."""
+    """Return the status (c,) that gaps below -`deep` m and forces beyond `small` N ask for."""
     parts, found = at.parts, rub(at, x, residual)
     leaves = (status != OPEN) & (found.normal < -small)
     rubs = (status != OPEN) & (parts.friction > 0) & ~leaves

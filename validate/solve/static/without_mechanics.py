@@ -1,4 +1,4 @@
-"""The model that knows no mechanics: every component is interpolated by Laplace's equation.
+"""Baseline without mechanics: every component is interpolated by Laplace's equation.
 
 What a law of elasticity adds to the motion of a surface is what it does better than this one.
 """

@@ -1,4 +1,4 @@
-"""The cheapest method that meets an error and a rate.
+"""Choice of the cheapest method that meets an error and a rate.
 
 Start with `study`.
 """

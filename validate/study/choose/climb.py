@@ -1,4 +1,4 @@
-"""Pilot runs of a choice, rung by rung from the cheapest methods on, with bounds on their times.
+"""Pilot runs of candidate methods, from the cheapest on, with bounds on their times.
 
 Once a pick is known, a candidate (a solver with one element) is first timed for a few steps on the
 coarsest mesh. Finer meshes are slower, so that its other cells run only where this time is not
@@ -153,7 +153,7 @@ def time_bound(pilot: Measured | None) -> float | None:
 
 
 def require_judged(trial: Trial, unit: ErrorUnit) -> None:
-    """Raises `UsageError` where the scene has nothing in that unit, naming what it has."""
+    """Raise `UsageError` where the scene has nothing in that unit, naming what it has."""
     element, levels = next(iter(trial.meshes.items()))
     scene = trial.build(element, levels[0], "linear")
     has = {"m": ("displacements",), "N": driving(scene), "Pa": cavity_pressures(scene)}

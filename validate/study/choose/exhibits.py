@@ -1,4 +1,4 @@
-"""What a choice shows: the verdict, the scene's numbers, the ladder with its evidence."""
+"""Report of a choice: verdict, the scene's figures, candidate methods with their evidence."""
 
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ _MM, _US = 1e3, 1e6
 
 
 def choose_exhibits(choice: Choice) -> tuple[Exhibit, ...]:
-    """The verdict and its evidence, then the table that it rests on."""
+    """Return the verdict and its evidence, then the table that it rests on."""
     return (
         Exhibit("choice", "The choice", tuple(words(choice)), charts=(_chart(choice),)),
         Exhibit("numbers", "Properties of the scene", tables=(_facts(choice),)),
@@ -53,7 +53,7 @@ def words(choice: Choice) -> Iterator[str]:
 
 
 def described(row: TradeRow, choice: Choice) -> str:
-    """A row by its numbers."""
+    """Return a row by its numbers."""
     error, time = error_of(row, choice.by) or 0.0, row.time_s or 0.0
     step = f", steps of {_MM * row.dt:.3g} ms" if row.solver.stepped else ""
     reached = choice.trade.shown(error)

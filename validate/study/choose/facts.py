@@ -1,4 +1,4 @@
-"""A scene's own numbers, and what they ask of a method: a choice shows them beside its pilots."""
+"""Figures of a scene and the requirements on a method that follow from them."""
 
 import json
 from collections.abc import Iterator
@@ -73,7 +73,8 @@ def _shown(effect: dict[str, Any]) -> ShownEffect:
 
 
 def with_effects(trial: Trial, experiment: Experiment, effects: ShownEffects | None) -> Trial:
-    """The ladder whose candidates are marked where they lack an effect that the recording shows."""
+    """Return the ladder whose candidates are marked where they lack an effect that the recording
+    shows."""
     shown = {e.name for e in effects.shown} if effects else set()
     specs = [s for s in experiment.effects if s.name in shown]
     return replace(
@@ -91,7 +92,7 @@ def _marked(rival: Rival, trial: Trial, experiment: Experiment, specs: list[Effe
 
 
 def lacks(rival: Rival, trial: Trial, experiment: Experiment, effect: EffectSpec) -> bool:
-    """Whether a candidate is the scheme of the effect's other method, without the effect.
+    """Return whether a candidate is the scheme of the effect's other method, without the effect.
 
     Effects between two variants of one scheme are parts of the scene, which every candidate has. A
     scheme of an accepted method lacks nothing.

@@ -1,4 +1,4 @@
-"""The cheapest method of a scene that meets an error and a rate: a ladder, climbed by pilot runs.
+"""Choice of the cheapest method that meets an error and a rate, by pilot runs.
 
 The pilots are the cells of the trade, run rung by rung from the cheapest methods on. The choice is
 the fastest cell of all that meet both. Once one does, candidates are left out whose step on their
@@ -60,7 +60,7 @@ class Climbed:
 
 @dataclass(frozen=True)
 class Choice:
-    """What was found; `pick` is None where nothing meets both, `nearest` is what comes nearest.
+    """Result; `pick` is None where no method meets both, `nearest` is the nearest one.
 
     `by`: "total" counts what the declared law costs, "error" does not. `confirmed` is the pick with
     a state at every tick of the rate, where its own step is longer.
@@ -133,14 +133,14 @@ def misses(row: TradeRow, want: Wanted, by: str, dynamic: bool) -> tuple[float, 
 
 
 def meeting(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> list[TradeRow]:
-    """The rows that meet both and leave nothing of the scene out, fastest first."""
+    """Return the rows that meet both and leave nothing of the scene out, fastest first."""
     whole = [r for r in rows if not r.solver.lacks]
     good = [r for r in whole if max(misses(r, want, by, dynamic)) <= 1]
     return sorted(good, key=lambda r: r.time_s or 0.0)
 
 
 def nearest(rows: Sequence[TradeRow], want: Wanted, by: str, dynamic: bool) -> TradeRow:
-    """The row whose worse miss is least; raises `UsageError` when no row has an error."""
+    """Return the row whose worse miss is least; raises `UsageError` when no row has an error."""
     scored = [r for r in rows if error_of(r, by) is not None and not r.solver.lacks]
     if not scored:
         raise UsageError(f"none of {len(rows)} pilot runs has an error; see 'study tradeoff'")
@@ -154,7 +154,8 @@ def choose(
     again: Again,
     effects: ShownEffects | None = None,
 ) -> Choice:
-    """The choice from trades that grow rung by rung; `again` runs a row's cell with another step s.
+    """Return the choice from trades that grow rung by rung; `again` runs a row's cell with another
+    step s.
 
     Where large strain could not be solved, what the declared law costs is not counted either.
     Raises `UsageError` where no rung has a cell, or no cell an error.
@@ -286,7 +287,7 @@ def _bounded(climbed: Climbed, excluded: Sequence[Excluded]) -> Climbed:
 
 
 def evidence(trade: Trade, row: TradeRow, by: str) -> str:
-    """What a rung's best row reached, and what its error is made of."""
+    """Return the best result of a candidate method, and the parts of its error."""
     error, time = error_of(row, by) or 0.0, row.time_s or np.nan
     words = f"{row.label}: {trade.shown(error)} at {1 / time:.3g} Hz"
     if row.solver_error is not None and row.mesh_error is not None:

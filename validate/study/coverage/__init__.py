@@ -1,4 +1,4 @@
-"""How often the verdicts of the package are wrong.
+"""Coverage study: error rates of the package's verdicts.
 
 Start with `study`.
 """

@@ -1,4 +1,4 @@
-"""On a worker: exact readings of a world, and what the checks of a method are judged with."""
+"""Worker data of a coverage study: exact readings of a model, and terms of the checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -156,7 +156,7 @@ def drawable(o: Observation) -> Drawable:
 
 
 def run_reading(bench: CoverageBench, cell: ReadingCell) -> ExactReading:
-    """Raises `ComparisonError` for a run that does not reach the end, and what solving does."""
+    """Raise `ComparisonError` for a run that does not reach the end, and what solving does."""
     road = bench.road
     parameters = in_world(road.experiment, road.parameters, cell.world)
     found = solve(
@@ -173,7 +173,7 @@ def run_reading(bench: CoverageBench, cell: ReadingCell) -> ExactReading:
 
 
 def run_terms(bench: CoverageBench, cell: TermsCell) -> AllStated:
-    """Raises `ComparisonError` where the method compares nothing."""
+    """Raise `ComparisonError` where the method compares nothing."""
     mine = bench.followed(cell.method)
     found = [
         _stated(mine.residuals[name], terms)

@@ -1,4 +1,4 @@
-"""On a worker: draws of a method's recordings, each judged in every world.
+"""Cell of a coverage study: draws of a method's recordings, with verdicts in every world.
 
 A drawn recording is the real one with its samples where a true model would have them: exact
 readings less measured samples add up, so that inputs, and parameters that are wrong, are
@@ -81,7 +81,7 @@ class Given:
         return DrawBench(self, bench.road, bench.followed(self.method))
 
     def truth(self, draw: int) -> ExactReading:
-        """What exact sensors would read with that draw's inputs."""
+        """Return the readings of exact sensors with that draw's inputs."""
         return self.full[draw] if draw in self.full else self.linear(draw)
 
     def linear(self, draw: int) -> ExactReading:

@@ -152,7 +152,7 @@ def _terms_shown(
 
 
 def together(given: Given, records: Sequence[Draws]) -> JointShare:
-    """The verdict over all checks of a method."""
+    """Return the verdict over all checks of a method."""
     differing = [d for r in records for d in r.overall[PERFECT]]
     return JointShare(given.method, Share(sum(differing), len(differing)), len(given.stated))
 

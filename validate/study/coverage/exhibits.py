@@ -1,4 +1,4 @@
-"""What a coverage study shows: shares with intervals, terms of u_val against draws, power."""
+"""Report of a coverage study: shares with intervals, terms of u_val against draws, power."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""What a coverage study tells: its sentence, its part of results.json and its table of draws."""
+"""Page of a coverage study: sentence, part of results.json and table of draws."""
 
 from collections import Counter
 from dataclasses import asdict
@@ -27,7 +27,7 @@ def told(study: Coverage) -> Findings:
 
 
 def sentence(study: Coverage) -> str:
-    """How often a perfect model differs, in one sentence."""
+    """Return the share of rejected perfect models, in one sentence."""
     words = Counter(q.finding.word for q in study.quantities)
     found = ", ".join(f"{n} {word}" for word, n in words.items())
     joint = ", ".join(f"{100 * t.share.value:.1f} % ({t.method})" for t in study.together)
@@ -50,7 +50,7 @@ def _named(study: Coverage, word: str) -> str:
 
 
 def document(study: Coverage) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """Return the study's own part of results.json: SI, nothing that is not finite."""
     return {
         "kind": "coverage",
         "passed": study.passed,

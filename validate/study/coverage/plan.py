@@ -1,4 +1,4 @@
-"""What a coverage study runs: readings of a perfect model and of wrong ones, then draws."""
+"""Plan of a coverage study: readings of a perfect model and of wrong ones, then draws."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class World:
 
 @dataclass(frozen=True)
 class ReadingCell:
-    """What exact sensors would read of `method` in a world."""
+    """Cell of the readings of exact sensors of `method` in a world."""
 
     method: str
     world: World
@@ -65,7 +65,7 @@ class ReadingCell:
 
 @dataclass(frozen=True)
 class TermsCell:
-    """What every check of a method is judged with."""
+    """Cell of the terms of every check of a method."""
 
     method: str
     key: str = ""
@@ -92,8 +92,8 @@ class DrawCell:
 
 
 def true_method(experiment: Experiment, name: str) -> str:
-    """The method whose runs are the truth: the judged one itself, for a filter the reference or
-    the first accepted one that sees no marker. Raises `ComparisonError` where there is none."""
+    """Return the method whose runs are the truth: the judged one itself, for a filter the reference
+    or the first accepted one that sees no marker. Raises `ComparisonError` where there is none."""
     methods = experiment.methods
     wanted = (name, experiment.reference, *experiment.accepted, *methods)
     for other in wanted:
@@ -143,7 +143,7 @@ def draws_of(experiment: Experiment, draws: int, seed: int) -> Floats:
 
 
 def numbered(names: Sequence[str]) -> list[str]:
-    """Names of which none stands twice."""
+    """Return the names, made distinct."""
     return [
         name if name not in names[:k] else f"{name} ({1 + names[:k].count(name)})"
         for k, name in enumerate(names)
@@ -151,7 +151,7 @@ def numbered(names: Sequence[str]) -> list[str]:
 
 
 def in_world(experiment: Experiment, parameters: Any, world: World) -> Any:
-    """The parameters as they are in a world."""
+    """Return the parameters as they are in a world."""
     by_name = inputs_of(experiment)
     for name, z in world.moves:
         parameters = by_name[name].move(parameters, z)

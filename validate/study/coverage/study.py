@@ -1,4 +1,4 @@
-"""Coverage of our own verdicts: how often a perfect model is called different, and a wrong one not.
+"""Coverage study: how often a perfect model is rejected, and a wrong one accepted.
 
 from validate.study.coverage.study import coverage
 found = coverage("kf_cube")
@@ -76,7 +76,7 @@ def coverage(
     where: Where | None = None,
     report: Report | None = None,
 ) -> Coverage:
-    """Runs what is not finished yet in `out`/<name>/study-coverage/cells.
+    """Run what is not finished yet in `out`/<name>/study-coverage/cells.
 
     `noise` is the real noise over the declared one: 2 asks what a standard deviation that is
     declared too small would do. Raises `UsageError` for too few draws or a noise that is none,

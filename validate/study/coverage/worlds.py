@@ -1,4 +1,4 @@
-"""Exact readings of a judged method in all worlds of a coverage study, each solved once.
+"""Exact readings of a tested method in all worlds of a coverage study, each solved once.
 
 What is dear is solved less often: inputs and wrong parameters then act by straight lines, and the
 study says so.
@@ -221,7 +221,7 @@ def finished(study: Study, plan: Plan[C, R], where: Where | None) -> Finished[R]
 
 
 def kept(bench: T, job: Job) -> T:
-    """The bench that is open already."""
+    """Return the bench that is open already."""
     return bench
 
 

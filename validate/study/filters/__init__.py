@@ -1,4 +1,4 @@
-"""Which filter setting is best on a recording: sweep, scores, ranking, choice.
+"""Filter study: sweep of filter settings, scores, ranking, choice.
 
 Start with `study`.
 """

@@ -1,4 +1,4 @@
-"""What the cells of a filter study share: recordings, registrations, systems and truths."""
+"""Worker data that cells of a filter study share: recordings, registrations, systems, truths."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -80,7 +80,7 @@ class Ready:
         return self.method.prepare(self.system, self.registered, given)
 
     def run(self, name: str, kept: KeptFields) -> Run:
-        """The method through the recorded inputs."""
+        """Return the method through the recorded inputs."""
         kept = replace(kept, system=self.system)
         (run,) = run_on(
             self.experiment,
@@ -124,8 +124,8 @@ class Bench:
         self._loaded: Kept[_Loaded] = Kept(4)
 
     def ready(self, cell: FilterCell, seed: int) -> tuple[Ready, ...]:
-        """The cell's method on each of its recordings: one that the twin makes with that seed, or
-        those that were measured."""
+        """Return the cell's method on each of its recordings: one that the twin makes with that
+        seed, or those that were measured."""
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         if not self.experiment.repeats:
             return self._on_measured(cell, method)
@@ -226,8 +226,8 @@ class Bench:
         )
 
     def truth(self, ready: Ready) -> Mapping[str, Floats]:
-        """The twin's motion at the probes: noise does not touch it, so the first seed's serves
-        all; empty without a twin."""
+        """Return the twin's motion at the probes: noise does not touch it, so the first seed's
+        serves all; empty without a twin."""
         if not self.experiment.repeats:
             return {}
         motions = self._truths.get(

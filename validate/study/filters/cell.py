@@ -1,4 +1,4 @@
-"""A filter study's cell: one method with its settings, on every seed or on the measured recordings.
+"""Cell of a filter study: one method with its settings, on every seed or recording.
 
 Seeds change the noise only: a linear filter whose gains need no data runs them all at once, every
 other method one by one.
@@ -82,7 +82,7 @@ class Timing:
 
 
 def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
-    """Raises what the cell's settings, its filter or its run end with."""
+    """Raise what the cell's settings, its filter or its run end with."""
     first = bench.ready(cell, cell.seeds[0])[0]
     if cell.baseline == "persistence":
         return _persistence(bench, cell, first)
@@ -101,7 +101,7 @@ def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
 
 
 def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
-    """The runs of a cell.
+    """Return the runs of a cell.
 
     Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
     every marker is held out in turn of a method that is given two and more. One that is given a

@@ -263,7 +263,8 @@ def study_exhibits(study: FilterStudy) -> tuple[Exhibit, ...]:
 def ranking_table(
     study: FilterStudy, ranking: Ranking, name: str, most: int | None = None
 ) -> NumberTable:
-    """The first `most` places: cell, score with interval, ties, consistency, time of a step."""
+    """Return the first `most` places: cell, score with interval, ties, consistency, time of a
+    step."""
     unit, shown = shown_unit(study.unit)[1], ranking.rows[:most]
     columns: Mapping[str, Shown] = {
         "place": "place", "method": "cell.name", "settings": _settings,
@@ -301,7 +302,7 @@ def _front(r: Ranked) -> str:
 
 
 def best_exhibit(study: FilterStudy) -> Exhibit:
-    """The best settings as commands, with those that are not distinguishable from them."""
+    """Return the best settings as commands, with those that are not distinguishable from them."""
     words = []
     factor, shown = shown_unit(study.unit)
     for best in study.best:
@@ -357,7 +358,7 @@ def _ranking_words(study: FilterStudy) -> Iterator[str]:
 
 
 def over(study: FilterStudy) -> str:
-    """What a score is taken over."""
+    """Return the samples that a score is taken over, in words."""
     seeds, blocks = len(study.plan.seeds), study.rankings[0].blocks
     if seeds > 1:
         return seeds_text(seeds)

@@ -20,7 +20,7 @@ from validate.study.study_page import Findings
 
 
 def findings(study: FilterStudy) -> Findings:
-    """The study with the parameters and methods that it began with."""
+    """Return the study with the parameters and methods that it began with."""
     experiment, job = study.plan.experiment, study.plan.job
     options = Options(dict(job.values), study.plan.methods, job.quick)
     parameters, methods = configure(experiment, options)
@@ -55,7 +55,7 @@ def sentence(study: FilterStudy) -> str:
 
 
 def document(study: FilterStudy) -> dict[str, Any]:
-    """The part of results.json that the study adds: SI, finite numbers."""
+    """Return the part of results.json that the study adds: SI, finite numbers."""
     done = study.done
     return {
         "kind": "filters",

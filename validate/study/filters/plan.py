@@ -1,4 +1,4 @@
-"""What a filter study will run: every method with every set of values, over common seeds."""
+"""Plan of a filter study: every method with every set of values, over common seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ class FilterCell:
 
     @property
     def name(self) -> str:
-        """What a ranking calls it."""
+        """Name in a ranking."""
         if self.baseline == "persistence":
             return "last measurement, held"
         return f"{self.method}, given nothing" if self.baseline else self.method
@@ -56,11 +56,12 @@ class FilterCell:
         return f"{self.name}{given}{seeds}"
 
     def in_turn(self, moving: Sequence[str]) -> bool:
-        """Whether every marker is held out in turn: `--hold-out each`, or no marker is free."""
+        """Return whether every marker is held out in turn: `--hold-out each`, or no marker is
+        free."""
         return self.hold_out == EACH or set(moving) <= set(self.given)
 
     def scored(self, moving: Sequence[str]) -> tuple[str, ...]:
-        """The markers at which a method that is given none is scored as held out."""
+        """Return the markers at which a method that is given none is scored as held out."""
         if self.hold_out and self.hold_out != EACH:
             return self.hold_out
         turns = self.spared if self.in_turn(moving) else ()
@@ -102,7 +103,7 @@ def plan(
     seeds: int | tuple[int, ...] | None = None,
     hold_out: tuple[str, ...] = (),
 ) -> FilterPlan:
-    """Checks every path and value before anything runs.
+    """Check every path and value before anything runs.
 
     `seeds`: so many from the declared seed of the twin on, or these (None: `SEEDS`; a measured
     recording has one). An axis of one method multiplies its cells only. Raises `UsageError` for

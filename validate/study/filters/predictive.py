@@ -1,4 +1,4 @@
-"""Predictive likelihood of methods without one: plain FEM and the last measurement held.
+"""Predictive likelihood of methods without one: plain FEM and the last measurement.
 
 A Gaussian about the prediction, of variance R + q per measured component: R is the noise of one
 measurement, q >= 0 the variance of the model. Its maximum-likelihood estimate over errors e is
@@ -22,7 +22,8 @@ Records = Mapping[str, Record[FilterScores]]
 
 
 def with_likelihoods(cells: Sequence[FilterCell], records: Records) -> Records:
-    """The records, with a likelihood for the methods without innovations of every condition."""
+    """Return the records, with a likelihood for the methods without innovations of every
+    condition."""
     scored = dict(records)
     for condition in dict.fromkeys(c.condition for c in cells):
         values = {

@@ -201,14 +201,14 @@ def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
 
 
 def tied(difference: SeedInterval) -> bool:
-    """Whether the interval of a difference holds zero, or there is none (one sample)."""
+    """Return whether the interval of a difference holds zero, or there is none (one sample)."""
     return difference.half is None or abs(difference.mean) <= difference.half
 
 
 def dominator(i: int, errors: Sequence[float], times: Sequence[float]) -> int | None:
-    """The first that has less error than i in at most its time, or no more error in less time;
-    times within `SAME_TIME` are equal, and so are errors within `SAME_ERROR`: two solvers of one
-    system differ by rounding. None on the Pareto front."""
+    """Return the first that has less error than i in at most its time, or no more error in less
+    time; times within `SAME_TIME` are equal, and so are errors within `SAME_ERROR`: two solvers of
+    one system differ by rounding. None on the Pareto front."""
     for j, (error, time) in enumerate(zip(errors, times, strict=True)):
         better = SAME_ERROR * error < errors[i] and time <= SAME_TIME * times[i]
         faster = error <= SAME_ERROR * errors[i] and SAME_TIME * time < times[i]

@@ -1,5 +1,4 @@
-"""Scores of a filter study: errors against a twin's truth, errors at what was withheld, likelihood
-of the innovations, and NIS."""
+"""Scores of a filter study: true error, error at withheld data, log-likelihood and NIS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +15,12 @@ from validate.study.filters.withheld_errors import Innovations, PredictionErrors
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """The factor and the unit in which a score of `unit` (SI) is shown."""
+    """Return the factor and the unit in which a score of `unit` (SI) is shown."""
     return (1e3, "mm") if unit == "m" else (1.0, unit)
 
 
 def unit_text(unit: str) -> str:
-    """A shown unit after a number in a sentence: " mm"; "" for a number without unit."""
+    """Return a shown unit after a number in a sentence: " mm"; "" for a number without unit."""
     return "" if unit == "1" else f" {unit}"
 
 
@@ -123,7 +122,7 @@ class FilterScores:
 
 
 def of_score(withheld: Sequence[Withheld], by: str) -> list[Withheld]:
-    """The quantities that a score is made of."""
+    """Return the quantities that a score is made of."""
     if by == WITHHELD:
         return [w for w in withheld if w.marker]
     if by in (HELD_OUT, AHEAD):
@@ -139,7 +138,7 @@ def summed(withheld: Sequence[Withheld]) -> tuple[Floats, Floats] | None:
 
 
 def name_of(w: Withheld) -> str:
-    """The name of the score of one quantity."""
+    """Return the name of the score of one quantity."""
     return f"{w.name}.{AHEAD if w.ahead else HELD_OUT}"
 
 

@@ -1,5 +1,4 @@
-"""How filters end when their step, noise settings or measurements are far from what they were made
-for: every run finishes, or has diverged or is refused, with the reason."""
+"""Robustness of filters far from their design settings: finished, diverged or refused."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -50,7 +49,7 @@ class FilterChange:
 
 @dataclass(frozen=True)
 class FilterEnding:
-    """How a run ended, after so many of its steps, and why."""
+    """Outcome of a run, with its number of steps and the reason."""
 
     state: str
     step: int
@@ -129,7 +128,7 @@ def _factors(settings: Any, name: str) -> tuple[float, float]:
 
 
 def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
-    """Raises what the settings or the registration refuse."""
+    """Raise what the settings or the registration refuse."""
     ready = _changed(bench.ready(change.cell, change.cell.seeds[0])[0], change)
     steps = min(STEPS, len(ready.registered.t))
     ready = replace(ready, method=replace(ready.method, steps=steps))
@@ -187,7 +186,7 @@ def endings_exhibit(endings: FilterEndings) -> Exhibit:
 
 
 def sentence(endings: FilterEndings) -> str:
-    """How many runs ended how, in one sentence."""
+    """Return the number of runs by outcome, in one sentence."""
     states = [e.state for _, e in endings.rows]
     counted = ", ".join(f"{states.count(s)} {s}" for s in dict.fromkeys(sorted(states)))
     bugs = f"; {len(endings.bugs)} ended in an error: {endings.bugs[0]}" if endings.bugs else ""
@@ -208,7 +207,7 @@ def endings_document(endings: FilterEndings) -> list[dict[str, Any] | None]:
 
 
 def with_endings(findings: Findings, endings: FilterEndings) -> Findings:
-    """The page of a stability map with how filters end."""
+    """Return the page of a stability map with how filters end."""
     return replace(
         findings,
         exhibits=(*findings.exhibits, endings_exhibit(endings)),

@@ -1,4 +1,4 @@
-"""The filter sweep: every method and setting over common seeds, ranked with intervals.
+"""Filter study: every method and setting over common seeds, ranked with intervals.
 
 from validate.study.filters.study import study
 result = study("kf_cube", ["methods.kf_printed.Q=log:1e-12:1e-6:7"], methods=("kf_printed",))
@@ -149,7 +149,7 @@ def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
 
 
 def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
-    """The first of the usual scores that every filter has; else the first of a filter."""
+    """Return the first of the usual scores that every filter has; else the first of a filter."""
     filters = [v for r in done.records.values() if (v := r.value) is not None and v.nis is not None]
     usual = (POOLED, HELD_OUT if in_turn else WITHHELD, AHEAD)
     names = (*usual, *(filters[0].scores if filters else ()))
@@ -192,8 +192,9 @@ def _edges(planned: FilterPlan, cell: FilterCell) -> tuple[str, ...]:
 
 
 def run_line(planned: FilterPlan, cell: FilterCell) -> str:
-    """The `validate run` command of a cell, with the methods it is judged beside: the reference
-    that speeds are compared with and those whose checks decide, as `cell` alone may have none."""
+    """Return the `validate run` command of a cell, with the methods it is judged beside: the
+    reference that speeds are compared with and those whose checks decide, as `cell` alone may have
+    none."""
     experiment = planned.experiment
     beside = [m for m in experiment.methods if m in (*experiment.accepted, experiment.reference)]
     methods = tuple(dict.fromkeys((*beside, cell.method)))

@@ -1,5 +1,4 @@
-"""Errors of an estimate at data that it was not given: withheld markers, later samples, outlines
-and forces.
+"""Errors of an estimate at withheld data: markers, later samples, outlines and forces.
 
 Squared errors are summed over short segments of time, so that a ranking can put them together in
 blocks as long as its innovations stay correlated.
@@ -89,7 +88,7 @@ class Segments:
         return np.asarray(np.where(inside, segment, -1), dtype=np.int64)
 
     def sums(self, t: Floats, values: Floats) -> Floats:
-        """Sums (segments,) of values (n,) at times (n,) s."""
+        """Return the sums (segments,) of values (n,) at times (n,) s."""
         at = self.number(t)
         return np.asarray(np.bincount(at[at >= 0], values[at >= 0], self.count), dtype=float)
 
@@ -167,7 +166,7 @@ class MarkerTracks:
 
 
 def marker_tracks(registered: Registered, system: System) -> MarkerTracks | None:
-    """The markers that are free to move; None where there is none."""
+    """Return the markers that are free to move; None where there is none."""
     observations = registered.of(MarkerObservation)
     if not observations:
         return None
@@ -288,7 +287,7 @@ class OutlineTracks:
 
 
 def outline_tracks(registered: Registered, given: Sequence[str]) -> tuple[OutlineTracks, ...]:
-    """The outlines among what filters are given."""
+    """Return the outlines among what filters are given."""
     return tuple(
         OutlineTracks(o.name, o.t, o.along_normals(NORMALS))
         for o in registered.of(OutlineObservation)
@@ -340,12 +339,12 @@ def _none(name: str, unit: str, segments: Segments) -> Withheld:
 
 
 def by_seed(every: Sequence[tuple[Withheld, ...]]) -> tuple[Withheld, ...]:
-    """The errors of all seeds, one row each."""
+    """Return the errors of all seeds, one row each."""
     return _joined(every, 0)
 
 
 def in_a_row(every: Sequence[tuple[Withheld, ...]]) -> tuple[Withheld, ...]:
-    """The errors on several recordings, one after the other."""
+    """Return the errors on several recordings, one after the other."""
     return _joined(every, 1)
 
 

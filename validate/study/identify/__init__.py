@@ -1,4 +1,4 @@
-"""Parameters from a recording with profiles and correlations.
+"""Identification study: parameters from a recording with profiles and correlations.
 
 Start with `study`.
 """

@@ -1,4 +1,4 @@
-"""What of an identification a worker evaluates: a fit from one start, or one side of a profile."""
+"""Cell of an identification: a fit from one start, or one side of a profile."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -79,7 +79,7 @@ class IdentifyBench:
         self._problems: Kept[Problem] = Kept(8)
 
     def problem(self, of: Of) -> Problem:
-        """Raises what loading the recordings that calibrate does."""
+        """Raise what loading the recordings that calibrate does."""
         return self._problems.get(of, lambda: self._problem(of))
 
     def _problem(self, of: Of) -> Problem:

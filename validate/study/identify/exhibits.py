@@ -1,4 +1,4 @@
-"""What an identification shows: values with intervals, profiles, correlations, starts."""
+"""Report of an identification: values with intervals, profiles, correlations, starts."""
 
 from collections.abc import Iterator, Mapping
 

@@ -1,4 +1,4 @@
-"""What an identification tells: its sentence, its part of results.json and its table of cells."""
+"""Page of an identification: sentence, part of results.json and table of cells."""
 
 from dataclasses import asdict
 from typing import Any
@@ -34,8 +34,8 @@ def sentence(study: IdentifyStudy) -> str:
 
 
 def unidentified(study: IdentifyStudy) -> list[str]:
-    """A line for each parameter that its recordings do not identify, and each method that has no
-    answer to them."""
+    """Return a line for each parameter that its recordings do not identify, and each method that
+    has no answer to them."""
     return [f"{name} could not be fitted: {why}" for name, why in study.failed.items()] + [
         not_identified(c, e, free)
         for c in study.calibrated
@@ -45,7 +45,7 @@ def unidentified(study: IdentifyStudy) -> list[str]:
 
 
 def document(study: IdentifyStudy) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """Return the study's own part of results.json: SI, nothing that is not finite."""
     return {
         "kind": "identify",
         "identified": study.identified,

@@ -1,4 +1,4 @@
-"""Identification of an experiment's parameters: starts and profiles side by side, kept as they end.
+"""Identification of an experiment's parameters: starts and profiles in parallel, stored at once.
 
 from validate.study.identify.study import identification
 found = identification("silicone_beam", wanted=("material.E=1e5:1e6",))
@@ -99,7 +99,7 @@ class InCells:
         return Job(str(self._path), file_sha256(self._path), hashes, values, self._options.quick)
 
     def finished(self, plan: Plan[C, R]) -> list[R]:
-        """The cells' values in order."""
+        """Return the cells' values in order."""
         found = finish(
             replace(plan, shares=True, after=self._after), self._folder, self._where, self._report
         )
@@ -174,7 +174,7 @@ def identification(
     where: Where | None = None,
     report: Report | None = None,
 ) -> IdentifyStudy:
-    """Runs what is not finished yet in `out`/<name>/study-identify/cells.
+    """Run what is not finished yet in `out`/<name>/study-identify/cells.
 
     Raises children of `ValidateError` for bad input, and where no start converges.
     """

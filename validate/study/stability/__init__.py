@@ -1,4 +1,4 @@
-"""Where schemes stay stable: step, material, damping; the gain of a pressure loop.
+"""Stability study: limits of schemes by step, material, damping; gain of a pressure loop.
 
 Start with `study`.
 """

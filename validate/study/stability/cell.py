@@ -1,4 +1,4 @@
-"""One variant on a worker: all modes once, then every scheme and step on them.
+"""Cell of a stability map: all modes of one variant, then every scheme and step.
 
 Radii, measured and predicted limits, condition numbers, locking, rounding and drift; or the one
 line for which the variant is refused.
@@ -75,7 +75,7 @@ class StabilityBench:
 
 
 def open_bench(job: Job) -> StabilityBench:
-    """Raises `ComparisonError` for an experiment that has nothing to be stepped."""
+    """Raise `ComparisonError` for an experiment that has nothing to be stepped."""
     body = body_of(job.experiment())
     if body is None:
         raise ComparisonError(
@@ -85,7 +85,7 @@ def open_bench(job: Job) -> StabilityBench:
 
 
 def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
-    """Raises `SceneError` for a variant that cannot be."""
+    """Raise `SceneError` for a variant that cannot be."""
     base, v = bench.body, cell.variant
     system = build(base.build(v))
     modes = {mass: frequencies(system, mass) for mass in ("consistent", "lumped")}
@@ -124,7 +124,8 @@ def _scheme(
 
 
 def measured_limit(radius: Callable[[float], float], near: float, border: float) -> float | None:
-    """The step s at which a radius crosses `border`, by bisection around `near`; None if none."""
+    """Return the step s at which a radius crosses `border`, by bisection around `near`; None if
+    none."""
     low, high = near / _REACH, near * _REACH
     if radius(low) > border or not radius(high) > border:
         return None

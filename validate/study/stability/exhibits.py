@@ -1,4 +1,4 @@
-"""What a stability map shows: claims, the papers' settings, maps, limits, what cells cost."""
+"""Report of a stability map: claims, the papers' settings, maps, limits, cost of cells."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

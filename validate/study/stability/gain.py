@@ -1,4 +1,4 @@
-"""The stability map of a static experiment: the gain of the loop that keeps a fluid's volume.
+"""Stability of a pressure loop: critical gain of a static experiment with a fluid.
 
 Nothing steps in time there, but paper 000's loop P <- P + Kp (1 - V/V0) (eqs 9 and 10) is a fixed
 point that settles where every |1 - Kp dV/dP / V0| < 1. Predicted: 2 / (dV/dP / V0) at the pressure
@@ -119,7 +119,7 @@ def open_bench(job: Job) -> GainBench:
 
 
 def run_cell(bench: GainBench, cell: GainCell) -> GainLimit:
-    """Raises `ComparisonError` where no pressure keeps the volume."""
+    """Raise `ComparisonError` where no pressure keeps the volume."""
     drives = cell.load * bench.largest
     tuned = tuned_gain(bench.responses)
     reach = 10 ** (DECADES / 2)

@@ -1,4 +1,4 @@
-"""What a stability map tells: its sentence, its part of results.json and its table of cells."""
+"""Page of a stability map: sentence, part of results.json and table of cells."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ def told(study: Stability) -> Findings:
 
 
 def sentence(study: Stability) -> str:
-    """What was computed and whether the predictions hold, in one sentence."""
+    """Return the computed cells and the validity of the predictions, in one sentence."""
     regimes = Counter(p.regime for p in study.all_points)
     found = ", ".join(f"{n} {name}" for name, n in sorted(regimes.items()))
     failed = [p.name for p in study.predictions if not p.holds]
@@ -41,7 +41,7 @@ def sentence(study: Stability) -> str:
 
 
 def document(study: Stability) -> dict[str, Any]:
-    """The study's own part of results.json: SI, nothing that is not finite."""
+    """Return the study's own part of results.json: SI, nothing that is not finite."""
     return {
         "kind": "stability",
         "passed": study.passed,

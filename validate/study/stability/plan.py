@@ -1,4 +1,4 @@
-"""Which variants of a body a stability map holds: each axis alone, and axes in pairs."""
+"""Plan of a stability map: variants of a body along each axis and along pairs of axes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class StabilityCell:
 
 
 def step_grid(dt: float, quick: bool = False) -> Floats:
-    """Steps (k,) s over six decades, `dt` in the middle."""
+    """Return the steps (k,) s over six decades, `dt` in the middle."""
     per = 2 if quick else PER_DECADE
     exponents = np.arange(DECADES * per + 1) / per - DECADES / 2
     return np.asarray(dt * 10.0**exponents)
@@ -77,12 +77,12 @@ def stability_cells(
 
 
 def drift_variant(base: StabilityBody) -> Turned:
-    """The undamped body on the coarsest mesh: what 1e5 steps are taken of."""
+    """Return the undamped body on the coarsest mesh: what 1e5 steps are taken of."""
     return replace(base.base, mesh=base.meshes[0], mass_damping=0.0, stiffness_damping=0.0)
 
 
 def axis(base: StabilityBody, name: str) -> tuple[Turned, ...]:
-    """The variants along one axis from the base: nu, E, damping, quality or mesh."""
+    """Return the variants along one axis from the base: nu, E, damping, quality or mesh."""
     return tuple(replace(base.base, **changes) for changes in _axes(base)[name])
 
 

@@ -1,4 +1,4 @@
-"""Stability of a static experiment: the gain of its pressure loop, or that nothing is stepped."""
+"""Stability of a static experiment: gain of its pressure loop, if it has one."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -19,7 +19,7 @@ _NOTHING = (
 
 
 def told_nothing(experiment: Experiment, quick: bool) -> Findings:
-    """A page that says so."""
+    """Return a page that says so."""
     said = _NOTHING.format(name=experiment.name)
     words = Exhibit("stability", "No scheme steps in time", (said,))
     document = {"kind": "stability", "points": 0}

@@ -1,4 +1,4 @@
-"""The stability map of an experiment's body: every scheme over step, material, damping, mesh.
+"""Stability map of an experiment's body: every scheme over step, material, damping, mesh.
 
 from validate.study.stability.study import stability
 found = stability("needle_block")
@@ -33,7 +33,7 @@ Regime = Literal["stable", "unresolved", "unstable", "refused"]
 
 
 def declared() -> Mapping[str, Stepping]:
-    """The step maps of all schemes by name."""
+    """Return the step maps of all schemes by name."""
     return {s.name: s for s in steppings()}
 
 
@@ -107,7 +107,7 @@ def stability(
     where: Where | None = None,
     report: Report | None = None,
 ) -> Stability | None:
-    """Runs what is not finished yet in `out`/<name>/study-stability/cells.
+    """Run what is not finished yet in `out`/<name>/study-stability/cells.
 
     None for an experiment without density, in which nothing steps in time. Raises `UsageError` for
     a body with too many modes, or a scheduler that does not answer.

@@ -1,4 +1,4 @@
-"""Stored runs side by side, and statements over all of them; nothing is run.
+"""Comparison and summary of stored runs, without new runs.
 
 Start with `score_comparison`.
 """

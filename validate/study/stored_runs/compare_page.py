@@ -1,4 +1,4 @@
-"""Stored runs side by side as a folder: page with pictures, all scores as a table, one document."""
+"""Folder of a comparison of stored runs: page with figures, table of scores, one document."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ _DRAWN = 40  # scores of a picture
 
 
 def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) -> Path:
-    """Replaces `folder`; returns the path of report.html. Raises what `replace_folder` does."""
+    """Replace `folder`; returns the path of report.html. Raises what `replace_folder` does."""
     told = (
         " and ".join(dict.fromkeys(r.experiment for r in found.runs)),
         "Stored runs side by side",

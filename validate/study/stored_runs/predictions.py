@@ -1,4 +1,4 @@
-"""Predictions of stored runs: which runs count, which of their checks, and why the others do not.
+"""Predictions of stored runs: counted runs and checks, and reasons for the others.
 
 A run counts once. Of several runs of the same recordings the one counts with the fewest changed
 parameters, then the newest: other settings are no other experiment. Runs of other recordings with

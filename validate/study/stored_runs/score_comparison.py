@@ -1,4 +1,4 @@
-"""Comparison of stored runs by the scores in their long tables. Nothing is run."""
+"""Comparison of stored runs by the scores in their long tables."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -74,12 +74,12 @@ class SideBySide:
 
 
 def read_run(path: Path) -> StoredRun:
-    """A report folder, or its results.json; raises `UsageError` for anything else."""
+    """Return a report folder, or its results.json; raises `UsageError` for anything else."""
     return _read(path, _run, "score")
 
 
 def read_table(path: Path, *parts: str) -> LongTable:
-    """The table of a run with these parts, or all that is stored; raises as `read_run`."""
+    """Return the table of a run with these parts, or all that is stored; raises as `read_run`."""
     return _read(path, lambda table: table, *parts)
 
 
@@ -240,7 +240,8 @@ class Pair:
 
 
 def pairs(found: SideBySide, *, every: bool = False) -> tuple[tuple[Pair, ...], int, int]:
-    """The pairs to show, how many more there are, and how many rows of `found` none of them has.
+    """Return the pairs to show, how many more there are, and how many rows of `found` none of them
+    has.
 
     Runs that share methods: the first against every other. Else their methods: accepted ones first,
     the first of one run against the first of the other, at most `MOST` unless `every` is asked for.
@@ -285,7 +286,8 @@ _TIMES = ("setup", "step.")  # scores that differ from run to run whatever was c
 def narrowed(
     runs: Sequence[StoredRun], methods: Sequence[str] = (), scores: Sequence[str] = ()
 ) -> tuple[StoredRun, ...]:
-    """The runs with the methods and scores that any of the patterns (`kf_*`) fits; none: all.
+    """Return the runs with the methods and scores that any of the patterns (`kf_*`) fits; none:
+    all.
 
     Raises `UsageError` for a pattern that fits nothing in any run.
     """

@@ -1,4 +1,4 @@
-"""A statement over all stored runs: how far off predictions are, by what was measured."""
+"""Summary of all stored runs: bias and scatter of predictions, by measured quantity."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Covered:
 
 @dataclass(frozen=True)
 class OfKind:
-    """What predictions of one kind of quantity say together.
+    """Bias and scatter of predictions of one kind of quantity.
 
     `stated` is None where a prediction has the wrong sign: then there is no ratio; `why` says so,
     and why an interval is missing.
@@ -74,7 +74,7 @@ def summary(reports: Path) -> Summary:
 
 
 def area_of(point: Foretold) -> float:
-    """The area metric of one prediction, in its unit."""
+    """Return the area metric of one prediction, in its unit."""
     return area_metric(point.error, point.u_simulated, point.u_measured)
 
 

@@ -1,4 +1,4 @@
-"""A statement over all stored runs as a page, its tables and one JSON document."""
+"""Page of a summary of all stored runs, with its tables and one JSON document."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
@@ -37,7 +37,7 @@ _WORDS = (
 
 
 def write_summary(found: Summary, folder: Path) -> Path:
-    """Replaces `folder`; returns the path of report.html. Raises what `replace_folder` does."""
+    """Replace `folder`; returns the path of report.html. Raises what `replace_folder` does."""
     told = (
         "summary", "Prediction errors over all stored runs", f"{len(found.taken)} stored runs",
         sentence(found),
@@ -56,7 +56,7 @@ def write_summary(found: Summary, folder: Path) -> Path:
 
 
 def sentence(found: Summary) -> str:
-    """The statement over measured recordings in one sentence."""
+    """Return the statement over measured recordings in one sentence."""
     if not found.kinds:
         return "No stored run of a measured recording counts; twins are in a separate table."
     points = sum(len(k.points) for k in found.kinds)
@@ -81,13 +81,13 @@ def _short(kind: OfKind) -> str:
 
 
 def percent(value: float, *, sign: bool = False) -> str:
-    """A relative value in per cent, two digits."""
+    """Return a relative value in per cent, two digits."""
     plus = "+" if sign and value > 0 else ""
     return plus + significant(_PERCENT * value, 2)
 
 
 def row(kind: OfKind) -> tuple[str, ...]:
-    """A kind of quantity as texts under `STATED` and `COVERED`."""
+    """Return a kind of quantity as texts under `STATED` and `COVERED`."""
     s, c = kind.stated, kind.covered
     specimens = len({p.specimen for p in kind.points})
     stated = ("–", "–", "–") if s is None else (
@@ -101,7 +101,7 @@ def row(kind: OfKind) -> tuple[str, ...]:
 
 
 def interval(found: Estimated, shift: float = 0.0) -> str:
-    """A value with its interval, in per cent."""
+    """Return a value with its interval, in per cent."""
     signed = shift != 0
     if not signed and found.value == 0:
         most = "" if found.high is None else f" (to {percent(found.high)})"

@@ -1,4 +1,4 @@
-"""Error against time per step over solvers, meshes and steps.
+"""Trade-off study: error against time per step over solvers, meshes and steps.
 
 Start with `study`.
 """

@@ -1,4 +1,4 @@
-"""One solver on one mesh of a ladder, timed and kept with its answer; or an answer to compare with.
+"""Cell of a trade-off: one solver on one mesh, timed and stored; or a reference answer.
 
 Cells with a solver run one after another on one thread: times of workers side by side would be
 those of their quarrel over memory.
@@ -148,7 +148,7 @@ def open_trial(job: Job) -> Trial:
 
 
 def run_cell(trial: Trial, cell: TradeCell) -> Measured:
-    """Raises what an answer to compare with ends with; a solver's failures are in its strides."""
+    """Raise what an answer to compare with ends with; a solver's failures are in its strides."""
     if cell.part == "solver":
         return _measured(trial, cell, trial.solver(cell.solver))
     scheme, law = _scheme(trial, cell)

@@ -1,4 +1,4 @@
-"""What a trade shows: front, what each error is made of, set-up, memory, convergence, failures."""
+"""Report of a trade-off: front, parts of each error, set-up, memory, convergence, failures."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Bytes that a prepared solver holds: its arrays, sparse matrices and factors, each once."""
+"""Memory of a prepared solver: arrays, sparse matrices and factors in bytes, each once."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass

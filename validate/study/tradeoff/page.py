@@ -1,4 +1,4 @@
-"""What a trade or a choice tells: its sentence, its part of results.json, its table of cells."""
+"""Page of a trade-off or choice: sentence, part of results.json, table of cells."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,7 +34,7 @@ def told_choice(choice: Choice) -> Findings:
 
 
 def sentence(trade: Trade) -> str:
-    """What ran and what lies on the front, in one sentence."""
+    """Return the number of cells and the ends of the Pareto front, in one sentence."""
     scored = sum(r.error is not None for r in trade.rows)
     on = trade.front()
     ends = ""
@@ -66,7 +66,7 @@ def cells_table(trade: Trade) -> NumberTable:
 
 
 def trade_document(trade: Trade) -> dict[str, Any]:
-    """The trade's part of results.json: SI, nothing that is not finite."""
+    """Return the trade's part of results.json: SI, nothing that is not finite."""
     fronts = {by: trade.front(by) for by in ("error", "total")}
     cells = cells_table(trade)
     return {

@@ -1,4 +1,4 @@
-"""Error against time per step: every solver x element x mesh x step of an experiment's ladder.
+"""Trade-off study: every solver x element x mesh x step of an experiment's ladder.
 
 The error is taken apart: what is left with a solver that makes none on that mesh is the mesh's, the
 rest is the solver's; what the declared law costs is a pair of runs at large strain.
@@ -164,7 +164,7 @@ class Trade:
         return _SHOWN[self.unit][1]
 
     def shown(self, error: float, digits: int = 3) -> str:
-        """An error as text with its unit."""
+        """Return an error as text with its unit."""
         return f"{self.scale * error:.{digits}g} {self.shown_unit}"
 
     @property
@@ -196,7 +196,7 @@ class Trade:
         )
 
     def front(self, by: str = "error") -> ParetoFront:
-        """The Pareto front of `by` ("error" or "total") against time per step."""
+        """Return the Pareto front of `by` ("error" or "total") against time per step."""
         return front(self.rows, by, self.floor)
 
 
@@ -218,7 +218,7 @@ def front(rows: tuple[TradeRow, ...], by: str, floor: float = 0.0) -> ParetoFron
 
 
 def trade_cells(trial: Trial, job: Job) -> tuple[TradeCell, ...]:
-    """The answers that errors are taken from, then every solver on every mesh it takes."""
+    """Return the answers that errors are taken from, then every solver on every mesh it takes."""
     shortest = trial.steps[-1:]
     meshes = [(e, n) for e, levels in trial.meshes.items() for n in levels]
     found = [
@@ -263,7 +263,8 @@ def plan_of(job: Job, cells: tuple[TradeCell, ...]) -> Plan[TradeCell, Measured]
 def again(
     trade: Trade, row: TradeRow, dt: float, out: Path | None = None, where: Where | None = None
 ) -> TradeRow:
-    """The row's solver on its mesh with another step s, measured against the same reference."""
+    """Return the row's solver on its mesh with another step s, measured against the same
+    reference."""
     job = job_of(trade.experiment, quick=trade.quick)
     bare = TradeCell("solver", row.element, row.level, (dt,), row.solver.name, AGAIN_S)
     cell = keyed(job, bare)
