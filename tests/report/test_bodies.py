@@ -154,9 +154,7 @@ def test_renders(tmp_path: Path, project_root: Path) -> None:
     with np.load(tmp_path / "marked.npz") as found, np.load(tmp_path / "1.npz") as one:
         red, green, blue = found["marked"].astype(int).transpose(2, 0, 1)
         assert ((red > 150) & (green < 130) & (blue < 60)).sum() > 10  # the arrows
-        assert (found["marked"].max(axis=2) < 60).sum() > (
-            one["render_deformed"].max(axis=2) < 60
-        ).sum()  # the markers
+        assert not near(found["marked"], one["render_deformed"])
     with np.load(tmp_path / "1.npz") as one, np.load(tmp_path / "2.npz") as two:
         assert all(one[name].min() < 200 < one[name].max() for name in one.files)
         assert near(one["render_rest"], two["render_rest"])

@@ -1,5 +1,4 @@
-"""The simulated body to be drawn, with what was measured on it: deformed state, plates, the plane
-that opens it, the camera, markers and outline."""
+"""Geometry of a drawn body: deformed state, plates, cutting plane, camera, markers, outline."""
 
 from dataclasses import dataclass
 
