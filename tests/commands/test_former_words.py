@@ -15,6 +15,7 @@ COMMAND = (
 )
 
 
+@pytest.mark.usefixtures("shared_data")  # of hanging_bar
 def test_the_former_option_works_with_one_warning_line(tmp_path: Path) -> None:
     for words in (("run", "hanging_bar"), ("study", "tradeoff", "hanging_bar")):
         both = [
@@ -27,6 +28,7 @@ def test_the_former_option_works_with_one_warning_line(tmp_path: Path) -> None:
         assert "not installed: there is no program 'no-such-program'" in now[2]
 
 
+@pytest.mark.usefixtures("shared_data")  # of hanging_bar
 def test_both_options_name_simulators(tmp_path: Path) -> None:
     words = ("--external", "python", "--guest", "no-such-program")
     code, _, err = here("run", "hanging_bar", "--quick", "--out", str(tmp_path), *words)
@@ -34,6 +36,7 @@ def test_both_options_name_simulators(tmp_path: Path) -> None:
     assert "no-such-program" in err.splitlines()[-1]
 
 
+@pytest.mark.usefixtures("shared_data")  # of hanging_bar
 def test_the_former_command_works_with_one_warning_line(tmp_path: Path) -> None:
     words = ("job", "hanging_bar", "--method", "hexahedra", "-o")
     code, out, err = here("guest", *words, str(tmp_path / "former"))
