@@ -44,7 +44,7 @@ def test_the_former_command_works_with_one_warning_line(tmp_path: Path) -> None:
     assert here("external", *words, str(tmp_path / "now"))[::2] == (0, "")
     former, now = ((tmp_path / n / "job.json").read_text("utf-8") for n in ("former", "now"))
     assert former == now
-    assert "job.json and mesh.vtu of hexahedra" in out
+    assert "job.json and mesh.vtu of hexahedra" in " ".join(out.split())
     assert here("guest", "check", "no-such-program")[0] == 2
 
 
