@@ -273,6 +273,9 @@ def test_landmarks_touched_exactly_lie_where_all_others_say() -> None:
     run = predicting(seen)
     (found,) = seen.anew(seen.left(run), Exact()).deviations(run, EVERYTHING)
     assert found.values == pytest.approx(np.zeros((6, 3)), abs=1e-9)
+    assert found.t is not None
+    assert found.t.tolist() == seen.t.tolist()
+    assert found.axes == ("x", "y", "z")
 
 
 @pytest.mark.slow

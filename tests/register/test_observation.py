@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats, Ints, rms
-from validate.compare.residual import _of
+from validate.compare.residual import Residual, _of, _volumes, stacked
 from validate.compare.verdict import errors_of
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.assembly.locate import nearest_node_rows
@@ -32,6 +32,7 @@ from validate.register.signals import (
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
+# private: _volumes: called alone.
 # private: _of: the residual of one deviation, drawn 300 times.
 
 T = np.array([0.0, 1.0, 2.0])
@@ -453,3 +454,34 @@ def test_a_record_that_is_no_vector_is_refused(text: str) -> None:
     with pytest.raises(RegistrationError, match=f"up is '{text}': expected three numbers"):
         vector(text, "up")
     assert vector("1 -2e-3 0", "up").tolist() == [1.0, -0.002, 0.0]
+
+
+# --- times ----------------------------------------------------------------------------------------
+
+
+def test_outlines_at_several_instants_have_the_time_of_each_point() -> None:
+    none: object = None
+    seen = Round("o", "validates", T, (ROUND,) * 3, np.eye(4), 1e-4, none, 0.0)  # type: ignore[arg-type]
+    late = {d.quantity: d for d in seen.deviations(ramp(()), Selection("late", T[1:]))}
+    for quantity, count in (("contour", len(ROUND)), ("contour.area", 1)):
+        t = late[quantity].t
+        assert t is not None
+        assert t.tolist() == [1.0] * count + [2.0] * count
+    assert all(d.t is None for d in seen.deviations(ramp(()), Selection("1s", T[1:2])))
+
+
+def test_the_volume_of_a_cavity_has_its_times_and_recordings_are_joined_with_theirs() -> None:
+    run = Simulated({"cyst.volume_ratio": Trace(np.array([1.0, 1.1, 1.2, 1.3, 1.4]), "1")})
+    (late,) = _volumes(run, Selection("late", np.array([1.0, 2.0])))  # type: ignore[arg-type]
+    assert late.t is not None
+    assert (late.values[:, 0], late.t) == (pytest.approx([0.2, 0.4]), pytest.approx([1.0, 2.0]))
+    (every,) = _volumes(run, EVERYTHING)  # type: ignore[arg-type]
+    assert every.t is not None
+    assert every.t.tolist() == RUN_T.tolist()
+    (hold,) = _volumes(run, Selection("1s", np.array([1.0])))  # type: ignore[arg-type]
+    assert (hold.t, hold.simulated, hold.measured) == (None, 1.2, 1.0)
+    one = Residual("tip", "all", np.zeros((2, 1)), 0.0, 0.0, "m", "", t=np.array([1.0, 2.0]))
+    joined = stacked([one, replace(one, t=np.array([3.0, 4.0]))])["tip@all"].t
+    assert joined is not None
+    assert joined.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert stacked([one, replace(one, t=None)])["tip@all"].t is None

@@ -36,3 +36,5 @@ def test_a_rigid_disk_is_held_against_every_image() -> None:
     (off,) = seen(np.array([4e-3, 5e-3, 6e-3])).deviations(run, EVERYTHING)
     np.testing.assert_allclose(off.values[:, 0], [1e-3, -1e-3, -3e-3], atol=1e-9)
     assert (off.sd, off.systematic) == (pytest.approx(2e-3), pytest.approx(2e-4))
+    assert off.t is not None
+    assert off.t.tolist() == T.tolist()

@@ -35,6 +35,8 @@ def test_an_error_is_relative_to_its_row_and_rest_has_none() -> None:
     assert (found.unit, found.sd, found.systematic) == ("1", 0.03, 0.01)
     assert found.reference is not None
     assert found.reference[:, 0].tolist() == [1.0, 1.0]
+    assert found.t is not None
+    assert found.t.tolist() == [1.0, 2.0]
 
 
 def test_two_stresses_are_relative_to_the_larger_one() -> None:
@@ -43,6 +45,8 @@ def test_two_stresses_are_relative_to_the_larger_one() -> None:
     run = Ran({"nominal_stress": Trace(first, "Pa"), "second_stress": Trace(second, "Pa")})
     (found,) = seen(y).deviations(run, EVERYTHING)
     assert found.values[:, 0] == pytest.approx([0.0, 0.1, -0.05, 0.02])
+    assert found.t is not None
+    assert found.t.tolist() == [1.0, 1.0, 2.0, 2.0]
 
 
 def test_what_is_no_stress_is_not_compared() -> None:
