@@ -27,7 +27,7 @@ from validate.report.exhibits import DrawnExhibit, draw_all, drawing
 from validate.report.export.fields import open_fields, write_fields
 from validate.report.export.tables import caption, word_columns
 from validate.report.export.tables import shown as read
-from validate.report.html import page
+from validate.report.page.html import page
 from validate.report.scenes import gl
 from validate.report.scenes.loads import at_times, held
 from validate.report.scenes.maps import ranges, values

@@ -11,7 +11,7 @@ from report_samples import small_result
 
 from validate.parameters import Changed
 from validate.report.exhibits import draw_all
-from validate.report.html import page
+from validate.report.page.html import page
 from validate.report.sections.provenance import how
 from validate.report.stored import environment as module
 from validate.report.stored.environment import environment

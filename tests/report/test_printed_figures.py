@@ -13,7 +13,7 @@ from validate.compare.exhibit import Entry, plain
 from validate.compare.published import Published
 from validate.compare.result import Result
 from validate.report.exhibits import draw_all
-from validate.report.html import page
+from validate.report.page.html import page
 from validate.report.sections.verdicts import band
 from validate.report.stored.store import document, schema
 

@@ -218,7 +218,8 @@ class RegimeMap:
 class Intervals:
     """values (k,) ± halves (k,) each with its limit (k,), all in the unit of its line, NaN = none.
 
-    `texts` are the numbers as read, `answers` what follows from them.
+    `texts` are the numbers as read, `answers` what follows from them, `quantities` what each line
+    compares (empty: not told).
     """
 
     name: str
@@ -230,6 +231,7 @@ class Intervals:
     texts: tuple[str, ...]
     answers: tuple[str, ...]
     caption: str = ""
+    quantities: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         shape, fail = (len(self.labels),), ComparisonError

@@ -106,7 +106,7 @@ def _fill(
 ) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import drawing, in_turn, write_files
-    from validate.report.html import page
+    from validate.report.page.html import page
     from validate.report.replay.mcap import write_replay
     from validate.report.sections.provenance import how
     from validate.report.sections.sections import parts

@@ -43,7 +43,7 @@ def fill_page(
 ) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import draw_all, write_files
-    from validate.report.html import page
+    from validate.report.page.html import page
 
     for name in ("tables", "figures"):
         (folder / name).mkdir()

@@ -114,16 +114,16 @@ def shown_body(result: Result) -> ShownBody | None:
     frame, load, t = _frame(method)
     nodes = _MM * scene.mesh.nodes
     wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
-    toward = _toward(scene)
-    normal, cut = _opened(result, toward) if cavity else (None, "")
+    toward = drive_direction(scene)
+    normal, cut = opening_plane(result, toward) if cavity else (None, "")
     return ShownBody(
         label=method.label,
         part=f" One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
         load=load,
         mesh=scene.mesh,
         u=_MM * run.u[frame],
-        plates=_plates(method, frame),
-        indenters=_indenters(method, frame),
+        plates=plates_at(method, frame),
+        indenters=indenters_at(method, frame),
         cavity=cavity.facets if cavity else None,
         pressure=float(trace.y[run.at[frame]]) if trace else None,
         pressures=(0.0, max(float(trace.y.max()), 1.0)) if trace else (0.0, 1.0),
@@ -172,7 +172,7 @@ def _load(hold: Held) -> str:
     return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, hold.unit)
 
 
-def _toward(scene: AnyScene) -> Floats:
+def drive_direction(scene: AnyScene) -> Floats:
     """Where the body is driven or pressed to, else where its weight pulls; without either the last
     axis is drawn upward."""
     tools = scene.contacts if isinstance(scene, Scene) else ()
@@ -182,7 +182,7 @@ def _toward(scene: AnyScene) -> Floats:
     return np.array([*drives, *pressed, *weights, (0.0, 0.0, -1.0)][0])
 
 
-def _opened(result: Result, toward: Floats) -> tuple[Floats, str]:
+def opening_plane(result: Result, toward: Floats) -> tuple[Floats, str]:
     """The normal of the plane that opens the body, its largest part positive, and the plane in
     words: that of the images, without any one along the drive."""
     seen = outline(result.registered[0]) if result.registered else None
@@ -192,7 +192,7 @@ def _opened(result: Result, toward: Floats) -> tuple[Floats, str]:
     return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))])), "the image plane"
 
 
-def _indenters(method: MethodResult, frame: int) -> tuple[ShownIndenter, ...]:
+def indenters_at(method: MethodResult, frame: int) -> tuple[ShownIndenter, ...]:
     scene, run = method.scene, method.run
     if not isinstance(scene, Scene):
         return ()
@@ -206,7 +206,7 @@ def _indenters(method: MethodResult, frame: int) -> tuple[ShownIndenter, ...]:
     return tuple(found)
 
 
-def _plates(method: MethodResult, frame: int) -> tuple[Plate, ...]:
+def plates_at(method: MethodResult, frame: int) -> tuple[Plate, ...]:
     """Flat facet sets across the first drive: the driven one and the held ones."""
     scene = method.scene
     drive = scene.drives[0] if scene.drives else None

@@ -16,10 +16,11 @@ from validate.report.charts.style import MEASURED, PALETTE
 from validate.report.scenes.body import ShownBody, ShownIndenter
 from validate.report.scenes.maps import TOWARD_EYE, Range, bar_title, colours, values, words
 from validate.report.scenes.residual_arrows import rounded_down
+from validate.report.scenes.skin import flat_triangles
 from validate.report.views.numbers import significant
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere
 from validate.scene.mesh import boundary_facets
-from validate.scene.shape_functions import EDGES, LATTICE
+from validate.scene.shape_functions import LATTICE
 
 _IN_FRONT = (
     0.985  # the wall is drawn this much smaller than the hole it lines, to be seen before it
@@ -266,7 +267,7 @@ def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
     if body.cavity is None:
         return
     facets = body.mesh.facets[body.cavity]
-    triangles = facets if facets.shape[1] == 3 else facets[:, _QUARTERS].reshape(-1, 3)
+    triangles = flat_triangles(facets)
     nodes = 1e3 * body.mesh.nodes
     if edges and body.normal is not None:  # whole triangles, as the elements beside them
         below = (nodes - body.origin) @ body.normal < 0
@@ -291,16 +292,6 @@ def _add_wall(plotter: Any, body: ShownBody, scale: float, edges: bool) -> None:
         scalar_bar_args=bar,
         ambient=0.45,
     )
-
-
-def _quarters() -> list[list[int]]:
-    """The four triangles of a six-node one: three corners, then the middles in `EDGES` order."""
-    middle = {frozenset(edge): 3 + i for i, edge in enumerate(EDGES[2])}
-    a, b, c = (middle[frozenset(e)] for e in ((0, 1), (1, 2), (0, 2)))
-    return [[0, a, c], [a, 1, b], [c, b, 2], [a, b, c]]
-
-
-_QUARTERS = _quarters()
 
 
 def _aim(plotter: Any, body: ShownBody, oblique: bool) -> None:

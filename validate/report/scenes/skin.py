@@ -1,6 +1,6 @@
 """Surface of a mesh as triangles for display: outside and cavity walls, decimated if large.
 
-Quadratic facets are drawn by their corners. Thinning lays a grid over the surface and joins the
+A quadratic facet of six nodes is drawn as four triangles through its middles. Thinning lays a grid over the surface and joins the
 vertices in one of its boxes to the one nearest their mean, so every vertex drawn is a node and
 moves as computed.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.meshless import AnyScene
+from validate.scene.shape_functions import EDGES
 
 OUTSIDE = "outside"
 _FEWEST = 8  # triangles that a thinned part keeps, to remain a body
@@ -36,11 +37,22 @@ def skins(scene: AnyScene, most: int) -> tuple[SurfacePart, ...]:
     mesh = scene.mesh
     if mesh.dimension != 3:
         return ()
-    walls = {c.name: mesh.facets[c.facets][:, :3] for c in scene.cavities}
-    parts = {OUTSIDE: _without(boundary_facets(mesh.simplices, 3), list(walls.values())), **walls}
+    walls = {c.name: flat_triangles(mesh.facets[c.facets]) for c in scene.cavities}
+    six = mesh.surface.shape[1] == 6
+    outside = flat_triangles(mesh.surface) if six else boundary_facets(mesh.simplices, 3)
+    parts = {OUTSIDE: _without(outside, list(walls.values())), **walls}
     total = sum(len(t) for t in parts.values())
     share = min(1.0, most / total)
     return tuple(_skin(mesh, name, t, share) for name, t in parts.items() if len(t))
+
+
+def flat_triangles(facets: Ints) -> Ints:
+    """Return triangles (t, 3) for facets (f, m): six-node ones as four, others by their corners."""
+    if facets.shape[1] != 6:
+        return facets[:, :3]
+    middle = {frozenset(edge): 3 + i for i, edge in enumerate(EDGES[2])}
+    a, b, c = (middle[frozenset(e)] for e in ((0, 1), (1, 2), (0, 2)))
+    return facets[:, [[0, a, c], [a, 1, b], [c, b, 2], [a, b, c]]].reshape(-1, 3)
 
 
 def _without(facets: Ints, others: list[Ints]) -> Ints:

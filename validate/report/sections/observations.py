@@ -95,6 +95,18 @@ def markers(registered: Registered) -> MarkerObservation | None:
     return next(iter(registered.of(MarkerObservation)), None)
 
 
+def where_shown(result: Result) -> dict[str, str]:
+    """Return the section of the page that draws each compared quantity, by the quantity."""
+    sections = {MarkerObservation: "markers", OutlineObservation: "outlines"}
+    return {
+        quantity: sections.get(type(observation), "curves")
+        for method in result.methods
+        for registered in method.registered
+        for observation in registered.observations
+        for quantity in observation.units
+    }
+
+
 def axis_label(scene: AnyScene, axis: int) -> str:
     """Return an axis of the scene's frame with its unit, and which drive moves along it."""
     along = [d.name for d in scene.drives if abs(d.direction[axis]) > _ALONG]

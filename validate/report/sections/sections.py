@@ -45,17 +45,17 @@ SECTIONS: tuple[Section, ...] = (
     Section("outlines", "Outlines", also=outlines),
     Section("markers", "Markers", also=markers),
     Section("curves", "Load and displacement", ("curve", "difference"), None, _over_displacement),
+    Section("methods", "Models side by side", ("methods", "speeds", "errors", "errors_of_truth")),
     Section(
         "discrimination",
         "Which effects this recording can distinguish",
         ("effects", "budget"),
         discrimination,
     ),
-    Section("body", "The simulated body", also=body),
-    Section("methods", "Models side by side", ("methods", "speeds", "errors", "errors_of_truth")),
     Section("published", "Published figures", ("published", "settings")),
     Section("identified", "Identified parameters and notes", ("identified",), found_besides),
     Section("scores", "All scores", ("scores", "scores_by_load")),
+    Section("body", "The simulated body", also=body),
     Section("registration", "Registration", also=registration),
     Section("recording", "Recording", also=recording),
     Section("parameters", "Parameters and environment", also=parameters),
@@ -81,15 +81,15 @@ class Begun:
 
 
 def parts(result: Result, table: LongTable) -> tuple[Begun | Exhibit, ...]:
-    """Return the sections, and the experiment's own exhibits and views after the checks, with the
-    views that plug-ins and scripts added."""
+    """Return the sections, and the experiment's own exhibits and views after the compared pictures,
+    with the views that plug-ins and scripts added."""
     known = {view.name: view for view in VIEWS}
     found: list[Begun | Exhibit] = []
     for s in SECTIONS:
         views = s.views if s.when(result) else ()
         filled_ = tuple(filled(known[name], table) for name in views)
         found.append(Begun(s.anchor, s.title, filled_, s.also))
-        if s.anchor == "checks":
+        if s.anchor == "curves":
             own = [filled(view, table) for view in result.views]
             own += [
                 VIEWS.answer(v, lambda v: filled(v, table), Exhibit("", "")) for v in VIEWS.further

@@ -64,14 +64,14 @@ def _inputs(result: Result) -> Iterator[NumberTable]:
     if result.inputs:
         title = "Uncertain inputs of u_input; a range that was not measured is marked."
         columns = {"input": "name", "range": "range", "source": "source"}
-        yield table("inputs", title, result.inputs, columns)
+        yield table("inputs", title, result.inputs, columns, folded=True)
     if result.joint:
         yield table(
             "joint_inputs",
             "u_input to first order, one input at a time, and by draws of all inputs together "
             "(Latin hypercube of uniform ranges; rms distance from the simulated value). Checks "
             "use first order.",
-            result.joint, _JOINT,
+            result.joint, _JOINT, folded=True,
         )  # fmt: skip
 
 

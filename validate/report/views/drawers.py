@@ -126,7 +126,7 @@ def figure_of(part: Chart | Heat | Intervals, run: "HasMethods") -> "Figure":
 def page(found: Exhibit, run: "HasMethods") -> str:
     """Return the exhibit as a page of its own in HTML: one text without a request."""
     from validate.report.exhibits import draw_all
-    from validate.report.html import fragment
+    from validate.report.page.html import fragment
 
     return fragment(draw_all(run, [found]))
 
@@ -134,7 +134,7 @@ def page(found: Exhibit, run: "HasMethods") -> str:
 def part(found: Exhibit, run: "HasMethods") -> str:
     """Return the exhibit in HTML for a page that has a head and a style of its own."""
     from validate.report.exhibits import draw_all
-    from validate.report.html import sections
+    from validate.report.page.html import sections
 
     return sections(draw_all(run, [found]))
 

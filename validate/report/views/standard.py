@@ -18,7 +18,7 @@ _CHECKS = View(
         "u_num": "check.u_num", "u_input": "check.u_input", "values": "check:n",
         "limit from": "check.limit:note", "why": "check:note",
     },
-    below="why",
+    below="why", folded=True,
     caption="E = simulation minus measurement. max: the point with the largest |E| + 2 u_val; rms: "
     "the rms error, noise removed (0: below noise). u_val² = u_D² (measurement) + u_num² (mesh, "
     "step) + u_input² (declared ranges, and a filter's claimed error), standard uncertainties. "

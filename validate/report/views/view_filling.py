@@ -404,12 +404,13 @@ def _heat(view: View, rows: Sequence[LongRow], table: LongTable) -> Heat:
 def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Intervals:
     """Each row's value ± 2 sd, and its limit where it has one."""
     limits = {_place(r): r.value for r in table.where(part="check.limit").rows}
-    names, numbers, words = [], [], []
+    names, numbers, words, quantities = [], [], [], []
     for row in rows:
         if row.value is None or row.sd is None:
             continue
         limit = limits.get(_place(row))
         names.append(": ".join(filter(None, _key(row, texts(view.x), table))))
+        quantities.append(row.quantity)
         numbers.append((row.value, _TWO * row.sd, limit))
         words.append((with_unit(row.value, row.unit), with_unit(_TWO * row.sd, row.unit),
                       with_unit(limit, row.unit) if limit else MISSING,
@@ -417,7 +418,7 @@ def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Interva
     value, half, most = np.array(numbers, dtype=float).reshape(-1, 3).T  # None becomes NaN
     return Intervals(view.name, view.title, tuple(names), value, half, most,
                      tuple(f"{v} ± {u} of {most}" for v, u, most, _ in words),
-                     tuple(w[3] for w in words), view.caption)  # fmt: skip
+                     tuple(w[3] for w in words), view.caption, tuple(quantities))  # fmt: skip
 
 
 def _place(row: LongRow) -> tuple[str, ...]:

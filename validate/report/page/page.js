@@ -1,0 +1,510 @@
+// The page of a report when scripts run: a body that turns, curves that zoom, tables that sort.
+// Without it every still picture and every row is there. No request is made.
+"use strict";
+(() => {
+  const make = (tag, attributes = {}, ...children) => {
+    const one = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) {
+      if (name in one && typeof value !== "string") one[name] = value;
+      else one.setAttribute(name, value);
+    }
+    one.append(...children);
+    return one;
+  };
+  const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const shown = value => value == null ? "–" : String(Number(value.toPrecision(4)));
+
+  // --- sections: a link opens what it leads to --------------------------------------------------
+
+  const open = () => {
+    const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (!target) return;
+    for (let d = target.closest("details"); d; d = d.parentElement.closest("details")) d.open = true;
+    target.scrollIntoView();
+  };
+  addEventListener("hashchange", open);
+
+  // --- tables: sorted by their headings, filtered by a text ------------------------------------
+
+  const FILTERED_FROM = 9; // rows
+
+  function table(one) {
+    for (const heading of one.tHead.rows[0].cells) {
+      heading.tabIndex = 0;
+      heading.addEventListener("keydown", event => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault();
+        heading.click();
+      });
+    }
+    const below = new Map(); // the line of words that belongs to a row, while rows are sorted
+    one.addEventListener("sort-start", () => {
+      for (const line of one.querySelectorAll("tr.below")) {
+        below.set(line.previousElementSibling, line);
+      }
+      for (const line of below.values()) line.remove();
+    });
+    one.addEventListener("sort-end", () => below.forEach((line, row) => row.after(line)));
+    const box = one.closest(".table");
+    const rows = [...one.tBodies[0].rows].filter(row => !row.classList.contains("below"));
+    if (rows.length < FILTERED_FROM) return;
+    const caption = box.previousElementSibling;
+    const field = make("input", { type: "search", class: "filter", placeholder: "Filter rows",
+      "aria-label": `Filter the rows of: ${caption.textContent.slice(0, 60)}` });
+    field.addEventListener("input", () => {
+      const wanted = field.value.toLowerCase();
+      const fold = box.querySelector(".unfold");
+      if (fold && wanted) fold.checked = true;
+      for (const row of rows) {
+        const other = row.nextElementSibling;
+        const line = other && other.classList.contains("below") ? other : null;
+        const text = row.textContent + (line ? line.textContent : "");
+        const out = !text.toLowerCase().includes(wanted);
+        row.classList.toggle("filtered", out);
+        if (line) line.classList.toggle("filtered", out);
+      }
+    });
+    box.querySelector(".scroll").before(field);
+  }
+
+  // --- curves: uPlot ----------------------------------------------------------------------------
+
+  const HEIGHT = 300;
+
+  function curves(figure, script) {
+    const found = JSON.parse(script.textContent);
+    const ink = style("--ink");
+    const colour = given => given === "#000000" ? ink : given;
+    const positive = (values, axis) =>
+      found.log.includes(axis) && !found.linear ? values.map(v => v > 0 ? v : null) : values;
+    const tables = [], series = [{ label: found.x, value: (u, v) => shown(v) }], bands = [];
+    const seen = new Set();
+    for (const s of found.series) {
+      const number = series.length;
+      const look = { label: s.label, stroke: colour(s.colour), width: s.width, dash: s.dash,
+        value: (u, v) => shown(v), points: { show: false } };
+      if (s.style === "points") {
+        Object.assign(look, { paths: () => null, points: { show: true, size: 5, fill: colour(s.colour) } });
+      }
+      if (s.style === "band") {
+        const edge = { ...look, width: 0, label: `${s.label}, from` };
+        series.push(edge, { ...edge, label: `${s.label}, to` });
+        tables.push([s.x, positive(s.y, "y"), positive(s.upper, "y")]);
+        bands.push({ series: [number + 1, number], fill: `${s.colour}40` });
+      } else {
+        look.class = seen.has(s.label) ? "branch" : "";
+        series.push(look);
+        tables.push([s.x, positive(s.y, "y")]);
+      }
+      seen.add(s.label);
+    }
+    const ends = found.series.flatMap(s => s.x.length ? [s.x[0], s.x.at(-1)] : []);
+    const [low, high] = ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
+    for (const level of found.levels) {
+      series.push({ label: level.name ?? level.label, stroke: ink, width: 1, dash: [6, 4],
+        value: (u, v) => shown(v), points: { show: false } });
+      tables.push([low < high ? [low, high] : [low], low < high ? [level.y, level.y] : [level.y]]);
+    }
+    const scale = axis => {
+      if (axis === "y" && found.linear) return { distr: 4, asinh: found.linear };
+      return found.log.includes(axis) ? { distr: 3 } : {};
+    };
+    const axis = label => ({ label, stroke: ink, grid: { stroke: style("--line"), width: 1 },
+      ticks: { stroke: style("--line"), width: 1 }, labelSize: 22,
+      values: (u, ticks) => ticks.map(v => v == null ? "" : shown(v)) });
+    const box = make("div", { class: "plotted" });
+    figure.prepend(box);
+    let together = false; // branches of one curve are shown and hidden as one
+    const drawn = new uPlot({
+      width: Math.max(280, figure.clientWidth), height: HEIGHT, series, bands,
+      scales: { x: { time: false, ...scale("x") }, y: scale("y") },
+      axes: [axis(found.x), { ...axis(found.y), size: 62 }],
+      cursor: { drag: { x: true, y: true, uni: 20 } },
+      hooks: { setSeries: [(u, number, options) => {
+        if (together || number == null || options.show == null) return;
+        together = true;
+        u.series.forEach((s, i) => {
+          if (i !== number && s.label === u.series[number].label) u.setSeries(i, { show: options.show });
+        });
+        together = false;
+      }] },
+    }, uPlot.join(tables), box);
+    for (const row of box.querySelectorAll(".u-series.branch")) row.hidden = true;
+    box.append(make("p", { class: "note" },
+      "Drag to zoom, double-click to see all; a click on a name hides its curve."));
+    figure.classList.add("live");
+    new ResizeObserver(() => {
+      if (figure.clientWidth) drawn.setSize({ width: figure.clientWidth, height: HEIGHT });
+    }).observe(figure);
+  }
+
+  // --- the body: three.js -----------------------------------------------------------------------
+
+  const VIRIDIS = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
+  const ORANGE = "#d55e00", BLUE = "#0072b2", GREY = "#c9ced3";
+  const STEPS = 32767;
+
+  const numbers = (text, Kind) => {
+    const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+    return new Kind(bytes.buffer);
+  };
+
+  function body(figure, script) {
+    const view = JSON.parse(script.textContent);
+    const canvas = make("canvas", { tabindex: "0", role: "img" });
+    let renderer;
+    try {
+      renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    } catch {
+      return; // no WebGL: the still picture stays
+    }
+    const ramp = VIRIDIS.map(c => new THREE.Color(c));
+    const coloured = share => {
+      const x = Math.min(Math.max(share, 0), 1) * (ramp.length - 1), i = Math.min(Math.floor(x), ramp.length - 2);
+      return ramp[i].clone().lerp(ramp[i + 1], x - i);
+    };
+    const methods = view.methods.map(unpacked);
+    const frames = view.labels.length;
+
+    // What is shown.
+    const state = { method: 0, other: -1, frame: largest(methods[0]), by: "displacement",
+      markers: true, arrows: 1, outline: true, edges: false, cut: Boolean(view.cut), scale: 1 };
+
+    function unpacked(m) {
+      const nodes = numbers(m.nodes, Float32Array);
+      const triangles = m.parts.map(p => numbers(p.triangles, Uint32Array));
+      const shares = ({ top, shares }) => Float32Array.from(numbers(shares, Int16Array), v => v * top / STEPS);
+      const fields = Object.fromEntries(Object.entries(m.fields).map(([name, f]) => [name, shares(f)]));
+      const markers = m.markers && { names: m.markers.names,
+        measured: numbers(m.markers.measured, Float32Array), simulated: numbers(m.markers.simulated, Float32Array) };
+      const outlines = m.outlines && m.outlines.map(o => ({
+        measured: numbers(o.measured, Float32Array), simulated: numbers(o.simulated, Float32Array) }));
+      return { ...m, packed: m.nodes, nodes, triangles, u: shares(m.u), fields, markers, outlines };
+    }
+
+    function largest(m) {
+      const size = m.nodes.length;
+      let best = 0, top = -1;
+      for (let f = 0; f < frames; f++) {
+        let here = 0;
+        for (let i = 0; i < size; i++) here = Math.max(here, Math.abs(m.u[f * size + i]));
+        if (here >= top) [best, top] = [f, here];
+      }
+      return best;
+    }
+
+    const length = (a, i) => Math.hypot(a[i], a[i + 1], a[i + 2]);
+
+    function values(m, by, f) { // of every drawn node in frame f
+      const n = m.nodes.length / 3, found = new Float32Array(n);
+      if (m.fields[by]) return m.fields[by].subarray(f * n, (f + 1) * n);
+      const other = by.startsWith("difference ") && methods[Number(by.slice(11))];
+      for (let i = 0; i < n; i++) {
+        const at = 3 * (f * n + i);
+        found[i] = other
+          ? Math.hypot(m.u[at] - other.u[at], m.u[at + 1] - other.u[at + 1], m.u[at + 2] - other.u[at + 2])
+          : length(m.u, at);
+      }
+      return found;
+    }
+
+    function errors(m, f) { // of every marker in frame f; NaN: not seen
+      const k = m.markers.names.length;
+      return Float32Array.from({ length: k }, (_, i) => {
+        const at = 3 * (f * k + i), a = m.markers.measured, b = m.markers.simulated;
+        return Math.hypot(a[at] - b[at], a[at + 1] - b[at + 1], a[at + 2] - b[at + 2]);
+      });
+    }
+
+    const ranges = new Map(); // of a colour over all frames and methods: pictures can be compared
+    function range(by) {
+      if (!ranges.has(by)) {
+        let low = Infinity, high = -Infinity;
+        for (const m of methods) {
+          if (by === "error" ? !m.markers : m.fields && by.includes(" / ") && !m.fields[by]) continue;
+          for (let f = 0; f < frames; f++) {
+            for (const v of by === "error" ? errors(m, f) : values(m, by, f)) {
+              if (v < low) low = v;
+              if (v > high) high = v;
+            }
+          }
+        }
+        const length = by === "displacement" || by === "error" || by.startsWith("difference");
+        ranges.set(by, [length ? 0 : low, high > low ? high : low + 1e-12]);
+      }
+      return ranges.get(by);
+    }
+
+    // One pane a method, all with one camera.
+    const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -20 * view.size, 20 * view.size);
+    const plane = view.cut && new THREE.Plane(new THREE.Vector3(...view.cut.normal).negate(), view.cut.at);
+    renderer.localClippingEnabled = true;
+    const panes = methods.map(pane);
+
+    function pane(m) {
+      const scene = new THREE.Scene();
+      const light = new THREE.DirectionalLight("#ffffff", 1.6);
+      scene.background = new THREE.Color("#ffffff");
+      scene.add(new THREE.AmbientLight("#ffffff", 1.7), light);
+      const place = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
+      const tint = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
+      const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
+      const lines = new THREE.LineBasicMaterial({ color: "#303030", transparent: true, opacity: 0.45 });
+      const parts = m.triangles.map(index => {
+        const geometry = new THREE.BufferGeometry();
+        geometry.setAttribute("position", place).setAttribute("color", tint);
+        geometry.setIndex(new THREE.BufferAttribute(index, 1));
+        const edges = new THREE.BufferGeometry();
+        edges.setAttribute("position", place);
+        edges.setIndex(new THREE.BufferAttribute(edgesOf(index), 1));
+        const wire = new THREE.LineSegments(edges, lines);
+        scene.add(new THREE.Mesh(geometry, material), wire);
+        wire.frustumCulled = scene.children.at(-2).frustumCulled = false;
+        return { geometry, wire };
+      });
+      const tools = view.tools.map(t => {
+        const geometry = new THREE.BufferGeometry();
+        geometry.setAttribute("position", new THREE.BufferAttribute(numbers(t.nodes, Float32Array), 3));
+        geometry.setIndex(new THREE.BufferAttribute(numbers(t.triangles, Uint32Array), 1));
+        geometry.computeVertexNormals();
+        const solid = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial(
+          { color: "#a9b0b7", transparent: true, opacity: 0.35, side: THREE.DoubleSide, depthWrite: false }));
+        scene.add(solid);
+        return { solid, shifts: numbers(t.shifts, Float32Array) };
+      });
+      const k = m.markers ? m.markers.names.length : 0;
+      const radius = 0.009 * view.size * Math.min(1, Math.sqrt(60 / Math.max(k, 1)));
+      const balls = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, 14, 10),
+        new THREE.MeshLambertMaterial({ color: "#ffffff" }), Math.max(k, 1));
+      const cones = new THREE.InstancedMesh(new THREE.CylinderGeometry(0, 0.55 * radius, 1, 10),
+        new THREE.MeshLambertMaterial({ color: ORANGE }), Math.max(k, 1));
+      const loop = colour => new THREE.LineLoop(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));
+      const measured = loop("#000000"), simulated = loop(BLUE);
+      for (const one of [balls, cones, measured, simulated]) one.frustumCulled = false;
+      scene.add(balls, cones, measured, simulated);
+      return { m, scene, light, place, tint, material, lines, parts, tools, balls, cones, measured, simulated };
+    }
+
+    function edgesOf(index) {
+      const seen = new Set(), found = [];
+      for (let t = 0; t < index.length; t += 3) {
+        for (const [i, j] of [[0, 1], [1, 2], [2, 0]]) {
+          const a = Math.min(index[t + i], index[t + j]), b = Math.max(index[t + i], index[t + j]);
+          const key = a * 4194304 + b;
+          if (!seen.has(key)) { seen.add(key); found.push(a, b); }
+        }
+      }
+      return Uint32Array.from(found);
+    }
+
+    function fill(p) {
+      const { m } = p, f = state.frame, n = m.nodes.length / 3;
+      for (let i = 0; i < 3 * n; i++) p.place.array[i] = m.nodes[i] + state.scale * m.u[3 * f * n + i];
+      const plain = state.by === "error" || (state.by.includes(" / ") && !m.fields[state.by]);
+      const [low, high] = range(state.by);
+      if (plain) {
+        const grey = new THREE.Color(GREY);
+        for (let i = 0; i < n; i++) grey.toArray(p.tint.array, 3 * i);
+      } else {
+        const found = values(m, state.by, f);
+        for (let i = 0; i < n; i++) coloured((found[i] - low) / (high - low)).toArray(p.tint.array, 3 * i);
+      }
+      p.place.needsUpdate = p.tint.needsUpdate = true;
+      p.material.clippingPlanes = p.lines.clippingPlanes = state.cut && plane ? [plane] : [];
+      for (const { geometry, wire } of p.parts) {
+        geometry.computeVertexNormals();
+        wire.visible = state.edges;
+      }
+      for (const { solid, shifts } of p.tools) {
+        solid.position.set(...shifts.subarray(3 * f, 3 * f + 3));
+      }
+      points(p, f, low, high);
+      const outline = state.outline && m.outlines;
+      for (const name of ["measured", "simulated"]) {
+        p[name].visible = Boolean(outline);
+        if (outline) {
+          p[name].geometry.dispose();
+          p[name].geometry = new THREE.BufferGeometry();
+          p[name].geometry.setAttribute("position", new THREE.BufferAttribute(m.outlines[f][name], 3));
+        }
+      }
+    }
+
+    function points(p, f, low, high) {
+      const { m } = p;
+      p.balls.visible = Boolean(m.markers) && state.markers;
+      p.cones.visible = Boolean(m.markers) && state.markers && state.arrows > 0;
+      if (!m.markers) return;
+      const k = m.markers.names.length, mover = new THREE.Object3D(), up = new THREE.Vector3(0, 1, 0);
+      const found = errors(m, f);
+      for (let i = 0; i < k; i++) {
+        const at = 3 * (f * k + i);
+        const end = new THREE.Vector3(...m.markers.measured.subarray(at, at + 3));
+        const start = new THREE.Vector3(...m.markers.simulated.subarray(at, at + 3));
+        const there = Number.isFinite(found[i]);
+        mover.position.copy(there ? end : start);
+        mover.quaternion.identity();
+        mover.scale.setScalar(there ? 1 : 0);
+        mover.updateMatrix();
+        p.balls.setMatrixAt(i, mover.matrix);
+        p.balls.setColorAt(i, state.by === "error" && there ? coloured(found[i] / high) : new THREE.Color("#111111"));
+        const arrow = end.clone().sub(start).multiplyScalar(state.arrows || 1), size = arrow.length();
+        if (there && size > 1e-6) {
+          mover.position.copy(end).addScaledVector(arrow, -0.5);
+          mover.quaternion.setFromUnitVectors(up, arrow.normalize());
+          mover.scale.set(1, size, 1);
+        } else mover.scale.setScalar(0);
+        mover.updateMatrix();
+        p.cones.setMatrixAt(i, mover.matrix);
+      }
+      p.balls.instanceMatrix.needsUpdate = p.cones.instanceMatrix.needsUpdate = true;
+      p.balls.instanceColor.needsUpdate = true;
+    }
+
+    // From where it is seen: as the still pictures see it.
+    const box = [0, 1, 2].map(axis => {
+      const found = methods[0].nodes.filter((_, i) => i % 3 === axis);
+      return [found.reduce((a, b) => Math.min(a, b), Infinity), found.reduce((a, b) => Math.max(a, b), -Infinity)];
+    });
+    const middle = new THREE.Vector3(...box.map(([a, b]) => (a + b) / 2));
+    const up = view.flat ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(...view.down).negate().normalize();
+    camera.up.copy(up); // before the controls, which read it once
+    const controls = new THREE.OrbitControls(camera, canvas);
+    controls.enableRotate = !view.flat;
+    controls.listenToKeyEvents(canvas);
+
+    const oblique = normal => new THREE.Vector3().crossVectors(normal, up).multiplyScalar(0.6)
+      .addScaledVector(normal, 1.1).addScaledVector(up, 0.5);
+
+    function aim() {
+      const axis = Math.abs(up.x) < 0.9 ? new THREE.Vector3(1, 0, 0) : new THREE.Vector3(0, 1, 0);
+      const side = axis.sub(up.clone().multiplyScalar(axis.dot(up))).normalize();
+      const along = new THREE.Vector3().crossVectors(up, side);
+      const away = view.flat ? new THREE.Vector3(0, 0, 1)
+        : view.cut ? oblique(new THREE.Vector3(...view.cut.normal))
+        : up.clone().multiplyScalar(0.5).addScaledVector(side, 1.0).addScaledVector(along, -0.7);
+      camera.position.copy(middle).addScaledVector(away.normalize(), 3 * view.size);
+      camera.zoom = 1;
+      controls.target.copy(middle);
+      controls.update();
+    }
+
+    function draw() {
+      const width = canvas.clientWidth, height = canvas.clientHeight;
+      if (!width) return;
+      const two = state.other >= 0 ? [state.method, state.other] : [state.method];
+      const w = width / two.length, half = 0.5 * view.size, aspect = w / height;
+      const tall = half / Math.min(1, aspect);
+      Object.assign(camera, { left: -tall * aspect, right: tall * aspect, top: tall, bottom: -tall });
+      camera.updateProjectionMatrix();
+      renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      renderer.setSize(width, height, false);
+      renderer.setScissorTest(true);
+      two.forEach((number, i) => {
+        const p = panes[number];
+        p.light.position.copy(camera.position).sub(controls.target).normalize();
+        renderer.setViewport(i * w, 0, w, height);
+        renderer.setScissor(i * w, 0, w - (i + 1 < two.length ? 1 : 0), height);
+        renderer.render(p.scene, camera);
+      });
+    }
+
+    function update() {
+      fill(panes[state.method]);
+      if (state.other >= 0) fill(panes[state.other]);
+      const [low, high] = range(state.by);
+      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high));
+      output.textContent = view.labels[state.frame];
+      canvas.setAttribute("aria-label", `${methods[state.method].label} at ${view.labels[state.frame]}, `
+        + `coloured by ${names.get(state.by)}; drag or Shift and arrow keys turn it, arrow keys move it`);
+      draw();
+    }
+
+    // Controls.
+    const names = new Map([["displacement", "displacement / mm"]]);
+    if (methods.some(m => m.markers)) names.set("error", "marker error / mm");
+    for (const m of methods) for (const name of Object.keys(m.fields)) names.set(name, name);
+    methods.forEach((m, i) => {
+      if (i !== 0 && m.packed === methods[0].packed) names.set(`difference ${i}`, `difference from ${m.label} / mm`);
+    });
+    const select = (label, options, chosen, change) => {
+      const one = make("select", {}, ...options.map(([value, text]) => make("option", { value: String(value) }, text)));
+      one.value = String(chosen);
+      one.addEventListener("change", () => { change(one.value); update(); });
+      return make("label", {}, `${label} `, one);
+    };
+    const tick = (label, name) => {
+      const one = make("input", { type: "checkbox", checked: state[name] });
+      one.addEventListener("change", () => { state[name] = one.checked; update(); });
+      return make("label", {}, one, ` ${label}`);
+    };
+    const output = make("output", {});
+    const legend = make("div", { class: "legend" });
+    const slider = make("input", { type: "range", min: "0", max: String(frames - 1), step: "1", "aria-label": "load or time" });
+    slider.value = String(state.frame);
+    slider.addEventListener("input", () => { state.frame = Number(slider.value); update(); });
+    const again = make("button", { type: "button" }, "Reset view");
+    again.addEventListener("click", () => { aim(); draw(); });
+    const save = make("button", { type: "button" }, "Save PNG");
+    save.addEventListener("click", () => {
+      draw();
+      make("a", { href: canvas.toDataURL("image/png"), download: `${document.title}.png` }).click();
+    });
+    const labels = methods.map((m, i) => [i, m.label]);
+    const row = make("div", { class: "controls" });
+    if (frames > 1) row.append(make("label", {}, "Load or time "), slider, output);
+    else row.append(output);
+    const choice = make("div", { class: "controls" }), more = make("div", { class: "controls" });
+    if (methods.length > 1) {
+      choice.append(select("Method", labels, 0, v => { state.method = Number(v); }),
+        select("beside", [[-1, "none"], ...labels], -1, v => { state.other = Number(v); }));
+    }
+    choice.append(select("Colour", [...names], state.by, v => { state.by = v; }));
+    more.append(select("Displacements", [[1, "true"], [2, "2 times"], [5, "5 times"], [10, "10 times"], [0, "none"]], 1,
+      v => { state.scale = Number(v); }));
+    if (methods.some(m => m.markers)) {
+      more.append(tick("measured markers", "markers"), select("Arrows", [[1, "true"], [2, "2 times"], [5, "5 times"],
+        [10, "10 times"], [0, "none"]], 1, v => { state.arrows = Number(v); }));
+    }
+    if (methods.some(m => m.outlines)) more.append(tick("outlines", "outline"));
+    if (view.cut) more.append(tick("cut open", "cut"));
+    more.append(tick("mesh edges", "edges"), again, save);
+    const words = ["Black: measured; orange arrows point to it from the simulated place. Grey: plates and tools."];
+    if (!methods.some(m => m.markers || m.outlines)) words[0] = "The body as simulated.";
+    if (methods.some(m => m.outlines)) words.push("Black line: measured outline; blue: simulated.");
+    if (view.part) words.push(view.part);
+    if (view.left_out.length) words.push(`Not in this view: ${view.left_out.join(", ")}.`);
+    const text = make("figcaption", {}, words.join(" "));
+    const viewer = make("div", { class: "viewer" }, canvas, legend, row, choice,
+      make("details", {}, make("summary", {}, "More of the view"), more, text));
+    figure.prepend(viewer);
+    figure.classList.add("live");
+    controls.addEventListener("change", draw);
+    new ResizeObserver(draw).observe(canvas);
+    aim();
+    update();
+  }
+
+  // --- all of it, each figure when it is first seen ---------------------------------------------
+
+  for (const one of document.querySelectorAll("table.sortable")) table(one);
+  const builders = { plot: curves, view: body };
+  const NEAR = 300; // pixels below the window
+  const build = figure => {
+    const script = figure.querySelector("script.plot, script.view");
+    builders[script.className](figure, script);
+  };
+  const watch = new IntersectionObserver(entries => {
+    for (const { isIntersecting, target } of entries) {
+      if (!isIntersecting) continue;
+      watch.unobserve(target);
+      build(target);
+    }
+  }, { rootMargin: `${NEAR}px` });
+  for (const script of document.querySelectorAll("script.plot, script.view")) {
+    const figure = script.closest("figure"), box = figure.getBoundingClientRect();
+    if (box.width && box.top < innerHeight + NEAR) build(figure);
+    else watch.observe(figure);
+  }
+  open();
+})();

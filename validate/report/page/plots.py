@@ -1,0 +1,77 @@
+"""Charts of a report's page that zoom and show values: their numbers as uPlot takes them."""
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.compare.exhibit import Chart, Series
+from validate.report.charts.axes import levels
+from validate.report.charts.line_styles import styled
+from validate.report.charts.style import HasMethods
+
+_MOST = 1500  # points of a series; of more, the lowest and the highest of equal parts
+_WAYS = 24  # of a line to and fro
+_DIGITS = 6
+
+
+def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
+    """Return series of a chart in the colours of its figure, and its named levels.
+
+    A line that goes to and fro along x is one series for each way: uPlot needs x to rise. A series
+    of more than `_MOST` points keeps the lowest and the highest of equal parts, so that no peak is
+    lost; a line that turns more than `_WAYS` times is shown by its points.
+    """
+    series = []
+    for drawn in styled(run, chart.series):
+        look = {"label": drawn.series.name, "colour": drawn.look.colour,
+                "dash": _dash(drawn.look.dash), "width": drawn.look.width or 1.0}  # fmt: skip
+        style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
+        if style == "line" and len(found := _ways(drawn.series.x)) > 1:
+            style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
+        series += [{**look, "style": style, **_points(drawn.series, way)} for way in ways]
+    return {
+        "x": chart.x, "y": chart.y, "log": chart.log, "linear": chart.linear, "series": series,
+        "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
+    }  # fmt: skip
+
+
+def _dash(given: Any) -> list[float]:
+    return [] if given == "-" else [3 * float(length) for length in given[1]]
+
+
+def _ways(x: Floats) -> list[Ints]:
+    """Indices of the parts of x (k,) between its turns, each in rising x; neighbours share ends."""
+    sense = np.sign(np.diff(x))
+    moving = np.flatnonzero(sense)
+    turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
+    ends = [0, *turns.tolist(), len(x) - 1]
+    parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+    return [part[np.argsort(x[part], kind="stable")] for part in parts]
+
+
+def _points(series: Series, order: Ints) -> dict[str, list[float | None]]:
+    keep = order[_peaks(series.y[order])]
+    found = {"x": _numbers(series.x[keep]), "y": _numbers(series.y[keep])}
+    if series.upper is not None:
+        found["upper"] = _numbers(series.upper[keep])
+    return found
+
+
+def _peaks(y: Floats) -> Ints:
+    """Indices of the lowest and the highest of equal parts of y (k,), and of both ends."""
+    if len(y) <= _MOST:
+        return np.arange(len(y))
+    parts = np.array_split(np.arange(len(y)), _MOST // 2)
+    found = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
+    return np.unique([0, *found, len(y) - 1])
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    return [_number(v) for v in values.tolist()]
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
