@@ -1,44 +1,59 @@
-"""The page in a real browser, without a network: visible, whole, every picture decoded."""
+"""The page in a real browser, without a network: seen, whole, and what its script makes of it."""
 
 import json
 import os
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PIL import Image
-from report_samples import small_result
+from report_samples import CHECK, bare_result, small_result
 from tracking_samples import tracking_result
 
+from validate.compare.exhibit import Exhibit, NumberTable
+from validate.compare.result import Result
 from validate.report.write import write_report
+from validate.study.loose_page import write_loose
 
 OPTIONS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr", "--v=0",
+    "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--enable-logging=stderr", "--v=0", "--virtual-time-budget=20000",
 )  # fmt: skip
-# Added by the test only: the shipped page has no script. What it finds ends up in the DOM.
-FINDINGS = """<script>addEventListener("load", () => {
+# Added by the test: what a reader does and sees. What it finds ends up in the DOM.
+FINDINGS = """<script>addEventListener("load", async () => {
+  const wait = ms => new Promise(done => setTimeout(done, ms));
   const shown = id => { const box = document.getElementById(id).getBoundingClientRect();
                         return box.width > 100 && box.height > 10; };
+  const all = selector => [...document.querySelectorAll(selector)];
+  const span = d => [d.getBoundingClientRect().left, d.getBoundingClientRect().right];
+  for (const details of all("main details")) details.open = true;
+  await wait(200);
   const found = {pictures: [...document.images].map(i => i.naturalWidth),
                  verdict: shown("verdict"), title: document.querySelector("h1").innerText,
-                 whys: [...document.querySelectorAll("tr.below div")]
-                   .map(d => [d.getBoundingClientRect().left, d.getBoundingClientRect().right]),
-                 verdicts: [...document.querySelectorAll("tr.parted td.good")]
-                   .map(d => [d.getBoundingClientRect().left, d.getBoundingClientRect().right]),
-                 wide: innerWidth, spilt: [...document.querySelectorAll("td, th")]
+                 whys: all("tr.below div").map(span),
+                 verdicts: all("tr.parted td.good").map(span), wide: innerWidth,
+                 spilt: all(".sortable td, .sortable th")
                    .filter(c => c.scrollWidth > c.clientWidth + 1).map(c => c.innerText),
-                 anchors: [...document.querySelectorAll("nav a")]
-                   .map(a => document.querySelectorAll(a.getAttribute("href")).length),
+                 anchors: all("nav a").map(a => all(a.getAttribute("href")).length),
+                 links: all(".forest a").map(a => all(a.getAttribute("href")).length),
+                 viewers: all(".viewer canvas").length, plots: all(".uplot canvas").length,
+                 plotted: all("script.plot").length, lines: all(".forest tbody tr").length,
+                 requests: performance.getEntriesByType("resource")
+                   .map(e => e.name).filter(n => !n.startsWith("data:")),
                  overflow: document.documentElement.scrollWidth - innerWidth};
+  await (async () => { ACTION })();
   const pre = document.createElement("pre"); pre.id = "found";
   pre.textContent = JSON.stringify(found); document.body.append(pre); });</script></body>"""
+CREATED = "2026-11-21T04:00:00Z"
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +66,18 @@ def browser() -> str:
     return found
 
 
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", autouse=True)
+def without_gl() -> Any:
+    """Still pictures by matplotlib: those of VTK are tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VALIDATE_NO_GL", "1")
-        folder = tmp_path_factory.mktemp("browser") / "cube"
-        return write_report(small_result(), folder, created="2026-11-21T04:00:00Z")
+        yield
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("browser") / "cube"
+    return write_report(small_result(), folder, created=CREATED)
 
 
 def run(browser: str, page: Path, profile: Path, *more: str) -> subprocess.CompletedProcess[str]:
@@ -69,16 +90,52 @@ def run(browser: str, page: Path, profile: Path, *more: str) -> subprocess.Compl
     )
 
 
-def look(browser: str, page: Path, folder: Path, width: int = 1280) -> tuple[dict[str, Any], str]:
-    """What `FINDINGS` found on a page, and the page's text; the console stays empty."""
+def look(
+    browser: str, page: Path, folder: Path, width: int = 1280, action: str = "", *more: str
+) -> tuple[dict[str, Any], str]:
+    """What `FINDINGS` found on a page, and the page's text; nothing but the driver of a software
+    renderer writes to the console."""
     probe = folder / "probe.html"
-    probe.write_text(page.read_text().replace("</body>", FINDINGS))
-    done = run(browser, probe, folder / "profile", f"--window-size={width},1000", "--dump-dom")
-    match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout)
+    text = page.read_text()
+    before, _, behind = text.rpartition("</body>")
+    probe.write_text(before + FINDINGS.replace("ACTION", action) + behind)
+    size = f"--window-size={width},1000"
+    done = run(browser, probe, folder / "profile", size, "--dump-dom", *more)
+    match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
     assert match, done.stdout[-500:]
-    assert "CONSOLE" not in done.stderr
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    assert [line for line in console if "GL Driver Message" not in line] == []
     found: dict[str, Any] = json.loads(unescape(match.group(1)))
     return found, unescape(done.stdout)
+
+
+def with_checks(count: int) -> Result:
+    """The small result with so many checks, of which every third fails."""
+    result = small_result()
+    words = ("good enough", "undecided", "not good enough")
+    checks = tuple(
+        replace(CHECK, name=f"force.plate@{i + 2}mm", value=0.1 * i, acceptance=words[i % 3])
+        for i in range(count)
+    )
+    first = replace(result.methods[0], checks=checks)
+    return replace(result, methods=(first, *result.methods[1:]))
+
+
+def empty() -> Result:
+    return Result("nothing", "Nothing", "none", "Nothing was run.", (), (), (), (), (), ())
+
+
+def of_runs(folder: Path) -> Path:
+    """A page without a run of its own, as studies, comparisons and summaries write it."""
+    rows = tuple((f"run {i}", float(30 - i)) for i in range(30))
+    table = NumberTable("rates", "Rates of runs", ("run", "rate / Hz"), rows)
+    exhibit = Exhibit("runs", "Runs", ("Thirty of them.",), (table,))
+    told = ("runs", "Stored runs", "this folder", "30 runs are stored.")
+    return write_loose(told, (exhibit,), {"kind": "summary"}, folder, "Summary")
+
+
+def of(result: Result) -> Callable[[Path], Path]:
+    return lambda folder: write_report(result, folder, created=CREATED)
 
 
 def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
@@ -88,22 +145,134 @@ def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
     assert len(found["pictures"]) >= 3
     assert all(width > 300 for width in found["pictures"])
     assert found["overflow"] <= 0
+    assert found["requests"] == []
+    assert found["viewers"] == 1
+    assert found["plots"] == found["plotted"] > 0
     assert small_result().sentence in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [375, 1280])
+@pytest.mark.parametrize(
+    "write", [of(with_checks(3)), of(bare_result()), of(empty()), of_runs, of(with_checks(500))],
+    ids=["failing", "not converged", "empty", "summary", "500 checks"],
+)  # fmt: skip
+def test_every_kind_of_page_is_whole(
+    browser: str, tmp_path: Path, write: Callable[[Path], Path], width: int
+) -> None:
+    found, _ = look(browser, write(tmp_path / "report"), tmp_path, width)
+    assert found["verdict"] is True
+    assert found["overflow"] <= 0
+    assert found["requests"] == []
+    assert found["plots"] == found["plotted"]
+    assert set(found["anchors"]) <= {1}
+    assert set(found["links"]) <= {1}
+
+
+def test_every_check_is_a_line(browser: str, tmp_path: Path) -> None:
+    found, _ = look(browser, of(with_checks(500))(tmp_path / "report"), tmp_path)
+    assert found["lines"] == 500
+
+
+def test_the_slider_moves_the_body(browser: str, report: Path, tmp_path: Path) -> None:
+    action = """const slider = document.querySelector(".viewer input[type=range]");
+      const canvas = document.querySelector(".viewer canvas");
+      const output = document.querySelector(".viewer output");
+      found.there = [output.innerText, canvas.getAttribute("aria-label")];
+      slider.value = "0"; slider.dispatchEvent(new Event("input"));
+      found.then = [output.innerText, canvas.getAttribute("aria-label")];
+      const select = [...document.querySelectorAll(".viewer select")].at(-1);
+      found.colours = [...document.querySelectorAll(".viewer option")].map(o => o.innerText);"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["there"][0] == "2 mm"
+    assert found["then"][0] == "0 mm"
+    assert "at 0 mm" in found["then"][1]
+    assert {"displacement / mm", "von Mises stress / Pa", "largest principal strain / %",
+            "difference from stiff <cube> / mm"} <= set(found["colours"])  # fmt: skip
+
+
+def test_a_table_sorts_filters_and_unfolds(browser: str, tmp_path: Path) -> None:
+    action = """const table = document.querySelector("table.sortable");
+      const names = () => [...table.tBodies[0].rows].filter(r => getComputedStyle(r).display
+        !== "none").map(r => r.cells[0].innerText);
+      found.first = names();
+      table.tHead.rows[0].cells[1].click(); await wait(50); found.down = names();
+      const key = new KeyboardEvent("keydown", {key: "Enter", bubbles: true});
+      table.tHead.rows[0].cells[1].dispatchEvent(key); await wait(50); found.up = names();
+      const field = document.querySelector(".filter");
+      field.value = "RUN 2"; field.dispatchEvent(new Event("input")); found.filtered = names();"""
+    found, _ = look(browser, of_runs(tmp_path / "runs"), tmp_path, 1280, action)
+    assert found["first"] == [f"run {i}" for i in range(8)]
+    assert sorted((found["down"], found["up"])) == [
+        [f"run {i}" for i in range(8)], [f"run {i}" for i in range(29, 21, -1)]
+    ]  # fmt: skip
+    assert set(found["filtered"]) == {f"run {i}" for i in (2, *range(20, 30))}
+
+
+@pytest.mark.slow
+def test_rows_keep_their_words_when_they_are_sorted(browser: str, tmp_path: Path) -> None:
+    action = """const table = document.querySelector("table.parted-rows");
+      const pairs = () => [...table.querySelectorAll("tr.parted")].map(r =>
+        [r.cells[1].innerText, r.nextElementSibling.innerText]);
+      found.before = pairs();
+      table.tHead.rows[0].cells[4].click(); await wait(50); found.after = pairs();"""
+    result = with_checks(12)
+    told = tuple(replace(c, why=f"why of {c.name}") for c in result.checks)
+    first = replace(result.methods[0], checks=told)
+    page = of(replace(result, methods=(first, *result.methods[1:])))(tmp_path / "report")
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    assert found["before"] != found["after"]
+    assert sorted(found["before"]) == sorted(found["after"])
+    assert all(why == f"why of {name}" for name, why in found["after"])
+
+
+def test_a_link_opens_its_section(browser: str, report: Path, tmp_path: Path) -> None:
+    action = """for (const d of document.querySelectorAll("main details")) d.open = false;
+      location.hash = "#recording"; await wait(50);
+      found.open = [...document.querySelectorAll("main details[open] h2")].map(h => h.id);"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["open"] == ["recording"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_serious_barrier(browser: str, report: Path, tmp_path: Path, scheme: str) -> None:
+    axe = files("axe_core_python").joinpath("axe.min.js").read_text("utf-8")
+    page = tmp_path / "with_axe.html"
+    page.write_text(report.read_text().replace("</body>", f"<script>{axe}</script></body>"))
+    action = """found.dark = matchMedia("(prefers-color-scheme: dark)").matches;
+      const told = await axe.run({resultTypes: ["violations"]});
+      found.barriers = told.violations.filter(v => ["serious", "critical"].includes(v.impact))
+        .map(v => [v.id, v.nodes.map(n => n.html.slice(0, 120))]);"""
+    dark = ("--blink-settings=preferredColorScheme=0",) if scheme == "dark" else ()
+    found, _ = look(browser, page, tmp_path, 1280, action, *dark)
+    assert found["dark"] is (scheme == "dark")
+    assert found["barriers"] == []
+
+
+@pytest.mark.slow
+def test_without_scripts_every_picture_and_row_is_there(
+    browser: str, report: Path, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare.html"
+    bare.write_text(re.sub(r"<script(?! type).*?</script>", "", report.read_text(), flags=re.S))
+    found, _ = look(browser, bare, tmp_path)
+    assert found["viewers"] == found["plots"] == 0
+    assert all(width > 300 for width in found["pictures"])
+    assert found["overflow"] <= 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 400])
 def test_why_a_check_ends_as_it_does_is_seen_without_scrolling(
-    browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int
+    browser: str, tmp_path: Path, width: int
 ) -> None:
-    monkeypatch.setenv("VALIDATE_NO_GL", "1")
     result = small_result()
     check = replace(
         result.checks[0], why=f"|E| is 0.5 u_val; {12 * 'what would decide, '}and so on"
     )
     methods = (replace(result.methods[0], checks=(check,)), *result.methods[1:])
-    folder = tmp_path / "long"
-    page = write_report(replace(result, methods=methods), folder, created="2026-11-21T04:00:00Z")
+    page = of(replace(result, methods=methods))(tmp_path / "long")
     found, text = look(browser, page, tmp_path, width)
     assert found["overflow"] <= 0
     assert len(found["whys"]) == 2  # of the check, and of the identified value
@@ -113,13 +282,9 @@ def test_why_a_check_ends_as_it_does_is_seen_without_scrolling(
 
 
 @pytest.mark.slow
-def test_dom_of_a_result_over_time(
-    browser: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("VALIDATE_NO_GL", "1")
-    page = write_report(tracking_result(), tmp_path / "box", created="2026-11-21T04:00:00Z")
-    found, _ = look(browser, page, tmp_path)
-    assert len(found["pictures"]) == 9  # checks, 3 charts, 2 maps, noise, body, registration
+def test_dom_of_a_result_over_time(browser: str, tmp_path: Path) -> None:
+    found, _ = look(browser, of(tracking_result())(tmp_path / "box"), tmp_path)
+    assert len(found["pictures"]) == 8  # 3 charts, 2 maps, noise, body, registration
     assert all(width > 300 for width in found["pictures"])
     assert found["overflow"] <= 0
     assert found["spilt"] == []  # no text of a cell lies on the next one
@@ -133,3 +298,22 @@ def test_screenshot(browser: str, report: Path, tmp_path: Path) -> None:
         colours = image.convert("RGB").getcolors(1280 * 900) or []
     green = (226, 244, 238)  # the band of an agreeing verdict
     assert {c: n for n, c in colours}.get(green, 0) > 20_000
+
+
+@pytest.mark.slow
+def test_a_print_has_few_pages(browser: str, tmp_path: Path) -> None:
+    page, paper = of(with_checks(500))(tmp_path / "report"), tmp_path / "paper.pdf"
+    run(browser, page, tmp_path / "profile", f"--print-to-pdf={paper}", "--no-pdf-header-footer")
+    assert 1 <= paper.read_bytes().count(b"/Type /Page\n") <= 12
+
+
+@pytest.mark.slow
+def test_what_turns_is_the_body(browser: str, report: Path, tmp_path: Path) -> None:
+    """The view's first picture shows colours of the displacement where the body is."""
+    shot = tmp_path / "shot.png"
+    run(browser, report, tmp_path / "profile", "--window-size=1280,900", f"--screenshot={shot}")
+    with Image.open(shot) as image:
+        part = image.convert("RGB").crop((40, 150, 620, 520)).resize((58, 37))
+    pixels = list(part.get_flattened_data())
+    coloured = [p for p in pixels if max(p) - min(p) > 60]
+    assert len(coloured) > 0.05 * len(pixels)

@@ -196,7 +196,8 @@ def _tools(method: MethodResult, frames: _Frames) -> Iterator[dict[str, Any]]:
     for number, plate in enumerate(by_frame[0]):
         shifts = np.array([plates[number].shift for plates in by_frame])
         corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-        yield _tool(plate.centre + 0.5 * plate.sizes * corners, np.array(_BOX), shifts)
+        box = _tool(plate.centre + 0.5 * plate.sizes * corners, np.array(_BOX), shifts)
+        yield {**box, "plate": True}
     if not gl.available():
         return
     from validate.report.scenes.renders import drawn_indenter  # vtk reads its window class first

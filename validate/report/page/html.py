@@ -136,7 +136,8 @@ def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
     prefix = f"{common.pop()}: " if len(common) == 1 else ""
     lines = tuple(
         Line(
-            found.labels[i].removeprefix(prefix), links.get(found.quantities[i], "") if found.quantities else "",
+            found.labels[i].removeprefix(prefix),
+            links.get(found.quantities[i], "") if found.quantities else "",
             low := place(share[i] - half[i]), round(place(share[i] + half[i]) - low, 2),
             place(share[i]), bool(abs(share[i]) > far), found.texts[i], found.answers[i],
             _COLOURS.get(found.answers[i], "open"),
@@ -216,12 +217,11 @@ def _breakable(name: str) -> str:
 def _json(found: Any) -> Markup:
     """JSON inside a script element, which no text of it can end."""
     text = json.dumps(found, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - nothing in it can be markup
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def _sort_key(entry: Entry | TableCell) -> Markup:
     """The attribute that a number is sorted by: it reads with units and spaces."""
     value = plain(entry)
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    return Markup(f' data-sort="{value!r}"' if number else "")  # noqa: S704 - a number
-
+    return Markup(f' data-sort="{value!r}"' if number else "")

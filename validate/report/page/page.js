@@ -77,6 +77,7 @@
     const colour = given => given === "#000000" ? ink : given;
     const positive = (values, axis) =>
       found.log.includes(axis) && !found.linear ? values.map(v => v > 0 ? v : null) : values;
+    for (const s of found.series) s.x = found.xs[s.x];
     const tables = [], series = [{ label: found.x, value: (u, v) => shown(v) }], bands = [];
     const seen = new Set();
     for (const s of found.series) {
@@ -87,12 +88,11 @@
         Object.assign(look, { paths: () => null, points: { show: true, size: 5, fill: colour(s.colour) } });
       }
       if (s.style === "band") {
-        const edge = { ...look, width: 0, label: `${s.label}, from` };
-        series.push(edge, { ...edge, label: `${s.label}, to` });
+        series.push({ ...look, width: 0 }, { ...look, width: 0, class: "branch" });
         tables.push([s.x, positive(s.y, "y"), positive(s.upper, "y")]);
         bands.push({ series: [number + 1, number], fill: `${s.colour}40` });
       } else {
-        look.class = seen.has(s.label) ? "branch" : "";
+        if (seen.has(s.label)) look.class = "branch";
         series.push(look);
         tables.push([s.x, positive(s.y, "y")]);
       }
@@ -101,7 +101,7 @@
     const ends = found.series.flatMap(s => s.x.length ? [s.x[0], s.x.at(-1)] : []);
     const [low, high] = ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
     for (const level of found.levels) {
-      series.push({ label: level.name ?? level.label, stroke: ink, width: 1, dash: [6, 4],
+      series.push({ label: level.label, stroke: ink, width: 1, dash: [6, 4],
         value: (u, v) => shown(v), points: { show: false } });
       tables.push([low < high ? [low, high] : [low], low < high ? [level.y, level.y] : [level.y]]);
     }
@@ -235,6 +235,8 @@
       return ranges.get(by);
     }
 
+    let held = [1, 1]; // half of what the camera holds in its first place, mm
+
     // One pane a method, all with one camera.
     const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -20 * view.size, 20 * view.size);
     const plane = view.cut && new THREE.Plane(new THREE.Vector3(...view.cut.normal).negate(), view.cut.at);
@@ -362,11 +364,24 @@
     }
 
     // From where it is seen: as the still pictures see it.
-    const box = [0, 1, 2].map(axis => {
-      const found = methods[0].nodes.filter((_, i) => i % 3 === axis);
-      return [found.reduce((a, b) => Math.min(a, b), Infinity), found.reduce((a, b) => Math.max(a, b), -Infinity)];
-    });
+    const box = extent();
     const middle = new THREE.Vector3(...box.map(([a, b]) => (a + b) / 2));
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(i => new THREE.Vector3(...box.map((ends, axis) => ends[(i >> axis) & 1])));
+
+    function extent() { // of the first method at rest and moved, of markers and tools
+      const found = [0, 1, 2].map(() => [Infinity, -Infinity]), m = methods[0], size = m.nodes.length;
+      const add = (value, axis) => {
+        if (value < found[axis][0]) found[axis][0] = value;
+        if (value > found[axis][1]) found[axis][1] = value;
+      };
+      for (let i = 0; i < m.u.length; i++) {
+        add(m.nodes[i % size], i % 3);
+        add(m.nodes[i % size] + m.u[i], i % 3);
+      }
+      if (m.markers) m.markers.measured.forEach((v, i) => add(v, i % 3));
+      for (const t of view.tools.filter(t => t.plate)) numbers(t.nodes, Float32Array).forEach((v, i) => add(v, i % 3));
+      return found;
+    }
     const up = view.flat ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(...view.down).negate().normalize();
     camera.up.copy(up); // before the controls, which read it once
     const controls = new THREE.OrbitControls(camera, canvas);
@@ -387,14 +402,22 @@
       camera.zoom = 1;
       controls.target.copy(middle);
       controls.update();
+      camera.updateMatrix();
+      held = half();
+    }
+
+    function half() { // of what the camera must hold, to the right and upward
+      const right = new THREE.Vector3().setFromMatrixColumn(camera.matrix, 0), above = new THREE.Vector3().setFromMatrixColumn(camera.matrix, 1);
+      const reach = along => Math.max(...corners.map(c => Math.abs(c.clone().sub(middle).dot(along))));
+      return [reach(right), reach(above)];
     }
 
     function draw() {
       const width = canvas.clientWidth, height = canvas.clientHeight;
       if (!width) return;
       const two = state.other >= 0 ? [state.method, state.other] : [state.method];
-      const w = width / two.length, half = 0.5 * view.size, aspect = w / height;
-      const tall = half / Math.min(1, aspect);
+      const w = width / two.length, aspect = w / height;
+      const tall = 1.06 * Math.max(held[1], held[0] / aspect);
       Object.assign(camera, { left: -tall * aspect, right: tall * aspect, top: tall, bottom: -tall });
       camera.updateProjectionMatrix();
       renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
@@ -485,26 +508,20 @@
     update();
   }
 
-  // --- all of it, each figure when it is first seen ---------------------------------------------
+  // --- all of it, each figure once it has a width ------------------------------------------------
 
   for (const one of document.querySelectorAll("table.sortable")) table(one);
   const builders = { plot: curves, view: body };
-  const NEAR = 300; // pixels below the window
-  const build = figure => {
-    const script = figure.querySelector("script.plot, script.view");
-    builders[script.className](figure, script);
-  };
-  const watch = new IntersectionObserver(entries => {
-    for (const { isIntersecting, target } of entries) {
-      if (!isIntersecting) continue;
-      watch.unobserve(target);
-      build(target);
+  const waiting = new Set(document.querySelectorAll("script.plot, script.view"));
+  const build = () => {
+    for (const script of waiting) {
+      const figure = script.closest("figure");
+      if (!figure.clientWidth) continue; // in a closed section
+      waiting.delete(script);
+      builders[script.className](figure, script);
     }
-  }, { rootMargin: `${NEAR}px` });
-  for (const script of document.querySelectorAll("script.plot, script.view")) {
-    const figure = script.closest("figure"), box = figure.getBoundingClientRect();
-    if (box.width && box.top < innerHeight + NEAR) build(figure);
-    else watch.observe(figure);
-  }
+  };
+  for (const section of document.querySelectorAll("main details")) section.addEventListener("toggle", build);
+  build();
   open();
 })();

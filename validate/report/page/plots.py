@@ -12,9 +12,9 @@ from validate.report.charts.axes import levels
 from validate.report.charts.line_styles import styled
 from validate.report.charts.style import HasMethods
 
-_MOST = 1500  # points of a series; of more, the lowest and the highest of equal parts
+_MOST = 800  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
-_DIGITS = 6
+_DIGITS = 5
 
 
 def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     of more than `_MOST` points keeps the lowest and the highest of equal parts, so that no peak is
     lost; a line that turns more than `_WAYS` times is shown by its points.
     """
+    xs: list[list[float | None]] = []  # each once: most series of a chart have the same
     series = []
     for drawn in styled(run, chart.series):
         look = {"label": drawn.series.name, "colour": drawn.look.colour,
@@ -31,9 +32,14 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
         style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
         if style == "line" and len(found := _ways(drawn.series.x)) > 1:
             style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
-        series += [{**look, "style": style, **_points(drawn.series, way)} for way in ways]
+        for way in ways:
+            x, columns = _points(drawn.series, way)
+            if x not in xs:
+                xs.append(x)
+            series.append({**look, "style": style, "x": xs.index(x), **columns})
     return {
-        "x": chart.x, "y": chart.y, "log": chart.log, "linear": chart.linear, "series": series,
+        "x": chart.x, "y": chart.y, "log": chart.log, "linear": chart.linear, "xs": xs,
+        "series": series,
         "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
     }  # fmt: skip
 
@@ -52,12 +58,14 @@ def _ways(x: Floats) -> list[Ints]:
     return [part[np.argsort(x[part], kind="stable")] for part in parts]
 
 
-def _points(series: Series, order: Ints) -> dict[str, list[float | None]]:
+def _points(
+    series: Series, order: Ints
+) -> tuple[list[float | None], dict[str, list[float | None]]]:
     keep = order[_peaks(series.y[order])]
-    found = {"x": _numbers(series.x[keep]), "y": _numbers(series.y[keep])}
+    found = {"y": _numbers(series.y[keep])}
     if series.upper is not None:
         found["upper"] = _numbers(series.upper[keep])
-    return found
+    return _numbers(series.x[keep]), found
 
 
 def _peaks(y: Floats) -> Ints:

@@ -1,8 +1,8 @@
 """Surface of a mesh as triangles for display: outside and cavity walls, decimated if large.
 
-A quadratic facet of six nodes is drawn as four triangles through its middles. Thinning lays a grid over the surface and joins the
-vertices in one of its boxes to the one nearest their mean, so every vertex drawn is a node and
-moves as computed.
+A quadratic facet of six nodes is drawn as four triangles through its middles. Thinning lays a grid
+over the surface and joins the vertices in one of its boxes to the one nearest their mean, so every
+vertex drawn is a node and moves as computed.
 """
 
 from dataclasses import dataclass
