@@ -193,7 +193,7 @@ def test_import_is_light_and_functions_are_also_packages() -> None:
 def test_a_view_is_text_a_page_part_figures_and_a_file(ran: RunResult, tmp_path: Path) -> None:
     checks = ran.show("checks")
     assert "top.max@all" in repr(checks)
-    assert checks._repr_html_().count("<table>") == 1
+    assert checks._repr_html_().count("<table") == 1
     assert "<html" not in checks._repr_html_()
     assert checks.figures() == []
     (figure,) = ran.show("limits").figures()

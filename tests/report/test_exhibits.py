@@ -336,7 +336,7 @@ def test_fields_hold_every_step_and_the_sd(result: Result, tmp_path: Path) -> No
 
 def test_replay_shows_frames_at_their_own_times(folder: Path) -> None:
     path = folder / "replay.mcap"
-    assert path.stat().st_size < 1_000_000
+    assert path.stat().st_size < 1_500_000
     replay = read_recording(path)
     simulated = replay.markers["/markers/simulated"]
     np.testing.assert_allclose(np.diff(simulated.t), np.diff(T[AT]), atol=1e-9)
@@ -350,4 +350,4 @@ def test_replay_shows_frames_at_their_own_times(folder: Path) -> None:
 
 
 def test_page_is_small(folder: Path) -> None:
-    assert (folder / "report.html").stat().st_size < 1_000_000
+    assert (folder / "report.html").stat().st_size < 1_500_000

@@ -1,0 +1,156 @@
+"""What the page's script is given: hashes of its libraries, curves, the body that turns."""
+
+import base64
+import json
+import tomllib
+from dataclasses import replace
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
+from report_samples import PRESS, SIDE, bare_result, small_result
+from tracking_samples import tracking_result
+
+from validate.arrays import Floats
+from validate.compare.exhibit import Chart, Intervals, Series
+from validate.report.page.body_view import body_view
+from validate.report.page.html import forest
+from validate.report.page.plots import plot
+
+PAGE = files("validate.report.page")
+
+
+def test_libraries_are_those_of_the_manifest() -> None:
+    folder = PAGE.joinpath("vendor")
+    listed = tomllib.loads(folder.joinpath("manifest.toml").read_text("utf-8"))
+    hashes = {name: h for one in listed.values() for name, h in one["sha256"].items()}
+    kept = {f.name for f in folder.iterdir() if f.name.endswith((".min.js", ".min.css"))}
+    assert kept == set(hashes)
+    for name, expected in hashes.items():
+        content = folder.joinpath(name).read_bytes()
+        assert sha256(content).hexdigest() == expected, name
+        assert b"</script" not in content
+    licences = folder.joinpath("LICENSES.txt").read_text("utf-8")
+    assert all(f"== {name}" in licences for name in listed)
+
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def plotted(x: Floats, y: Floats, **more: Any) -> dict[str, Any]:
+    chart = Chart("c", "C", "t / s", "u / mm", (Series("soft", x, y, **more),))
+    return plot(small_result(), chart)
+
+
+def test_a_line_to_and_fro_is_a_series_for_each_way() -> None:
+    x = np.array([0.0, 1.0, 2.0, 1.5, 0.5])
+    found = plotted(x, np.arange(5.0))
+    ways = [(found["xs"][s["x"]], s["y"]) for s in found["series"]]
+    assert ways == [([0.0, 1.0, 2.0], [0.0, 1.0, 2.0]), ([0.5, 1.5, 2.0], [4.0, 3.0, 2.0])]
+
+
+def test_a_line_that_turns_often_is_shown_by_its_points() -> None:
+    x = np.tile([0.0, 1.0], 40)
+    (series,) = plotted(x, np.arange(80.0))["series"]
+    assert series["style"] == "points"
+    assert len(series["y"]) == 80
+
+
+def test_no_peak_is_lost() -> None:
+    y = np.zeros(100_000)
+    y[[31_234, 77_777]] = 5.0, -3.0
+    (series,) = plotted(np.arange(100_000.0), y)["series"]
+    assert len(series["y"]) < 2000
+    assert (max(series["y"]), min(series["y"])) == (5.0, -3.0)
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=60))
+def test_x_always_rises(x: list[float]) -> None:
+    found = plotted(np.array(x), np.arange(float(len(x))))
+    assert all(np.all(np.diff(column) >= 0) for column in found["xs"])
+    assert sum(len(s["y"]) for s in found["series"]) >= len(x)
+    json.dumps(found, allow_nan=False)
+
+
+# --- checks against limits ------------------------------------------------------------------------
+
+
+def test_a_line_lies_where_its_share_is() -> None:
+    values, halves, limits = np.array([0.5, -9.0]), np.array([0.25, 1.0]), np.array([1.0, 1.0])
+    found = forest(
+        Intervals("limits", "L", ("m: a", "m: b"), values, halves, limits, ("", ""),
+                  ("good enough", "differs"), quantities=("a", "b")),
+        {"a": "#markers"},
+    )  # fmt: skip
+    far, near = found.lines
+    assert (far.label, far.beyond, far.colour, far.link) == ("b", True, "bad", "")
+    assert (near.label, near.beyond, near.link) == ("a", False, "#markers")
+    zero, one = found.zero, found.within[0] + found.within[1]
+    assert near.at == pytest.approx(zero + 0.5 * (one - zero), abs=0.02)
+    assert near.low == pytest.approx(zero + 0.25 * (one - zero), abs=0.02)
+    assert near.wide == pytest.approx(0.5 * (one - zero), abs=0.03)
+
+
+# --- the body -------------------------------------------------------------------------------------
+
+
+def array(text: str, kind: str) -> Any:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def test_the_body_moves_as_computed() -> None:
+    view = body_view(small_result())
+    assert view is not None
+    assert view["labels"] == ["0 mm", "2 mm"]
+    first = view["methods"][0]
+    nodes = array(first["nodes"], "<f4").reshape(-1, 3)
+    u = first["u"]["top"] / 32767 * array(first["u"]["shares"], "<i2").reshape(2, -1, 3)
+    assert np.ptp(nodes, axis=0) == pytest.approx(1e3 * SIDE)
+    assert u[0] == pytest.approx(0.0)
+    assert u[1, :, 0] == pytest.approx(-1e3 * PRESS * nodes[:, 0] / (1e3 * SIDE), abs=1e-3)
+    strain = first["fields"]["largest principal strain / %"]
+    found = strain["top"] / 32767 * array(strain["shares"], "<i2").reshape(2, -1)
+    assert found == pytest.approx(0.0, abs=1e-3)  # pressed along x alone: no stretch anywhere
+    young, nu, pressed = 1e4, 0.4, PRESS / SIDE
+    uniaxial = young * pressed / (1 + nu)  # von Mises of a strain along x alone, Pa
+    stress = first["fields"]["von Mises stress / Pa"]
+    found = stress["top"] / 32767 * array(stress["shares"], "<i2").reshape(2, -1)
+    assert found[1] == pytest.approx(uniaxial, rel=1e-3)
+
+
+def test_markers_stand_where_they_were_measured() -> None:
+    result = tracking_result()
+    view = body_view(result)
+    assert view is not None
+    seen = view["methods"][0].get("markers")
+    observed = [o for o in result.registered[0].observations if hasattr(o, "simulated")]
+    if not observed:
+        assert seen is None
+        return
+    assert seen is not None
+    measured = array(seen["measured"], "<f4").reshape(len(view["labels"]), -1, 3)
+    assert np.isfinite(measured).any()
+
+
+def test_nothing_finished_has_no_body() -> None:
+    assert body_view(bare_result()) is None
+
+
+def test_a_body_with_a_cavity_can_be_opened() -> None:
+    result = small_result()
+    scene = phantom_scene(phantom_mesh(COARSE_GRID))
+    n = len(scene.mesh.nodes)
+    method = result.methods[0]
+    run = replace(method.run, u=np.zeros((2, n, 3)))
+    one = replace(method, scene=scene, runs=(run, run))
+    view = body_view(replace(result, methods=(one,)))
+    assert view is not None
+    assert {p["name"] for p in view["methods"][0]["parts"]} == {"outside", scene.cavities[0].name}
+    wall = 1e3 * scene.mesh.nodes[scene.mesh.facet_nodes("cavity")]
+    along = wall @ np.array(view["cut"]["normal"])
+    assert along.min() < view["cut"]["at"] < along.max()
