@@ -49,14 +49,6 @@ def test_names_of_test_modules_are_unique(project_root: Path) -> None:
     assert sorted(names) == sorted(set(names))
 
 
-def test_class_names_stand_once(project_root: Path) -> None:
-    """Two classes of one name are two meanings of one word."""
-    names = [
-        name for path in (project_root / "validate").rglob("*.py") for name, _ in classes(path)
-    ]
-    assert not {name for name in names if names.count(name) > 1}
-
-
 def test_every_dataclass_is_frozen(project_root: Path) -> None:
     found = {
         f"{path.name}:{name}": settings

@@ -25,7 +25,7 @@ PAGES = (
 )
 TIP = np.array([0.108, 0.008, 0.003])
 SLOW = ("study", "run", "check", "identify", "show", "compare", "history", "summary", "export",
-        "external", "live", "data get")  # fmt: skip
+        "report", "open", "external", "live", "data get")  # fmt: skip
 README = ["validate", "run", "fluid_phantom"]  # its first command, which `.ci/run` executes
 FAILS = {"study coverage": 1, "identify": 1}  # ten draws decide nothing; one law is not identified
 
@@ -63,14 +63,17 @@ def test_a_help_page_has_few_words_and_an_example(name: str) -> None:
         for n in PAGES
     ],
 )
-def test_the_example_of_a_help_page_runs(name: str, lab: Path, project_root: Path) -> None:
+def test_the_example_of_a_help_page_runs(
+    name: str, lab: Path, project_root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if name == "external check":
         script = project_root / "benchmarks" / "external" / "felupe_simulator.py"
         shutil.copy(script, lab / "my_simulator.py")
     if name == "summary":  # of measured recordings, and of whole runs only
         assert here("new", "pressed", "--from", "log.mcap", cwd=lab)[0] == 0
         assert here("run", "pressed", cwd=lab)[0] in (0, 1)
-    if name in ("show", "compare", "export", "history"):
+    monkeypatch.setattr("click.launch", lambda address: 0)  # no window on the tester's screen
+    if name in ("show", "compare", "export", "history", "report", "open"):
         for experiment in ("kf_cube", "kf_cube_inertia"):
             stored(experiment, lab)
     for _, *words in (e for e in examples(name) if e != README):

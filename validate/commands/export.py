@@ -1,30 +1,59 @@
-"""`validate export`: export a stored run as JUnit XML or LaTeX."""
+"""`validate export`: a stored run as JUnit XML, LaTeX, or vector figures."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from validate.commands.display import say
+from validate.commands.display import relative, say
+from validate.commands.show import shown_of
 from validate.errors import UsageError
-from validate.places import try_file, write_whole
+from validate.files import safe_name
+from validate.places import try_file, try_folder, write_whole
 from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
+from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
 from validate.study.stored_runs.score_comparison import read_table
 
 
-def export(run: Path, junit_file: Path | None, latex_file: Path | None) -> None:
+def export(
+    run: Path, junit_file: Path | None, latex_file: Path | None, figures: Path | None = None
+) -> None:
     """Write the requested exports; raises `UsageError` where none is requested."""
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
-    if not wanted:
+    if not wanted and figures is None:
         raise UsageError(
-            "export: no output is named; give --junit checks.xml or --latex checks.tex"
+            "export: no output is named; give --junit checks.xml, --latex checks.tex or "
+            "--figures FOLDER"
         )
     table = read_table(run, "score*", "check*", "published*", "outcome")
     for file, make in wanted:
         try_file(file)
         write_whole(file, make(table))
         say(f"{file}: {file.stat().st_size / 1e3:.1f} kB", indent="  ")
+
+    if figures is not None:
+        _figures(run, figures)
+
+
+def _figures(run: Path, folder: Path) -> None:
+    """Every view, chart and table of a stored run by its name: charts as SVG and PDF, 142 mm wide,
+    tables as CSV and LaTeX."""
+    table = read_table(run, *NOT_SHOWN)
+    try_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, _, exhibit in shown_of(run, table):
+        for part in drawable(exhibit):
+            for suffix in (".svg", ".pdf"):
+                written.append(folder / f"{safe_name(part.name)}{suffix}")
+                figure_of(part, table).savefig(written[-1])
+        for suffix in (".csv", ".tex") if len(exhibit.tables) == 1 else ():
+            written.append(folder / f"{safe_name(name)}{suffix}")
+            save(replace(exhibit, charts=(), heats=(), intervals=()), table, written[-1])
+    say(f"{relative(folder)}: {len(set(written))} files", indent="  ")
 
 
 def _junit(table: LongTable) -> str:

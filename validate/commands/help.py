@@ -65,7 +65,7 @@ SECTIONS = {
     "Studies": (
         "study filters", "study stability", "study tradeoff", "study choose", "study coverage",
     ),
-    "Results": ("show", "compare", "history", "summary", "export"),
+    "Results": ("open", "report", "show", "compare", "history", "summary", "export"),
     "Connect": ("external check", "external job", "live"),
 }  # fmt: skip
 

@@ -284,6 +284,35 @@ def history_(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool
     past.show(name, named, out, as_json)
 
 
+@cli.command("report")
+@click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
+def report_(out: Path | None) -> None:
+    """Write one page over all stored runs: verdicts, changes, links.
+
+    \b
+    Example:
+      validate report
+    """
+    from validate.commands import overview
+
+    overview.show(out)
+
+
+@cli.command("open")
+@click.argument("name", default="")
+@click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
+def open_(name: str, out: Path | None) -> None:
+    """Open a report in the browser; without NAME the page over all runs.
+
+    \b
+    Example:
+      validate open kf_cube
+    """
+    from validate.commands import overview
+
+    overview.open_page(name, out)
+
+
 @cli.command("summary")
 @click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON document; write no page.")
@@ -334,18 +363,24 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--junit", type=FILE, help="Write checks and published figures as JUnit XML.")
 @click.option("--latex", type=FILE, help="Write checks as a LaTeX tabular.")
+@click.option(
+    "--figures", type=FOLDER, help="Write every chart as SVG and PDF, every table as CSV and LaTeX."
+)
 @FORCE
-def export_(run: Path, junit: Path | None, latex: Path | None, *, force: bool) -> None:
-    """Write a stored run as JUnit XML or LaTeX.
+def export_(
+    run: Path, junit: Path | None, latex: Path | None, figures: Path | None, *, force: bool
+) -> None:
+    """Write a stored run as JUnit XML, LaTeX, or vector figures.
 
     \b
     Example:
       validate export reports/kf_cube --junit checks.xml --latex checks.tex
+      validate export reports/kf_cube --figures thesis/figures
     """
     from validate.commands import export as exporting
 
     require_new((file for file in (junit, latex) if file is not None), (run,), force=force)
-    exporting.export(run, junit, latex)
+    exporting.export(run, junit, latex, figures)
 
 
 @cli.group()

@@ -27,7 +27,7 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
     """
     folder = _folder(run, reports)
     table = read_table(folder, *NOT_SHOWN)
-    found = {name: (form, exhibit) for name, form, exhibit in _shown(folder, table)}
+    found = {name: (form, exhibit) for name, form, exhibit in shown_of(folder, table)}
     for name in names:
         if name not in found:
             raise UsageError(f"{folder.name} shows no '{name}'; {nearest_names(name, set(found))}")
@@ -54,7 +54,7 @@ def _folder(run: str, reports: Path | None) -> Path:
     return reports_of(experiment_files(Path.cwd()).get(run), reports) / run
 
 
-def _shown(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:
+def shown_of(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:
     """Name, form and content of views that have rows, then of the run's own tables and charts."""
     for view in (*VIEWS, *(View.from_json(v) for v in table.head.get("views", ()))):
         found = filled(view, table)

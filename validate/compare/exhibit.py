@@ -21,14 +21,15 @@ Pixels = NDArray[np.uint8]
 class TableCell:
     """A table entry with its SI unit ("": the number is as shown) and its emphasis.
 
-    `text` is how it reads, where that is not the rule; an emphasis never replaces words. A number
-    that is not finite is none.
+    `text` is how it reads, where that is not the rule; an emphasis never replaces words. `link` is
+    the address that a page leads to from it. A number that is not finite is none.
     """
 
     value: Entry
     unit: str = ""
     text: str = ""
     emphasis: Emphasis = ""
+    link: str = ""
 
     def __post_init__(self) -> None:
         if isinstance(self.value, float) and not math.isfinite(self.value):

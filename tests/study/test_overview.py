@@ -1,0 +1,94 @@
+"""The page over all stored runs, and reports opened from the command line."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from command_line import here, refused
+from report_samples import small_result
+
+from validate.report.write import write_report
+from validate.study.stored_runs.overview import share, stored, write_overview
+
+FIRST, SECOND = "2026-11-21T04:00:00+00:00", "2026-11-22T05:00:00+00:00"
+
+
+@pytest.fixture
+def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder where `cube` ran twice, with another modulus, and `ball` once."""
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    result = small_result()
+    other = tuple(
+        replace(p, default=2e4) if p.path == "material.E" else p for p in result.parameters
+    )
+    write_report(result, tmp_path / "cube", created=FIRST)
+    write_report(replace(result, parameters=other), tmp_path / "cube", created=SECOND)
+    write_report(replace(result, name="ball"), tmp_path / "ball", created=FIRST)
+    return tmp_path
+
+
+def test_every_folder_is_a_row_that_leads_to_its_report(reports: Path) -> None:
+    page = write_overview(reports)
+    text = page.read_text("utf-8")
+    for folder in ("cube", "ball"):
+        assert f'href="../{folder}/report.html"' in text
+        assert (page.parent / f"../{folder}/report.html").is_file()
+    with (page.parent / "tables" / "runs.csv").open() as file:
+        rows = {row["run"]: row for row in csv.DictReader(file)}
+    assert list(rows) == ["cube", "ball"]  # the newest first
+    assert rows["cube"]["verdict"] == "good enough"
+    assert rows["cube"]["changed since the run before"] == "material.E: 10000 Pa -> 20000 Pa"
+    assert rows["ball"]["changed since the run before"] == "first run"
+    document = json.loads((page.parent / "results.json").read_text("utf-8"))
+    assert [run["folder"] for run in document["runs"]] == ["cube", "ball"]
+
+
+def test_shares_of_limits_over_the_runs_are_a_curve(reports: Path) -> None:
+    write_overview(reports)
+    with (reports / "overview" / "tables" / "chart_trend.csv").open() as file:
+        rows = [row for row in csv.reader(file) if row[:2] == ["cube", "line"]]
+    cube = next(s for s in stored(reports) if s.folder == "cube")
+    assert [float(row[3]) for row in rows] == [share(run) for run in cube.runs]
+    check = small_result().checks[0]
+    assert check.limit
+    assert float(rows[0][3]) == pytest.approx(abs(check.value) / check.limit)
+
+
+def test_the_overview_is_no_run_of_its_own(reports: Path) -> None:
+    write_overview(reports)
+    assert [s.folder for s in stored(reports)] == ["cube", "ball"]
+    write_overview(reports)
+
+
+def test_open_finds_the_page(reports: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("click.launch", opened.append)
+    assert here("open", "cube", "--out", str(reports))[0] == 0
+    assert here("open", "--out", str(reports))[0] == 0
+    assert opened == [
+        (reports / p / "report.html").resolve().as_uri() for p in ("cube", "overview")
+    ]
+
+
+@pytest.mark.parametrize("command", [("open", "cub"), ("report",)])
+def test_nothing_stored_is_refused(command: tuple[str, ...], tmp_path: Path) -> None:
+    assert "validate run" in refused(*command, "--out", str(tmp_path / "none"))
+
+
+def test_a_wrong_name_gets_the_nearest(reports: Path) -> None:
+    assert "cube" in refused("open", "cub", "--out", str(reports))
+
+
+def test_figures_are_vectors_and_tables_are_files(reports: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "figures"
+    assert here("export", str(reports / "cube"), "--figures", str(folder))[0] == 0
+    names = {f.name for f in folder.iterdir()}
+    assert {"limits.svg", "limits.pdf", "checks.csv", "checks.tex"} <= names
+    assert any(name.startswith("curve") and name.endswith(".svg") for name in names)
+    root = ElementTree.parse(folder / "limits.svg").getroot()
+    assert root.tag.endswith("svg")
+    assert root.findall(".//{*}image") == []  # lines, not pixels
+    assert (folder / "limits.pdf").read_bytes().startswith(b"%PDF")

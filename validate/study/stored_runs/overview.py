@@ -1,0 +1,131 @@
+"""Overview of stored runs: verdict, date and change of each, with links to their reports."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
+from validate.errors import UsageError
+from validate.report.stored.run_changes import PastRun, Since, history, since
+from validate.report.stored.tables import report_folders
+from validate.report.views.view_filling import WORDS
+from validate.study.loose_page import write_loose
+
+FOLDER = "overview"
+_NAMED = 3  # changed parameters and moved checks that are named
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """All runs of a report folder, the oldest first; the last one is what the folder holds."""
+
+    runs: tuple[PastRun, ...]
+
+    @property
+    def folder(self) -> str:
+        return self.runs[-1].folder
+
+    @property
+    def verdict(self) -> str:
+        """The word over all checks."""
+        return self.runs[-1].verdict.partition(";")[0]
+
+    @property
+    def changed(self) -> str:
+        """What changed since the run before, in words."""
+        return change(since(*self.runs[-2:])) if len(self.runs) > 1 else "first run"
+
+
+def stored(reports: Path) -> tuple[StoredRun, ...]:
+    """Return the runs of every report folder, the newest first.
+
+    Raises `UsageError` where there is none, and for a damaged line.
+    """
+    folders = [f.name for f in report_folders(reports)] if reports.is_dir() else []
+    by_folder: dict[str, list[PastRun]] = {}
+    for name in dict.fromkeys(folder.partition("+")[0] for folder in folders):
+        for run in history(reports, name):
+            by_folder.setdefault(run.folder, []).append(run)
+    if not by_folder:
+        raise UsageError(f"no stored run below {reports}; `validate run fluid_phantom` makes one")
+    found = [StoredRun(tuple(runs)) for runs in by_folder.values()]
+    return tuple(sorted(found, key=lambda s: s.runs[-1].created, reverse=True))
+
+
+def share(run: PastRun) -> float | None:
+    """Return the largest |E| over its limit of a run's checks; None where none has a limit."""
+    shares = [abs(c.value) / c.limit for c in run.checks if c.value is not None and c.limit]
+    return max(shares, default=None)
+
+
+def change(found: Since) -> str:
+    """Return what a run changed, in words."""
+    parts = [f"verdict: {found.verdict[0].partition(';')[0]} before"] if found.verdict else []
+    parts += [
+        f"{name}: {before} -> {after}"
+        for name, (before, after) in list(found.parameters.items())[:_NAMED]
+    ]
+    parts += [f"{m.method} {m.name} moved" for m in found.moved[:_NAMED]]
+    parts += [f"method {m} added" for m in found.added] + [f"no {m}" for m in found.left_out]
+    parts += ["code"] if found.code else []
+    parts += ["files"] if found.files else []
+    return "; ".join(parts) or "nothing"
+
+
+def write_overview(reports: Path) -> Path:
+    """Write the overview beside the reports; returns the path of its page.
+
+    Raises what `stored` and `replace_folder` raise.
+    """
+    found = stored(reports)
+    words = [s.verdict for s in found]
+    counted = ", ".join(f"{words.count(w)} {w}" for w in dict.fromkeys(words))
+    exhibit = Exhibit("runs", "Stored runs", (), (_table(found),), _trends(found))
+    told = ("overview", "All stored runs", reports.resolve().name,
+            f"{len(found)} stored runs: {counted}.")  # fmt: skip
+    members = [
+        {"folder": s.folder, "created": s.runs[-1].created, "verdict": s.verdict,
+         "largest_share_of_limit": share(s.runs[-1]), "changed": s.changed}
+        for s in found
+    ]  # fmt: skip
+    document = {"kind": "overview", "runs": members}
+    return write_loose(told, (exhibit,), document, reports / FOLDER, "Stored")
+
+
+def _table(found: Sequence[StoredRun]) -> NumberTable:
+    rows = tuple(
+        (
+            TableCell(s.folder, emphasis="strong", link=f"../{s.folder}/report.html"),
+            TableCell(s.verdict, emphasis=WORDS.get(s.verdict, "")),
+            s.runs[-1].verdict.partition("; evidence: ")[2],
+            share(s.runs[-1]),
+            s.runs[-1].created[:16].replace("T", " "),
+            s.changed,
+        )
+        for s in found
+    )
+    heads = ("run", "verdict", "evidence", "largest |E| / limit", "made, UTC",
+             "changed since the run before")  # fmt: skip
+    return NumberTable(
+        "runs", "The last run of every folder", heads, rows,
+        "A share of the limit above 1 fails for its value alone; the verdict counts 2 u_val, too. "
+        "Bias and scatter over all of them: validate summary.",
+    )  # fmt: skip
+
+
+def _trends(found: Sequence[StoredRun]) -> tuple[Chart, ...]:
+    """The largest share of a limit, run by run, of what ran more than once."""
+    series = []
+    for one in found:
+        points = [(i + 1.0, s) for i, run in enumerate(one.runs) if (s := share(run)) is not None]
+        if len(points) > 1:
+            x, y = np.array(points).T
+            series.append(Series(one.folder, x, y))
+    if not series:
+        return ()
+    return (
+        Chart("trend", "Largest |E| over its limit, run by run", "run, the oldest is 1",
+              "largest |E| / limit", tuple(series), (("limit", 1.0),)),
+    )  # fmt: skip
