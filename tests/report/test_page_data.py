@@ -21,6 +21,7 @@ from validate.compare.exhibit import Chart, Intervals, Series
 from validate.report.page.body_view import body_view
 from validate.report.page.html import forest
 from validate.report.page.plots import plot
+from validate.report.sections.observations import markers_seen
 
 PAGE = files("validate.report.page")
 
@@ -124,17 +125,22 @@ def test_the_body_moves_as_computed() -> None:
 
 
 def test_markers_stand_where_they_were_measured() -> None:
+    """At each instant shown: measured on the line between two samples, simulated by the run."""
     result = tracking_result()
     view = body_view(result)
+    seen = markers_seen(result.methods[0])
     assert view is not None
-    seen = view["methods"][0].get("markers")
-    observed = [o for o in result.registered[0].observations if hasattr(o, "simulated")]
-    if not observed:
-        assert seen is None
-        return
     assert seen is not None
-    measured = array(seen["measured"], "<f4").reshape(len(view["labels"]), -1, 3)
-    assert np.isfinite(measured).any()
+    shown = view["methods"][0]["markers"]
+    count = len(view["labels"])
+    frames = np.unique(np.linspace(0, len(result.methods[0].run.u) - 1, count).round()).astype(int)
+    run = result.methods[0].run
+    measured = array(shown["measured"], "<f4").reshape(count, -1, 3)
+    for i, t in enumerate(run.t[run.at][frames]):
+        expected = [np.interp(t, seen.t, x) for x in seen.x.reshape(len(seen.t), -1).T]
+        assert measured[i].ravel() == pytest.approx(1e3 * np.array(expected), abs=1e-4)
+    simulated = array(shown["simulated"], "<f4").reshape(count, -1, 3)
+    assert simulated[-1] == pytest.approx(1e3 * seen.simulated(run.u[-1]), abs=1e-4)
 
 
 def test_nothing_finished_has_no_body() -> None:
