@@ -73,7 +73,7 @@ def body_view(result: Result) -> dict[str, Any] | None:
         ],
         "tools": list(_tools(shown[0], frames)),
     }
-    if scene.cavities:
+    if scene.cavities and scene.mesh.dimension == 3:
         normal, words = opening_plane(result, drive_direction(scene))
         wall = _MM * scene.mesh.nodes[scene.mesh.facet_nodes(scene.cavities[0].facets)]
         origin = 0.5 * (wall.min(axis=0) + wall.max(axis=0))
