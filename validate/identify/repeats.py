@@ -15,10 +15,9 @@ from validate.arrays import Floats, Ints, rms
 from validate.errors import RecordingError, UsageError
 from validate.identify.budget import Votes, by_specimen
 from validate.identify.modulus import MIN_SAMPLES, Log, TestKind, load_noise, loading, zero_of
-from validate.recording.clocks.clock_check import clock_of
+from validate.recording.merge import REPEATS, SHARE
 from validate.recording.motion_capture.text_rows import ASSUMED
-from validate.recording.scatter import REPEATS, SHARE
-from validate.recording.types import Record, Recording, Signal, Source
+from validate.recording.types import Record, Recording, Signal, Source, clock_of
 
 _TOE = 0.01  # of the way: where contact is told apart, see `zero_of`
 _ALIKE = 0.01  # sizes and speeds of repeats differ by less, relative

@@ -16,15 +16,13 @@ import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.chain import chain_faults
 from validate.recording.clocks.alignment import RECORD as CLOCK_OFFSET
-from validate.recording.clocks.clock_check import GAP_FACTOR, clock_of
 from validate.recording.mcap.channel_state import AllSeen, ChannelSeen
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP, read_recording
-from validate.recording.mcap.records import Channel, Schema
+from validate.recording.mcap.records import Channel, Schema, Verified, messages_of, opened
 from validate.recording.mcap.schemas import (
+    CALIBRATION,
     CONTOUR,
     IMAGE,
     MARKERS,
@@ -32,15 +30,15 @@ from validate.recording.mcap.schemas import (
     MIRROR_OF,
     SIGNAL,
     Sample,
+    by_name,
 )
 from validate.recording.mcap.streams import our_channels
-from validate.recording.mcap.verified_file import Verified, messages_of, opened
-from validate.recording.motion_capture.poses import ROTATION
+from validate.recording.motion_capture.poses import ROTATION, chain_faults
 from validate.recording.motion_capture.text_rows import ASSUMED, cut_lines
 from validate.recording.reader import Options, Reader, require_known, source_of
 from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
-from validate.recording.types import Clock, Frames, Recording, Signal, Source
+from validate.recording.types import GAP_FACTOR, Clock, Frames, Recording, Signal, Source, clock_of
 
 # What rosbag2 always writes is no defect: this record for every split, channels without messages.
 _ROS2, _OFTEN = "ros2", "rosbag2"

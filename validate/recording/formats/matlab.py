@@ -17,20 +17,25 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
-from validate.recording.formats.options import (
+from validate.recording.formats.streams import begun, recorded
+from validate.recording.formats.subprocess_decoder import decoded
+from validate.recording.reader import (
     M_PER_PX,
     RATE,
     SD,
     UNIT,
+    MapOption,
+    Options,
+    Reader,
     above_zero,
     frame,
+    head,
     length,
+    require_known,
+    source_of,
     spread,
 )
-from validate.recording.formats.streams import begun, recorded
-from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.reader import MapOption, Options, Reader, head, require_known, source_of
-from validate.recording.tables.displacement_field import FieldColumns, field_columns
+from validate.recording.tables.point_layout import FieldColumns, field_columns
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Frames, Markers, Recording, Signal, Stream
 from validate.units import in_si, si_of

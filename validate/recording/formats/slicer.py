@@ -9,10 +9,19 @@ import numpy as np
 
 from validate.errors import RecordingError
 from validate.files import json_value
-from validate.recording.formats.options import SD, UNIT, frame, length, spread
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import TextRow, TextRows, text_rows
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    length,
+    source_of,
+    spread,
+)
 from validate.recording.tables.encoding import whole_file
 from validate.recording.types import Markers, Recording
 

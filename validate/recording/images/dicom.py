@@ -9,11 +9,21 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.files import member, members
-from validate.recording.formats.options import M_PER_PX, RATE, WHITE, above_zero, frame, length
 from validate.recording.formats.streams import recorded
 from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import shallow
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    WHITE,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    source_of,
+)
 from validate.recording.types import Frames, Recording, Source, Stream
 
 # --- Which files are DICOM: known by what stands at byte 128.

@@ -15,12 +15,20 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.options import M_PER_PX, RATE, WHITE, above_zero, length
 from validate.recording.formats.streams import begun
 from validate.recording.formats.streams import recorded as of_streams
 from validate.recording.images.image import shallow
 from validate.recording.motion_capture.poses import pose_signals
-from validate.recording.reader import MapOption, Options, source_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    WHITE,
+    MapOption,
+    Options,
+    above_zero,
+    length,
+    source_of,
+)
 from validate.recording.types import Frames, Recording, Signal, Stream
 
 IMAGES = "images"

@@ -21,7 +21,6 @@ from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.images.image import png_size
 from validate.recording.mcap import streams
-from validate.recording.mcap.metadata import pose_of, scale_of
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import (
     CONTOUR,
@@ -32,6 +31,8 @@ from validate.recording.mcap.schemas import (
     Json,
     Sample,
     decode,
+    pose_of,
+    scale_of,
 )
 from validate.recording.mcap.streams import (
     Collected,

@@ -32,16 +32,18 @@ from validate.recording.mcap.records import (
     Attachment,
     Channel,
     Chunk,
+    Cut,
     Footer,
     Header,
     Metadata,
     Op,
     Schema,
+    Span,
+    Verified,
     chunk_index_place,
     records_in,
     statistics_messages,
 )
-from validate.recording.mcap.verified_file import Cut, Span, Verified
 from validate.recording.types import Source
 
 # --- SHA-256 and CRC-32 of bytes that come one after another, taken by a thread beside the

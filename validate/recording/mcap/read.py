@@ -16,18 +16,24 @@ from pathlib import Path
 from validate.errors import RecordingError
 from validate.files import ANY_SIZE
 from validate.recording.clocks.alignment import moved
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.formats.options import M_PER_PX, UNIT, WHITE, metres
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.metadata import by_name, name_of, own_records
-from validate.recording.mcap.records import MAGIC
+from validate.recording.mcap.records import MAGIC, Verified, messages_of, opened
+from validate.recording.mcap.schemas import by_name, name_of, own_records
 from validate.recording.mcap.streams import Collected, fill, not_ours, ours, stream_of
 from validate.recording.mcap.third_party_channels import ForeignStreams, found_streams, gatherers
 from validate.recording.mcap.third_party_channels import fill as fill_foreign
-from validate.recording.mcap.verified_file import Verified, messages_of, opened
-from validate.recording.reader import MapOption, Options, Reader, head
+from validate.recording.reader import (
+    M_PER_PX,
+    UNIT,
+    WHITE,
+    MapOption,
+    Options,
+    Reader,
+    head,
+    metres,
+)
 from validate.recording.scales import in_unit
-from validate.recording.types import Clock, Recording, by_kind
+from validate.recording.types import Clock, Recording, by_kind, clock_of
 
 
 def read_recording(path: Path) -> Recording:

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.mcap.channels import replacing
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.records import HEAD, MAGIC, Op
-from validate.recording.mcap.verified_file import Cut, Verified, opened
+from validate.recording.mcap.records import HEAD, MAGIC, Cut, Op, Verified, opened
+from validate.recording.mcap.write import replacing
 
 RECORD = "validate.recovered"
 _BLOCK = 2**20  # bytes copied at once

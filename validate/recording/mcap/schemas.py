@@ -1,4 +1,4 @@
-"""JSON schemas of this package's messages, and their encoding and decoding.
+"""Messages and metadata records of this package's recordings: schemas, encoding and decoding.
 
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane
@@ -11,23 +11,27 @@
     foxglove.PosesInFrame                                   mirror of markers, for viewing only
 
 `stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
-written in their shortest exact form, so they return bit for bit. Own schemas because the
-well-known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
+written in their shortest exact form, so they return bit for bit. Own schemas because the well-
+known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
 (`own_protobuf`), where NaN is a point not seen, no z is points in a plane, and an image is bytes.
 """
 
 import base64
 import binascii
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, checked
 from validate.errors import RecordingError
 from validate.recording.images.image import Pixels, decode_png, encode_png
+from validate.recording.mcap.records import Metadata
+from validate.recording.types import Contours, Frames, Record, Recording
 
 MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Contour"
 IMAGE = "foxglove.CompressedImage"
@@ -314,3 +318,96 @@ def _columns(columns: list[Floats]) -> Floats:
     if len(set(lengths)) != 1:
         raise RecordingError(f"lengths of x, y, z differ: {lengths}")
     return np.stack(columns, axis=1)
+
+
+RECORD = "validate.recording"  # the recording's name and the format of its file
+FORMAT = "1"
+POSE = "pose/"  # POSE + topic of every stream of contours or frames
+POSE_KEY = "T_frame_from_image"
+FOUND_IN = "found_in"  # in the pose record of contours: the topic of the images they come from
+CALIBRATION = "calibration/"  # CALIBRATION + topic of every stream of frames
+CALIBRATION_KEYS = ("m_per_px_x", "m_per_px_y")
+
+
+def own_records(recording: Recording) -> dict[str, Record]:
+    """Return the records that a recording's file adds to the recording's."""
+    own: dict[str, Record] = {RECORD: {"format": FORMAT, "name": recording.name}}
+    posed: dict[str, Contours | Frames] = {**recording.contours, **recording.frames}
+    for topic, stream in posed.items():
+        own[POSE + topic] = {POSE_KEY: " ".join(map(repr, stream.pose.ravel().tolist()))}
+        if isinstance(stream, Contours) and stream.images:
+            own[POSE + topic] = {**own[POSE + topic], FOUND_IN: stream.images}
+    for topic, frames in recording.frames.items():
+        scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
+        own[CALIBRATION + topic] = {key: repr(scale) for key, scale in scales}
+    return own
+
+
+def all_records(recording: Recording) -> dict[str, Record]:
+    """Return the recording's records and those that its file adds.
+
+    Raises `RecordingError` for records that bear a name of the file's own or hold more than texts.
+    """
+    own = own_records(recording)
+    taken = sorted(own.keys() & recording.metadata.keys())
+    if taken:
+        raise RecordingError(f"{recording.name}: metadata names {taken} are reserved; rename them")
+    for name, values in recording.metadata.items():
+        if not all(isinstance(text, str) for pair in values.items() for text in pair):
+            raise RecordingError(
+                f"{recording.name}: metadata {name!r} has values that are not text"
+            )
+    return {**own, **recording.metadata}
+
+
+def by_name(found: Iterable[Metadata]) -> dict[str, Record]:
+    """Metadata records by name; the second of one name is called `name#2`, and so on."""
+    records: dict[str, Record] = {}
+    counts: Counter[str] = Counter()
+    for record in found:
+        counts[record.name] += 1
+        again = counts[record.name] > 1
+        name = f"{record.name}#{counts[record.name]}" if again else record.name
+        if name in records:
+            raise RecordingError(f"metadata {name!r} occurs twice; rename one")
+        records[name] = record.values
+    return records
+
+
+def name_of(records: Mapping[str, Record], path: Path) -> str:
+    """What the recording calls itself, else its file's name; refuses formats of other versions."""
+    record = records.get(RECORD)
+    if record is None:
+        return path.stem
+    if record.get("format") != FORMAT or "name" not in record:
+        raise RecordingError(
+            f"record '{RECORD}' is {dict(record)}, expected format {FORMAT} and a name; "
+            "read it with the version that wrote it"
+        )
+    return record["name"]
+
+
+def pose_of(records: Mapping[str, Record], topic: str) -> Floats:
+    """T_frame_from_image (4, 4) of a topic; raises `RecordingError` where there is none."""
+    return _record_numbers(records, POSE + topic, (POSE_KEY,), 16).reshape(4, 4)
+
+
+def scale_of(records: Mapping[str, Record], topic: str) -> tuple[float, float]:
+    """Size (x, y) m of a topic's pixels; raises `RecordingError` where there is none."""
+    x, y = _record_numbers(records, CALIBRATION + topic, CALIBRATION_KEYS, 2).tolist()
+    return x, y
+
+
+def _record_numbers(
+    records: Mapping[str, Record], name: str, keys: tuple[str, ...], count: int
+) -> Floats:
+    """The `count` numbers under `keys` of a topic's metadata record."""
+    record = records.get(name, {})
+    missing = [key for key in keys if key not in record]
+    if missing:
+        raise RecordingError(f"no record {name!r} with {', '.join(missing)}, {count} numbers")
+    try:
+        numbers = np.array([float(word) for key in keys for word in record[key].split()])
+    except ValueError as error:
+        raise RecordingError(f"record {name!r}: {error}") from None
+    return checked(numbers, f"record {name!r}: {', '.join(keys)}", (count,), error=RecordingError)

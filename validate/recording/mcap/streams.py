@@ -14,22 +14,25 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.mcap.decoders import decoder_of
-from validate.recording.mcap.metadata import CALIBRATION, FOUND_IN, POSE, pose_of, scale_of
-from validate.recording.mcap.records import Channel, Message, Schema
+from validate.recording.mcap.records import Channel, Message, Schema, Verified
 from validate.recording.mcap.schemas import (
+    CALIBRATION,
     CONTOUR,
+    FOUND_IN,
     IMAGE,
     JSON_SCHEMA,
     MARKERS,
     MIRROR_OF,
+    POSE,
     PROTOBUF,
     SIGNAL,
     Parse,
     Sample,
     decode,
     parse_json,
+    pose_of,
+    scale_of,
 )
-from validate.recording.mcap.verified_file import Verified
 from validate.recording.types import Contours, Frames, Markers, Record, Signal, Stream
 
 OURS = (MARKERS, SIGNAL, CONTOUR)

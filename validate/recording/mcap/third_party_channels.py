@@ -12,17 +12,14 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.formats.options import length
 from validate.recording.images.image import shallow
 from validate.recording.mcap.decoders import Plain, decoder_of
 from validate.recording.mcap.known_messages import MessagePart, parts_of, stamp_ns
-from validate.recording.mcap.records import Channel, Message, Schema
+from validate.recording.mcap.records import Channel, Message, Schema, Verified
 from validate.recording.mcap.schemas import MIRROR_OF
 from validate.recording.mcap.streams import MAX_NUMBERS, ours
-from validate.recording.mcap.verified_file import Verified
-from validate.recording.reader import Options
-from validate.recording.types import Clock, Frames, Markers, Signal, Stream
+from validate.recording.reader import Options, length
+from validate.recording.types import Clock, Frames, Markers, Signal, Stream, clock_of
 from validate.units import si_of
 
 _DATE = 10**17  # ns: three years; clocks that count from a start stay below

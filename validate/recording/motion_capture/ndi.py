@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.options import RATE, UNIT, above_zero, frame, length
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
 from validate.recording.motion_capture.text_rows import (
@@ -30,7 +29,18 @@ from validate.recording.motion_capture.text_rows import (
     text_rows,
     told_left,
 )
-from validate.recording.reader import MapOption, Options, Reader, head, source_of
+from validate.recording.reader import (
+    RATE,
+    UNIT,
+    MapOption,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    source_of,
+)
 from validate.recording.tables.table import split_unit
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Recording, Stream

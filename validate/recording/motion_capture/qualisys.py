@@ -10,7 +10,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, length, spread
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.motion_capture.text_rows import (
@@ -25,7 +24,17 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    length,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording, Signal, Stream
 
 # --- Analog channels and force plates as Qualisys Track Manager exports them: a text of samples.

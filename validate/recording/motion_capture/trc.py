@@ -6,7 +6,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import RATE, SD, UNIT, above_zero, frame, metres, spread
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
@@ -20,7 +19,19 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    RATE,
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording
 
 _MAGIC = b"PathFileType"

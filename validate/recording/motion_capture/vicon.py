@@ -14,7 +14,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, metres, spread
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     LEFT_OUT,
@@ -28,7 +27,17 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording, Signal, Stream
 
 _POINTS, _DEVICES, _EVENTS = "Trajectories", "Devices", "Events"

@@ -23,17 +23,18 @@ from scipy.optimize import least_squares
 from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError
 from validate.recording.images.image import ellipse_through
-from validate.recording.outlines.discs import candidates, scanned
 from validate.recording.outlines.polar import (
     ANGLES,
     DIRECTIONS,
     RAYS,
     Grey,
     Wall,
+    candidates,
+    placed,
+    scanned,
     speckle_area,
     trace,
 )
-from validate.recording.outlines.wall import placed
 from validate.recording.types import Contours, Frames
 
 # --- Is a traced path the wall of a closed dark region, and how well is it known?

@@ -26,7 +26,7 @@ from validate.errors import RecordingError, UsageError
 from validate.files import buffered, json_value, npz_arrays, read_bytes, read_text
 from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import decode_png
-from validate.recording.images.numbered_files import number_key, numbered
+from validate.recording.images.png_stack import number_key, numbered
 from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
@@ -188,7 +188,7 @@ def _array(path: Path) -> Any:
 def _volume(path: Path) -> tuple[Any, Mapping[str, int]]:
     """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored. The
     values of regions by name, as 3D Slicer has them."""
-    held = decoded("validate.recording.images.nrrd_arrays", path)
+    held = decoded("validate.recording.images.nrrd", path)
     masks = held["pixels"]
     if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
         raise RecordingError(

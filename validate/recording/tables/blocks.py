@@ -10,29 +10,27 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.tables.cells import (
+from validate.recording.tables.columns import Said, time_column
+from validate.recording.tables.encoding import Text, decode
+from validate.recording.tables.table import (
     NOTHING,
     Line,
     Split,
+    Table,
+    columns_of,
     decimal_sign,
     decimals,
+    header_of,
     is_data,
     is_names,
     is_remark,
     is_row,
     is_unit_row,
+    labview_units,
     looks_numeric,
     number,
-    split_lines,
-)
-from validate.recording.tables.columns import Said, time_column
-from validate.recording.tables.encoding import Text, decode
-from validate.recording.tables.table import (
-    Table,
-    columns_of,
-    header_of,
-    labview_units,
     size_lines,
+    split_lines,
     split_unit,
 )
 from validate.recording.tables.vocabulary import SPECIMEN, holds
@@ -91,7 +89,8 @@ def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
     rows: list[Line] = []
     footer: list[Line] = []
     for line, cells in lines:
-        if _is_text(cells, count):
+        # A remark below a table (at most key and value); a damaged row is a row, not a remark.
+        if is_remark(cells) and sum(map(bool, cells)) < min(count, 3):
             footer.append((line, cells))
             continue
         if footer:
@@ -106,11 +105,6 @@ def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
         f"line {line}: text '{' '.join(words).strip()[:60]}' between the rows; export one test "
         f"per file and correct this line"
     )
-
-
-def _is_text(cells: Sequence[str], count: int) -> bool:
-    """A remark below a table (at most key and value); a damaged row is a row, not a remark."""
-    return is_remark(cells) and sum(map(bool, cells)) < min(count, 3)
 
 
 def _beside(rows: Sequence[Line], count: int) -> list[int]:
@@ -300,7 +294,12 @@ def _blocks(split: Split) -> list[TextBlock]:
         last = k + 1 == len(tops)
         rows, tail = (zone, []) if last and sizes[k] >= least else _parted(zone)
         if sizes[k] < least:
-            _refuse_pretender(names, units, rows, blocks)
+            # Words amid samples, with a few more samples below, are no table of their own.
+            width = max(len(cells) for _, cells in rows)
+            alike = blocks and width == len(blocks[-1].names[1])
+            bare = not units and not any(split_unit(cell)[1] for cell in names[1])
+            if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
+                refuse_text(*names)
             small.append(f"{len(rows)} rows below line {names[0]} ('{names[1][0]}', ...)")
             above += lines[top : tops[k + 1] if not last else len(lines)]
             above += size_lines(names, units, rows)
@@ -310,7 +309,9 @@ def _blocks(split: Split) -> list[TextBlock]:
         if blocks:
             found = [replace(b, shared=shared) for b in found]
         else:
-            shared = _shared(found[0].header)
+            # The lines of the first table's header that are the file's: those above its specimen's.
+            marks = [i for i, line in enumerate(found[0].header) if specimen_label(line[1])]
+            shared = found[0].header[: marks[0]] if marks else found[0].header
         blocks += found
         above = tail
     blocks[-1] = replace(blocks[-1], header=blocks[-1].header + above)
@@ -355,23 +356,6 @@ def _parted(zone: list[Line]) -> tuple[list[Line], list[Line]]:
     while end and not is_data(zone[end - 1][1]) and is_remark(zone[end - 1][1]):
         end -= 1
     return zone[:end], zone[end:]
-
-
-def _refuse_pretender(
-    names: Line, units: list[str], rows: Sequence[Line], blocks: Sequence[TextBlock]
-) -> None:
-    """Words amid samples, with a few more samples below, are no table of their own."""
-    width = max(len(cells) for _, cells in rows)
-    alike = blocks and width == len(blocks[-1].names[1])
-    bare = not units and not any(split_unit(cell)[1] for cell in names[1])
-    if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
-        refuse_text(*names)
-
-
-def _shared(header: list[Line]) -> list[Line]:
-    """The lines of the first table's header that are the file's: those above its specimen's."""
-    marks = [i for i, line in enumerate(header) if specimen_label(line[1])]
-    return header[: marks[0]] if marks else header
 
 
 def _stacked(block: TextBlock) -> list[TextBlock]:

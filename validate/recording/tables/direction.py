@@ -102,7 +102,17 @@ def signs(
     """
     d, f = excursion(displacement.values), excursion(force.values)
     if _said_sign(displacement) or _said_sign(force):
-        return _as_said(d, f, displacement, force, kind)
+        # The flips that the user gives; the kind of test is then what they make of it.
+        said_d, said_f = _said_sign(displacement), _said_sign(force)
+        flip_d = said_d or _matching(d, f * (said_f or 1))
+        flip_f = said_f or _matching(f, d * flip_d)
+        given = _NAMES.get(flip_d * d or flip_f * f)
+        if kind and kind.said and given and given != kind.name:
+            raise UsageError(
+                f"--map test={kind.name}: the signs of the other --map options mean {given}"
+            )
+        shown = Kind(given, "follows from the sign given by --map") if given else kind
+        return Signs(flip_d, flip_f, "sign given by --map", shown)
     kind = kind or _by_strain(d, f, strain, stress)
     if kind is None:
         raise UsageError(
@@ -125,20 +135,6 @@ def _of_neither(displacement: Pick, force: Pick) -> str:
         return ""
     return ("; a bent or an indented body is neither: give compression if the tool moves into it "
             "and answer experiment = body in `validate new`")  # fmt: skip
-
-
-def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None) -> Signs:
-    """The flips that the user gives; the kind of test is then what they make of it."""
-    said_d, said_f = _said_sign(displacement), _said_sign(force)
-    flip_d = said_d or _matching(d, f * (said_f or 1))
-    flip_f = said_f or _matching(f, d * flip_d)
-    given = _NAMES.get(flip_d * d or flip_f * f)
-    if kind and kind.said and given and given != kind.name:
-        raise UsageError(
-            f"--map test={kind.name}: the signs of the other --map options mean {given}"
-        )
-    shown = Kind(given, "follows from the sign given by --map") if given else kind
-    return Signs(flip_d, flip_f, "sign given by --map", shown)
 
 
 def _reason(d: int, f: int, kind: Kind) -> str:

@@ -13,17 +13,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.recording.formats.options import (
-    M_PER_PX,
-    RATE,
-    SD,
-    UNIT,
-    above_zero,
-    frame,
-    length,
-    metres,
-    spread,
-)
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
@@ -38,9 +27,30 @@ from validate.recording.motion_capture.text_rows import (
     told_left,
     whole_points,
 )
-from validate.recording.reader import MapOption, Options, Reader, head, source_of
-from validate.recording.tables.displacement_field import field_columns, is_grid
-from validate.recording.tables.point_layout import AXES, PIXELS, PointLayout, layout_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    SD,
+    UNIT,
+    MapOption,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    metres,
+    source_of,
+    spread,
+)
+from validate.recording.tables.point_layout import (
+    AXES,
+    PIXELS,
+    PointLayout,
+    field_columns,
+    is_grid,
+    layout_of,
+)
 from validate.recording.tables.table import split_unit
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Markers, Recording

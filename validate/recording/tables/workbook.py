@@ -1,4 +1,4 @@
-"""Reader of testing machines' workbooks (.xlsx, .xls, .ods): the sheet with the test, as text.
+"""Reader of testing machines' workbooks (.xlsx, .xls, .ods), and every specimen of an export.
 
 The sheet is read with the same parser as text exports.
 """
@@ -17,7 +17,7 @@ from validate.recording.tables.columns import OPTIONS, role_of
 from validate.recording.tables.encoding import whole_file
 from validate.recording.tables.specimens import chosen, specimen_tables
 from validate.recording.tables.table import Table
-from validate.recording.tables.testing_machine import recording_of
+from validate.recording.tables.testing_machine import INSTRON, recording_of
 from validate.recording.types import Recording
 
 _OPTIONS = (*OPTIONS, MapOption("sheet", "sheet of the workbook", default="the one with a test"))
@@ -52,19 +52,19 @@ def read_xlsx(path: Path, options: Options) -> Recording:
     and without the library, `RecordingError` where no sheet holds a table, or several hold a test
     and none is named.
     """
-    return _read(path, options, "validate.recording.tables.xlsx_arrays")
+    return _read(path, options)
 
 
 def read_sheets(path: Path, options: Options) -> Recording:
     """`read_xlsx` of a workbook of old Excel or OpenDocument."""
-    return _read(path, options, "validate.recording.tables.sheets_arrays")
+    return _read(path, options, old=True)
 
 
-def _read(path: Path, options: Options, decoder: str) -> Recording:
+def _read(path: Path, options: Options, *, old: bool = False) -> Recording:
     said = {key: value for key, value in options.items() if key != "sheet"}
     data = whole_file(path)
     try:
-        sheets = _sheets(path, options, decoder)
+        sheets = _sheets(path, options, old)
         sheet = _chosen(sheets, options.get("sheet"))
         label, table = chosen(sheet.tables, said.get("specimen"))
         return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
@@ -77,13 +77,8 @@ def _read(path: Path, options: Options, decoder: str) -> Recording:
 def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
     """What chooses each specimen, by its label: those of the sheet that is named or alone holds a
     test, else of all sheets that do; raises as `read_xlsx`."""
-    decoder = (
-        "validate.recording.tables.xlsx_arrays"
-        if _is_workbook(path)
-        else "validate.recording.tables.sheets_arrays"
-    )
     try:
-        tests = _tests(_sheets(path, options, decoder), options.get("sheet"))
+        tests = _tests(_sheets(path, options, not _is_workbook(path)), options.get("sheet"))
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
     one = len(tests) == 1
@@ -93,8 +88,8 @@ def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
     }  # fmt: skip
 
 
-def _sheets(path: Path, options: Options, decoder: str) -> list[_Sheet]:
-    found = decoded(decoder, path)
+def _sheets(path: Path, options: Options, old: bool) -> list[_Sheet]:
+    found = decoded("validate.recording.tables.workbook_arrays", path, {"old": float(old)})
     texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
     return [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
 
@@ -195,3 +190,20 @@ SHEETS = Reader(
     options=_OPTIONS,
     extensions=(".xls", ".ods"),
 )
+
+
+def every_specimen(reader: Reader, path: Path, options: Options) -> list[Recording]:
+    """Return a recording of each specimen, named by its label; raises as the reader, and
+    `UsageError` for one of another format."""
+    if reader in (XLSX, SHEETS):
+        chosen = specimens_in_book(path, options)
+    elif reader is INSTRON:
+        said = (options.get("encoding"), options.get("decimal"))
+        tables = specimen_tables(parse_tables(whole_file(path), *said))
+        chosen = {label: {"specimen": label} for label in tables}
+    else:
+        raise UsageError(
+            f"--map specimen={ALL}: {path.name} is {reader.doc}, which has no specimens"
+        )
+    logs = {label: reader.read(path, {**options, **one}) for label, one in chosen.items()}
+    return [replace(log, name=f"{log.name}-{label}") for label, log in logs.items()]

@@ -18,17 +18,19 @@ from validate.fem.assembly.locate import (
 )
 from validate.recording.types import Markers, Recording
 from validate.register.clocks import SAME, clock_sd, interpolated, slopes, with_clock
-from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.quality import LINE, Registration, register_points
 from validate.register.markers.transform import spread
 from validate.register.observation import (
+    AnyDraw,
     Deviation,
     History,
     Role,
     Selection,
     Simulated,
     frame_at,
+    from_rest,
+    shifted,
 )
 from validate.scene.mesh import Mesh
 

@@ -14,9 +14,8 @@ from scipy.spatial import KDTree
 from validate.arrays import Ints
 from validate.errors import SceneError, ValidateError
 from validate.places import cache
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
-from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.scene import Scene
 from validate.scene.shape_functions import CORNERS, LATTICE
 
