@@ -194,9 +194,6 @@ def pattern(
     least = 1e-9 * float(np.abs(residual).max(initial=0.0)) or 1e-300
     ratio = float(amounts @ amounts) / len(amounts) / (times * max(noise, least) ** 2)
     chance = float(fdtrc(len(amounts), max(freedom / times, 1.0), ratio))
-    return Pattern(smooth, chance, bool(_bend(x, smooth) > 0))
-
-
-def _bend(x: Floats, smooth: Floats) -> float:
-    """The second coefficient of the smooth part: positive where both ends lie above the middle."""
-    return float(legendre.legfit(x, smooth, max(DEGREES))[2])
+    # The second coefficient of the smooth part: positive where both ends lie above the
+    # middle.
+    return Pattern(smooth, chance, bool(float(legendre.legfit(x, smooth, max(DEGREES))[2]) > 0))

@@ -79,18 +79,15 @@ class Space:
                 f"--seeds {count}: expected at least one start; ten or more for a reliable result"
             )
         p = len(self.ranges)
-        return np.vstack([np.full((1, p), 0.5), _latin_hypercube(count - 1, p, seed)])
-
-
-def _latin_hypercube(n: int, p: int, seed: int) -> Floats:
-    """Points (n, p), one in each n-th of every axis; those of `scipy.stats.qmc`, whose import costs
-    more than most fits."""
-    draw = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    within = draw.uniform(size=(n, p))
-    parts = np.tile(np.arange(1, n + 1), (p, 1))
-    for row in parts:
-        draw.shuffle(row)
-    return np.asarray((parts.T - within) / max(n, 1))
+        # Points (n, p), one in each n-th of every axis; those of `scipy.stats.qmc`, whose import
+        # costs more than most fits.
+        n = count - 1
+        draw = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+        within = draw.uniform(size=(n, p))
+        parts = np.tile(np.arange(1, n + 1), (p, 1))
+        for row in parts:
+            draw.shuffle(row)
+        return np.vstack([np.full((1, p), 0.5), np.asarray((parts.T - within) / max(n, 1))])
 
 
 Residual = Callable[[Floats], Floats]  # x (p,) from 0 to 1 -> (m,), independent, of variance one

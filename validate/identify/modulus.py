@@ -125,7 +125,14 @@ def fit_modulus(
     strain = (d - contact) / cylinder.height
     used = _loading(strain, high)
     used &= (strain >= low) & (strain <= high)
-    _check_cover(recording.name, strain, used, window)
+    low, high = window
+    count = int(used.sum())
+    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
+        raise RecordingError(
+            f"{recording.name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} "
+            f"samples in the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose "
+            "another"
+        )
     return _fit(recording.name, strain[used], force[used], cylinder.area, offset, contact, window)
 
 
@@ -295,21 +302,6 @@ def _loading(strain: Floats, high: float) -> np.ndarray[tuple[int], np.dtype[np.
     beyond = strain > high
     end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
     return np.arange(len(strain)) < end
-
-
-def _check_cover(
-    name: str,
-    strain: Floats,
-    used: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    window: tuple[float, float],
-) -> None:
-    low, high = window
-    count = int(used.sum())
-    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
-        raise RecordingError(
-            f"{name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} samples in "
-            f"the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose another"
-        )
 
 
 def _fit(

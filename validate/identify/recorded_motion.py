@@ -238,32 +238,43 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     x = moved[name]
     seen = np.isfinite(x).all(axis=1)
     t_all, t, x = t, t[seen], x[seen]
-    direction = _direction(x)
+    # The unit vector (d,) along which x (nt, d) varies most, its largest part positive.
+    _, _, V = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
+    along = V[0]
+    direction = np.asarray(along * np.sign(along[np.abs(along).argmax()]))
     y = (x - x[0]) @ direction
     steps = np.diff(t)
     usual = float(np.median(np.diff(t_all)))
-    frequency, resolution = _dominant(t, y)
+    # Frequency of the spectrum's largest peak and its resolution, Hz; zeros where none is.
+    if len(t) < _FEWEST:
+        frequency, resolution = 0.0, 0.0
+    else:
+        f, amplitude = spectrum(*_even(t, y))
+        frequency, resolution = float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
     coarse = noise > 0 and frequency * usual * _SMOOTH > 1
     found, rings = noise if coarse else max(noise, _noise(y)), _ringing(t, y)
     starts = _starts(t, y, found)
+    # Until when it stays within a hundredth of the motion about its start, or within noise.
+    first = int((np.abs(y - y[0]) > max(6 * found, _STILL * np.ptp(y))).argmax())
+    held_until = float(t[first - 1]) if first > 1 else None
+    # From when it stays within a hundredth of the motion of where it ends, for a tenth of the
+    # time at least.
+    late = t[-1] - 0.1 * (t[-1] - t[0])
+    tail = y[t >= late]
+    near = np.abs(y - np.median(tail)) <= max(4 * found, _STILL * np.ptp(y))
+    away = np.flatnonzero(~near)
+    start = t[0] if not len(away) else t[min(away[-1] + 1, len(t) - 1)]
     return RecordedMotion(
         name, direction, t, y, found, frequency, resolution,
-        _released(t, y, starts, rings) if rings else starts, _still(t, y, found),
-        _rests(t, y, found), float(steps.max()), int((steps > _GAP * usual).sum()),
-        float(1 - seen.mean()), rings,
+        _released(t, y, starts, rings) if rings else starts, held_until,
+        float(start) if start <= late else None, float(steps.max()),
+        int((steps > _GAP * usual).sum()), float(1 - seen.mean()), rings,
     )  # fmt: skip
 
 
 def _extent(x: Floats) -> float:
     seen = x[np.isfinite(x).all(axis=1)]
     return float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) > 1 else 0.0
-
-
-def _direction(x: Floats) -> Floats:
-    """The unit vector (d,) along which x (nt, d) varies most, its largest part positive."""
-    _, _, V = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
-    along = V[0]
-    return np.asarray(along * np.sign(along[np.abs(along).argmax()]))
 
 
 def _even(t: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -277,14 +288,6 @@ def _noise(y: Floats) -> float:
     if len(y) < _FEWEST:
         return 0.0
     return float(1.4826 * np.median(np.abs(np.diff(y, n=4))) / np.sqrt(70))
-
-
-def _dominant(t: Floats, y: Floats) -> tuple[float, float]:
-    """Frequency of the spectrum's largest peak and its resolution, Hz; zeros where none is."""
-    if len(t) < _FEWEST:
-        return 0.0, 0.0
-    f, amplitude = spectrum(*_even(t, y))
-    return float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
 
 
 def _starts(t: Floats, y: Floats, noise: float) -> float:
@@ -322,23 +325,6 @@ def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
     at = np.arctan2(w * s - d * p, w * p + d * s) / w
     at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
     return float(max(starts + at, t[0]))
-
-
-def _still(t: Floats, y: Floats, noise: float) -> float | None:
-    """Until when it stays within a hundredth of the motion about its start, or within noise."""
-    away = np.abs(y - y[0]) > max(6 * noise, _STILL * np.ptp(y))
-    first = int(away.argmax())
-    return float(t[first - 1]) if first > 1 else None
-
-
-def _rests(t: Floats, y: Floats, noise: float) -> float | None:
-    """From when it stays within a hundredth of the motion of where it ends, for a tenth of the
-    time at least."""
-    tail = y[t >= t[-1] - 0.1 * (t[-1] - t[0])]
-    near = np.abs(y - np.median(tail)) <= max(4 * noise, _STILL * np.ptp(y))
-    away = np.flatnonzero(~near)
-    start = t[0] if not len(away) else t[min(away[-1] + 1, len(t) - 1)]
-    return float(start) if start <= t[-1] - 0.1 * (t[-1] - t[0]) else None
 
 
 def _ringing(t: Floats, y: Floats) -> Ringing | None:

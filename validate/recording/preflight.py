@@ -7,7 +7,6 @@ so is a file that stops short, as if its writer was ended; only other damage is 
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,7 +19,7 @@ from validate.recording.clocks.alignment import RECORD as CLOCK_OFFSET
 from validate.recording.mcap.channel_state import AllSeen, ChannelSeen
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.read import MCAP, read_recording
-from validate.recording.mcap.records import Channel, Schema, Verified, messages_of, opened
+from validate.recording.mcap.records import Channel, Verified, messages_of, opened
 from validate.recording.mcap.schemas import (
     CALIBRATION,
     CONTOUR,
@@ -29,13 +28,12 @@ from validate.recording.mcap.schemas import (
     MIRROR,
     MIRROR_OF,
     SIGNAL,
-    Sample,
     by_name,
 )
 from validate.recording.mcap.streams import our_channels
 from validate.recording.motion_capture.poses import ROTATION, chain_faults
 from validate.recording.motion_capture.text_rows import ASSUMED, cut_lines
-from validate.recording.reader import Options, Reader, require_known, source_of
+from validate.recording.reader import Options, require_known, source_of
 from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
 from validate.recording.types import GAP_FACTOR, Clock, Frames, Recording, Signal, Source, clock_of
@@ -107,7 +105,22 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
     except UsageError as asks:
         if options or reader.holds is None:
             raise
-        return _not_said(reader, path, reader.holds(path), str(asks))
+        # The contents of a file that cannot be read before the user says more of it.
+        held = reader.holds(path)
+        return Inspection(
+            source=source_of(path, "not checked"),
+            profile="",
+            library="",
+            compressions=(),
+            chunks=0,
+            messages=0,
+            attachments=0,
+            metadata=(),
+            topics=tuple(_unread_topic(name, what) for name, what in held.items()),
+            defects=(),
+            facts=(f"still needed: {asks!s}",),
+            read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
+        )
     topics = [_stream_topic(name, recording) for name in recording.streams]
     never = [_unread_topic(name, why) for name, why in recording.unread.items()]
     facts = [f"{k}: {v}" for r in recording.metadata.values() for k, v in r.items() if v]
@@ -125,18 +138,6 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
         ),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
         facts=tuple(facts),
-    )  # fmt: skip
-
-
-def _not_said(reader: Reader, path: Path, held: Mapping[str, str], asks: str) -> Inspection:
-    """The contents of a file that cannot be read before the user says more of it."""
-    return Inspection(
-        source=source_of(path, "not checked"),
-        profile="", library="", compressions=(), chunks=0, messages=0, attachments=0, metadata=(),
-        topics=tuple(_unread_topic(name, what) for name, what in held.items()),
-        defects=(),
-        facts=(f"still needed: {asks}",),
-        read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
     )  # fmt: skip
 
 
@@ -168,8 +169,31 @@ def inspect_recording(path: Path | str) -> Inspection:
     seen = AllSeen()
     with opened(path) as stream:
         verified = _verified(stream, path, seen)
-        _look_again(stream, verified, seen)
-    defects = [*_cut(verified), *_file_defects(verified), *([seen.limit] if seen.limit else [])]
+        # Channels without messages, and images whose calibration came after them.
+        late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
+        seen.channels.update(
+            {n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()}
+        )
+        for message in messages_of(stream, verified, late.keys()):
+            seen.take(message.channel_id, [message.data])
+    found: list[str] = []
+    if verified.claimed_messages not in (None, verified.messages):
+        found.append(
+            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
+        )
+    if verified.misindexed:
+        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
+    if verified.unknown_records:
+        found.append(f"{verified.unknown_records} records of unknown kind")
+    often = Counter(c.topic for c in verified.channels.values())
+    found += [f"{topic!r} is on {n} channels" for topic, n in often.items() if n > 1]
+    for number, channel in verified.channels.items():
+        schema = verified.schemas.get(channel.schema_id)
+        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
+            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
+    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
+    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
+    defects = [*_cut(verified), *found, *([seen.limit] if seen.limit else [])]
     topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
     return _inspection(verified, topics, [*defects, *_chained(path, verified)])
 
@@ -196,14 +220,6 @@ def _cut(verified: Verified) -> list[str]:
     ]
 
 
-def _look_again(stream: BinaryIO, verified: Verified, seen: AllSeen) -> None:
-    """Channels without messages, and images whose calibration came after them."""
-    late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
-    seen.channels.update({n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()})
-    for message in messages_of(stream, verified, late.keys()):
-        seen.take(message.channel_id, [message.data])
-
-
 def _inspection(
     verified: Verified, topics: list[tuple[Topic, list[str]]], defects: list[str]
 ) -> Inspection:
@@ -219,7 +235,13 @@ def _inspection(
         topics=tuple(topic for topic, _ in topics),
         defects=(*defects, *(line for _, found in topics for line in found)),
         clock_offsets=tuple(_offset_lines(verified)),
-        facts=(*_assumed(verified), *_attached(verified)),
+        facts=(
+            *_assumed(verified),
+            *(
+                f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
+                for a in verified.attachments
+            ),
+        ),
     )
 
 
@@ -249,13 +271,6 @@ def _assumed(verified: Verified) -> list[str]:
     ]
 
 
-def _attached(verified: Verified) -> list[str]:
-    return [
-        f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
-        for a in verified.attachments
-    ]
-
-
 def _topic(
     verified: Verified, number: int, channel: Channel, seen: ChannelSeen | None
 ) -> tuple[Topic, list[str]]:
@@ -274,16 +289,14 @@ def _topic(
         count=len(publish),
         first_ns=int(times.min()) if len(times) else None,
         last_ns=int(times.max()) if len(times) else None,
-        unit=_unit(schema, first) if schema and first else "",
+        unit={SIGNAL: first.unit, IMAGE: "grey level"}.get(schema.name, "m")
+        if schema and first
+        else "",
         frame=first.frame if first else "",
         clock=clock,
     )
     silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
     return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
-
-
-def _unit(schema: Schema, first: Sample) -> str:
-    return {SIGNAL: first.unit, IMAGE: "grey level"}.get(schema.name, "m")
 
 
 def _kind(channel: Channel, schema: str, seen: ChannelSeen | None) -> str:
@@ -309,27 +322,6 @@ def _content(
         return stamps, [str(error)]
     odd = odd_stream(stream)
     return stamps, [f"{seen.channel.topic!r}: {odd}"] if odd else []
-
-
-def _file_defects(verified: Verified) -> list[str]:
-    found: list[str] = []
-    if verified.claimed_messages not in (None, verified.messages):
-        found.append(
-            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
-        )
-    if verified.misindexed:
-        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
-    if verified.unknown_records:
-        found.append(f"{verified.unknown_records} records of unknown kind")
-    topics = Counter(c.topic for c in verified.channels.values())
-    found += [f"{topic!r} is on {n} channels" for topic, n in topics.items() if n > 1]
-    for number, channel in verified.channels.items():
-        schema = verified.schemas.get(channel.schema_id)
-        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
-            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
-    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
-    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
-    return found
 
 
 def _clock_defects(topic: str, clock: Clock | None, log_ns: Ints) -> list[str]:

@@ -64,7 +64,19 @@ _FIRST: tuple[tuple[bytes, str, str], ...] = (
 def known_unread(path: Path) -> str:
     """What a path is that no reader takes, and what to do; empty where nothing shows."""
     if path.is_dir():
-        return _folder(path)
+        # A folder of bags, or of scans.
+        name = path.resolve().name
+        if dicom := sorted(p.name for p in path.glob("*.dcm")):
+            return (
+                f"{name} is a folder of DICOM files, read one by one: "
+                f"validate import {name}/{dicom[0]}"
+            )
+        if bags := sorted(p.name for kind in ("db3", "mcap") for p in path.glob(f"*.{kind}")):
+            return (
+                f"{name} holds {'bags of ROS 2' if bags[0].endswith('db3') else 'MCAP files'} "
+                f"without metadata.yaml of rosbag2; name one: validate import {name}/{bags[0]}"
+            )
+        return ""
     first = head(path, 64)
     if first.startswith(b"PK\3\4") and b".npy" in first:
         first = _NPZ
@@ -77,21 +89,6 @@ def known_unread(path: Path) -> str:
         ),
         "",
     )
-
-
-def _folder(folder: Path) -> str:
-    """A folder of bags, or of scans."""
-    name = folder.resolve().name
-    if dicom := sorted(p.name for p in folder.glob("*.dcm")):
-        return (
-            f"{name} is a folder of DICOM files, read one by one: validate import {name}/{dicom[0]}"
-        )
-    if bags := sorted(p.name for kind in ("db3", "mcap") for p in folder.glob(f"*.{kind}")):
-        return (
-            f"{name} holds {'bags of ROS 2' if bags[0].endswith('db3') else 'MCAP files'} without "
-            f"metadata.yaml of rosbag2; name one: validate import {name}/{bags[0]}"
-        )
-    return ""
 
 
 _OWN: tuple[Reader, ...] = (

@@ -45,7 +45,15 @@ def odd_stream(stream: object) -> str:
         height, width = stream.images[0].shape
         return odd_pixel(stream.m_per_px, (height, width))
     if isinstance(stream, Markers):
-        return _odd_spread(stream.x)
+        # Of markers x (nt, k, d) m.
+        size = _spread(stream.x)
+        low, high = _SPREADS
+        if low <= size <= high or size == 0:
+            return ""
+        return (
+            f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
+            f"{_factor(size, _SPREADS)}"
+        )
     return _odd_outlines(stream) if isinstance(stream, Contours) else ""
 
 
@@ -93,18 +101,6 @@ def _scaled(c: Contours, factor: float) -> Contours:
 def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
     for topic, stream in recording.streams.items():
         yield topic, odd_stream(stream)
-
-
-def _odd_spread(x: Floats) -> str:
-    """Of markers x (nt, k, d) m."""
-    size = _spread(x)
-    low, high = _SPREADS
-    if low <= size <= high or size == 0:
-        return ""
-    return (
-        f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
-        f"{_factor(size, _SPREADS)}"
-    )
 
 
 def _spread(x: Floats) -> float:

@@ -173,7 +173,15 @@ class Contours:
     def __post_init__(self) -> None:
         _set(self, "t", _times(self.t, "contours"))
         if self.each is not None:
-            _set(self, "each", _told_apart(self.each, len(self.t)))
+            each = self.each
+            each = checked(
+                each, "contours' sd [m] and confidence", (len(self.t), 2), error=RecordingError
+            )
+            if (each < 0).any() or (each[:, 1] > 1).any():
+                raise RecordingError(
+                    "contours: an sd below 0, or a confidence that is not within 0..1"
+                )
+            _set(self, "each", each)
         if len(self.outlines) != len(self.t):
             raise RecordingError(f"contours: {len(self.outlines)} outlines, {len(self.t)} times")
         outlines = tuple(
@@ -198,13 +206,6 @@ class Contours:
         t = np.repeat(self.t, [len(outline) for outline in self.outlines])
         points = np.concatenate(self.outlines)
         return labelled("points", points, ("point", "axis"), t, attributes, axis=("x", "y"))
-
-
-def _told_apart(each: Floats, count: int) -> Floats:
-    each = checked(each, "contours' sd [m] and confidence", (count, 2), error=RecordingError)
-    if (each < 0).any() or (each[:, 1] > 1).any():
-        raise RecordingError("contours: an sd below 0, or a confidence that is not within 0..1")
-    return each
 
 
 def _image(image: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
@@ -420,7 +421,12 @@ def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints)
         raise RecordingError(f"{topic!r}: {counts} stamps, publish and log times, expected equal")
     steps = np.diff(times)
     duplicates, backward = int((steps == 0).sum()), int((steps < 0).sum())
-    gaps = _gaps(steps[steps > 0])
+    # The steps that are gaps; reorders `forward`, as a copy costs 8 bytes a sample.
+    forward = steps[steps > 0]
+    if not len(forward):
+        gaps = forward
+    else:
+        gaps = forward[forward > GAP_FACTOR * np.median(forward, overwrite_input=True)]
     duration = _seconds(int(times.max()) - int(times.min()))
     return Clock(
         topic=topic,
@@ -434,13 +440,6 @@ def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints)
         stamp_minus_publish=None if stamps_ns is None else _largest(stamps_ns, publish_ns),
         publish_minus_log=_largest(publish_ns, log_ns),
     )
-
-
-def _gaps(forward: Ints) -> Ints:
-    """The steps that are gaps; reorders `forward`, as a copy costs 8 bytes a sample."""
-    if not len(forward):
-        return forward
-    return forward[forward > GAP_FACTOR * np.median(forward, overwrite_input=True)]
 
 
 def _seconds(ns: int) -> float:

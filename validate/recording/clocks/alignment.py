@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.types import GAP_FACTOR, Recording, Signal, Stream, by_kind
 
@@ -47,7 +47,26 @@ def coarse_lag(
     start = float(reference.t[0] - stream.t[0])
     reach = int(np.ceil((within + abs(start)) / step)) + 1
     lags = np.arange(-min(reach, len(b)), min(reach, len(a)) + 1)
-    correlation, overlap = _masked_correlation(a, a_seen, b, b_seen, lags)
+    # Correlation and overlap of b(i) with a(i + lag), means and variances over the overlap.
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(len(a) + len(b), real=True)
+    A, A1, A2 = (rfft(x, size) for x in (a, a_seen, a * a))
+    B, B1, B2 = (np.conj(rfft(x, size)) for x in (b, b_seen, b * b))
+
+    def over(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> Floats:
+        return np.asarray(irfft(x * y, size), dtype=np.float64)[lags % size]
+
+    n = np.maximum(np.rint(over(A1, B1)), 0.0)
+    safe = np.maximum(n, 1.0)
+    sum_a, sum_b = over(A, B1), over(A1, B)
+    var_a = over(A2, B1) - sum_a**2 / safe
+    var_b = over(A1, B2) - sum_b**2 / safe
+    scale = np.sqrt(np.maximum(var_a, 0) * np.maximum(var_b, 0))
+    top = over(A, B) - sum_a * sum_b / safe
+    enough = scale > 1e-9 * np.sqrt(float(a @ a) * float(b @ b))
+    found = np.divide(top, scale, out=np.zeros_like(top), where=enough)
+    correlation, overlap = np.clip(found, -1.0, 1.0), n
     tau = start + lags * step
     usable = (np.abs(tau) <= within + step) & (overlap >= min_coverage * b_seen.sum())
     if usable.sum() < 3:
@@ -75,25 +94,20 @@ def _only_peak(tau: Floats, correlation: Floats, within: float, least: float) ->
         raise RecordingError(
             f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s reaches the edge of the "
             f"search ({tau[0]:+.4g}..{tau[-1]:+.4g} s), as for ramps or for an offset beyond "
-            f"{within:g} "
-            "s; widen the search (--within) or align by a marked event (--event)"
+            f"{within:g} s; widen the search (--within) or align by a marked event (--event)"
         )
     at = np.flatnonzero(rivals)
     if (np.diff(at) > 1).any():
-        other = at[np.argmax(np.where(_far(at, peak), correlation[at], -1))]
+        # Which lags are not in one run with the peak.
+        runs = np.concatenate([[0], np.cumsum(np.diff(at) > 1)])
+        found: Bools = runs != runs[np.searchsorted(at, peak)]
+        other = at[np.argmax(np.where(found, correlation[at], -1))]
         raise RecordingError(
             f"ambiguous: correlation {best:.3f} at {tau[peak]:+.4g} s and {correlation[other]:.3f} "
             f"at {tau[other]:+.4g} s, as in periodic signals; narrow the search (--within) or "
             "align by a marked event (--event)"
         )
     return float(tau[peak])
-
-
-def _far(at: np.ndarray[tuple[int], np.dtype[np.int64]], peak: int) -> Bools:
-    """Which lags are not in one run with the peak."""
-    runs = np.concatenate([[0], np.cumsum(np.diff(at) > 1)])
-    found: Bools = runs != runs[np.searchsorted(at, peak)]
-    return found
 
 
 def _on_grid(signal: Signal, step: float) -> tuple[Floats, Floats]:
@@ -107,31 +121,6 @@ def _on_grid(signal: Signal, step: float) -> tuple[Floats, Floats]:
     grid = np.arange(count, dtype=np.float64) * step
     seen = met(t, grid).astype(np.float64)
     return (np.interp(grid, t, signal.y[:, 0]) - signal.y.mean()) * seen, seen
-
-
-def _masked_correlation(
-    a: Floats, a_seen: Floats, b: Floats, b_seen: Floats, lags: Ints
-) -> tuple[Floats, Floats]:
-    """Correlation and overlap of b(i) with a(i + lag), means and variances over the overlap."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    size = next_fast_len(len(a) + len(b), real=True)
-    A, A1, A2 = (rfft(x, size) for x in (a, a_seen, a * a))
-    B, B1, B2 = (np.conj(rfft(x, size)) for x in (b, b_seen, b * b))
-
-    def over(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> Floats:
-        return np.asarray(irfft(x * y, size), dtype=np.float64)[lags % size]
-
-    n = np.maximum(np.rint(over(A1, B1)), 0.0)
-    safe = np.maximum(n, 1.0)
-    sum_a, sum_b = over(A, B1), over(A1, B)
-    var_a = over(A2, B1) - sum_a**2 / safe
-    var_b = over(A1, B2) - sum_b**2 / safe
-    scale = np.sqrt(np.maximum(var_a, 0) * np.maximum(var_b, 0))
-    top = over(A, B) - sum_a * sum_b / safe
-    enough = scale > 1e-9 * np.sqrt(float(a @ a) * float(b @ b))
-    found = np.divide(top, scale, out=np.zeros_like(top), where=enough)
-    return np.clip(found, -1.0, 1.0), n
 
 
 def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float]:
@@ -164,7 +153,15 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
             break
         step = float(np.clip(-at_zero / falls, -width, width))
         tau += step
-        sd = _weighted_sd(g, left.mean(axis=0)) / abs(float(falls))
+        # The sd of sum g e, of noise e like `left`, whose neighbours may be correlated.
+        left = left.mean(axis=0)
+        count = len(left) - 3
+        alone = float(left @ left) / count * float(g @ g)
+        near = sum(
+            float(left[:-k] @ left[k:]) / count * float(g[:-k] @ g[k:])
+            for k in range(1, _NEIGHBOURS)
+        )
+        sd = float(np.sqrt(max(alone + 2 * near, 0.5 * alone))) / abs(float(falls))
         if abs(step) < 1e-4 * width + 0.05 * sd:
             return tau, float(np.hypot(sd, FLOOR * width))
         if abs(tau - start) > 2 * width:
@@ -199,16 +196,6 @@ def _left(along: Floats, x: Floats, y: Floats) -> Floats:
     line = np.column_stack([np.ones_like(x), x])
     a, b = np.linalg.solve(along.T @ line, along.T @ y)
     return np.asarray(y - a - b * x)
-
-
-def _weighted_sd(g: Floats, left: Floats) -> float:
-    """The sd of sum g e, of noise e like `left`, whose neighbours may be correlated."""
-    count = len(left) - 3
-    alone = float(left @ left) / count * float(g @ g)
-    near = sum(
-        float(left[:-k] @ left[k:]) / count * float(g[:-k] @ g[k:]) for k in range(1, _NEIGHBOURS)
-    )
-    return float(np.sqrt(max(alone + 2 * near, 0.5 * alone)))
 
 
 def _smoothed(
@@ -283,7 +270,20 @@ def offset_by_correlation(
     weak correlation, an offset at the edge of the search, and too small a coverage.
     """
     for signal, name in ((reference, "reference"), (stream, "stream")):
-        _require_motion(signal, name)
+        if signal.y.shape[1] != 1:
+            raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
+        if len(np.unique(signal.t)) < MIN_MATCHED:
+            raise RecordingError(
+                f"{name}: {len(signal.t)} samples; at least {MIN_MATCHED} are needed"
+            )
+        y = signal.y[:, 0]
+        noise = noise_of(y)
+        spread = float(np.std(y))
+        if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
+            raise RecordingError(
+                f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of its "
+                f"noise ({noise:.3g}); it cannot be correlated, align by another stream"
+            )
     if not within > 0:
         raise RecordingError(f"offset within {within} s: expected a range above 0")
     step = min(step_of(reference.t), step_of(stream.t))
@@ -387,18 +387,3 @@ def moved(recording: Recording, seconds: float, topic: str | None = None) -> Rec
         for k, s in recording.streams.items()
     }
     return replace(recording, **by_kind(streams))
-
-
-def _require_motion(signal: Signal, name: str) -> None:
-    if signal.y.shape[1] != 1:
-        raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
-    if len(np.unique(signal.t)) < MIN_MATCHED:
-        raise RecordingError(f"{name}: {len(signal.t)} samples; at least {MIN_MATCHED} are needed")
-    y = signal.y[:, 0]
-    noise = noise_of(y)
-    spread = float(np.std(y))
-    if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
-        raise RecordingError(
-            f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of its noise "
-            f"({noise:.3g}); it cannot be correlated, align by another stream"
-        )

@@ -50,29 +50,21 @@ def _found(stream: object, rest: str) -> Signal | None:
         case Signal() if rest.isdecimal() and int(rest) < stream.y.shape[1]:
             return replace(stream, y=stream.y[:, [int(rest)]])
         case Markers():
-            return _coordinate(stream, rest)
+            marker, _, axis = rest.rpartition(".")
+            axes = _AXES[: stream.x.shape[2]]
+            if marker not in stream.names or len(axis) != 1 or axis not in axes:
+                return None
+            x = stream.x[:, stream.names.index(marker), axes.index(axis)]
+            # Missing ones leave before a signal of finite numbers is made.
+            seen = np.isfinite(x)
+            return Signal(stream.t[seen], x[seen, None], "m", stream.sd, stream.frame)
         case Frames() if rest in _OF_IMAGES:
-            return _of_images(stream, rest)
+            if rest == "brightness":
+                return _grey(stream.t, [image.mean() for image in stream.images])
+            pairs = zip(stream.images[:-1], stream.images[1:], strict=True)
+            away = [np.sqrt(((b.astype(float) - a) ** 2).mean()) for a, b in pairs]
+            return _grey((stream.t[1:] + stream.t[:-1]) / 2, away) if away else None
     return None
-
-
-def _coordinate(markers: Markers, rest: str) -> Signal | None:
-    marker, _, axis = rest.rpartition(".")
-    axes = _AXES[: markers.x.shape[2]]
-    if marker not in markers.names or len(axis) != 1 or axis not in axes:
-        return None
-    x = markers.x[:, markers.names.index(marker), axes.index(axis)]
-    # Missing ones leave before a signal of finite numbers is made.
-    seen = np.isfinite(x)
-    return Signal(markers.t[seen], x[seen, None], "m", markers.sd, markers.frame)
-
-
-def _of_images(frames: Frames, rest: str) -> Signal | None:
-    if rest == "brightness":
-        return _grey(frames.t, [image.mean() for image in frames.images])
-    pairs = zip(frames.images[:-1], frames.images[1:], strict=True)
-    away = [np.sqrt(((b.astype(float) - a) ** 2).mean()) for a, b in pairs]
-    return _grey((frames.t[1:] + frames.t[:-1]) / 2, away) if away else None
 
 
 def _grey(t: Floats, values: list[float]) -> Signal:
@@ -126,11 +118,6 @@ def event_time(signal: Signal, kind: Kind, window: Window | None = None) -> tupl
 
     Raises `RecordingError` for a flat signal, several steps, and an event at the edge.
     """
-    t, y = _windowed(signal, window)
-    return _onset(t, y, signal.unit) if kind == "onset" else _step(t, y, signal.unit)
-
-
-def _windowed(signal: Signal, window: Window | None) -> tuple[Floats, Floats]:
     if signal.y.shape[1] != 1:
         raise RecordingError(f"an event needs 1 column, the signal has {signal.y.shape[1]}")
     low, high = window or (signal.t[0], signal.t[-1])
@@ -139,7 +126,8 @@ def _windowed(signal: Signal, window: Window | None) -> tuple[Floats, Floats]:
         raise RecordingError(
             f"{int(inside.sum())} samples between {low:g} and {high:g} s; {_MIN_SAMPLES} are needed"
         )
-    return signal.t[inside], signal.y[inside, 0]
+    t, y = signal.t[inside], signal.y[inside, 0]
+    return _onset(t, y, signal.unit) if kind == "onset" else _step(t, y, signal.unit)
 
 
 def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
@@ -160,21 +148,10 @@ def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     flank = np.flatnonzero((level > 0.2) & (level < 0.8))
     if len(flank) < 3 or np.ptp(flank) + 1 != len(flank):
         return _between(t, level, i)
-    return _on_line(t[flank], level[flank] - 0.5, noise / abs(high - low))
-
-
-def _between(t: Floats, level: Floats, i: int) -> tuple[float, float]:
-    """Where a line from sample i to the next crosses; the step may be anywhere between them."""
-    gap = float(t[i + 1] - t[i])
-    part = (0.5 - level[i]) / (level[i + 1] - level[i])
-    return float(t[i] + part * gap), gap / float(np.sqrt(12))
-
-
-def _on_line(t: Floats, y: Floats, noise: float) -> tuple[float, float]:
-    """Zero of the line through y(t), sd from the larger of the noise and what a cubic leaves.
-
-    A flank is bent alike on both sides of its middle, which a line's own residuals would count.
-    """
+    # Zero of the line through y(t), sd from the larger of the noise and what a cubic leaves.
+    t = t[flank]
+    y = level[flank] - 0.5
+    noise = noise / abs(high - low)
     x = t - t.mean()
     slope, height = np.polyfit(x, y, 1)
     if len(t) >= _MIN_SAMPLES:
@@ -184,6 +161,13 @@ def _on_line(t: Floats, y: Floats, noise: float) -> tuple[float, float]:
     spread = float(x @ x)
     sd = noise / abs(slope) * float(np.sqrt(1 / len(t) + zero**2 / spread))
     return float(t.mean() + zero), sd
+
+
+def _between(t: Floats, level: Floats, i: int) -> tuple[float, float]:
+    """Where a line from sample i to the next crosses; the step may be anywhere between them."""
+    gap = float(t[i + 1] - t[i])
+    part = (0.5 - level[i]) / (level[i + 1] - level[i])
+    return float(t[i] + part * gap), gap / float(np.sqrt(12))
 
 
 def _onset(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
@@ -199,11 +183,10 @@ def _onset(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
             f"the event is at the edge: {first} samples before it, {len(y) - first} after; give a "
             "window with more rest before it"
         )
-    return _corner(t[:stop], y[:stop], float(t[first]))
-
-
-def _corner(t: Floats, y: Floats, start: float) -> tuple[float, float]:
-    """The corner with the least squares left, its sd from the slopes of all three unknowns."""
+    # The corner with the least squares left, its sd from the slopes of all three unknowns.
+    t = t[:stop]
+    y = y[:stop]
+    start = float(t[first])
     low, high = float(t[2]), min(float(t[-3]), start + 0.5 * float(t[-1] - start))
     tries = np.linspace(low, high, 4 * len(t))
     best = float(tries[np.argmin([_bent(t, y, x)[0] for x in tries])])

@@ -59,7 +59,26 @@ def no_stream(path: str, found: Arrays) -> str:
     if values.dtype.kind not in "fiu":
         return ""
     if values.ndim == 2 and values.shape[1] in (2, 3) and len(values) > 1:
-        return _indices(path, found)
+        # Whole numbers, each row an edge or a triangle by the rows of its corners in another
+        # array.
+        values = found[path]
+        if not np.isfinite(values).all() or (values != np.rint(values)).any():
+            return ""
+        low, high, kinds = int(values.min()), int(values.max()), len(np.unique(values))
+        what = (
+            f"a list of {('edges', 'triangles')[values.shape[1] - 2]} by the rows of another array"
+        )
+        told = f"{what} (whole numbers {low} to {high}), not points"
+        if values.dtype.kind in "iu":
+            return f"{told}; if they are coordinates, save them as double"
+        others = (a for n, a in found.items() if n != path and a.ndim == 2 and a.dtype.kind == "f")
+        listed = low >= 0 and high <= max(map(len, others), default=0)
+        name, twice = _leaf(path), (np.diff(np.sort(values, axis=1), axis=1) == 0).any()
+        if _LISTS.fullmatch(name) or (_LETTERS.fullmatch(name) and listed):
+            return told
+        all_occur = low in (0, 1) and kinds == high - low + 1
+        shared = values.size >= 2 * kinds and not twice
+        return told if shared and (all_occur or listed) else ""
     deep = values.dtype == np.uint8 and values.ndim == 3 and min(values.shape) > 1
     return _volume(path, found) if deep else ""
 
@@ -76,30 +95,6 @@ def field_at(path: str, found: Arrays) -> FieldColumns | None:
 
 def _leaf(path: str) -> str:
     return path.rpartition(".")[2]
-
-
-def _indices(path: str, found: Arrays) -> str:
-    """Whole numbers, each row an edge or a triangle by the rows of its corners in another array.
-
-    Doubles are such a list where they are called so, or where numbers occur twice on average, but
-    not in one row, and either all from 0 or 1 on do or another array has that many rows.
-    """
-    values = found[path]
-    if not np.isfinite(values).all() or (values != np.rint(values)).any():
-        return ""
-    low, high, kinds = int(values.min()), int(values.max()), len(np.unique(values))
-    what = f"a list of {('edges', 'triangles')[values.shape[1] - 2]} by the rows of another array"
-    told = f"{what} (whole numbers {low} to {high}), not points"
-    if values.dtype.kind in "iu":
-        return f"{told}; if they are coordinates, save them as double"
-    others = (a for n, a in found.items() if n != path and a.ndim == 2 and a.dtype.kind == "f")
-    listed = low >= 0 and high <= max(map(len, others), default=0)
-    name, twice = _leaf(path), (np.diff(np.sort(values, axis=1), axis=1) == 0).any()
-    if _LISTS.fullmatch(name) or (_LETTERS.fullmatch(name) and listed):
-        return told
-    all_occur = low in (0, 1) and kinds == high - low + 1
-    shared = values.size >= 2 * kinds and not twice
-    return told if shared and (all_occur or listed) else ""
 
 
 def _volume(path: str, found: Arrays) -> str:
@@ -191,7 +186,24 @@ def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) ->
     values = found[said.path].astype(np.float64)
     values = values.ravel() if values.size == max(values.shape, default=1) else values
     t = times_of(options, found)
-    order = _order(key, values.shape, None if t is None else len(t), options)
+    # Which axis is which: t times, c channels, p points, x coordinates; r, which they have
+    # with a residual, is told as x.
+    shape = values.shape
+    nt = None if t is None else len(t)
+    told = options.get(f"{AXES}{key}", "")
+    if told:
+        order = told.replace("r", "x")
+        plain = tuple(
+            3 if (c, n) == ("r", _RESIDUAL) else 0 if c == "r" else n
+            for c, n in zip(told, shape, strict=False)
+        )
+        if order not in _KNOWN or len(told) != len(shape) or not _fits(order, plain, nt):
+            raise UsageError(f"--map {AXES}{key}={told}: {_misfit(key, shape, nt)}")
+    else:
+        fitting = [order for order in _ORDERS.get(len(shape), ()) if _fits(order, shape, nt)]
+        if len(fitting) != 1:
+            raise UsageError(f"{key}: {_misfit(key, shape, nt)}")
+        order = fitting[0]
     factor, unit = si_of(said.unit)
     scaled = said.sign * factor * values
     frame = options.get("frame", "matlab")
@@ -220,25 +232,6 @@ def note_on(
     if point:
         notes.append(f"channels; if they are a point's coordinates: --map {AXES}{key}=tx")
     return "; ".join(notes)
-
-
-def _order(key: str, shape: tuple[int, ...], nt: int | None, options: Options) -> str:
-    """Which axis is which: t times, c channels, p points, x coordinates; r, which they
-    have with a residual, is told as x."""
-    told = options.get(f"{AXES}{key}", "")
-    if told:
-        order = told.replace("r", "x")
-        plain = tuple(
-            3 if (c, n) == ("r", _RESIDUAL) else 0 if c == "r" else n
-            for c, n in zip(told, shape, strict=False)
-        )
-        if order not in _KNOWN or len(told) != len(shape) or not _fits(order, plain, nt):
-            raise UsageError(f"--map {AXES}{key}={told}: {_misfit(key, shape, nt)}")
-        return order
-    fitting = [order for order in _ORDERS.get(len(shape), ()) if _fits(order, shape, nt)]
-    if len(fitting) != 1:
-        raise UsageError(f"{key}: {_misfit(key, shape, nt)}")
-    return fitting[0]
 
 
 def _fits(order: str, shape: tuple[int, ...], nt: int | None) -> bool:

@@ -54,7 +54,14 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """
     from scipy.io import loadmat
 
-    _require_sums(path)
+    # Every packed variable unpacks to the size that it states itself, and to its checksum.
+    parts = elements(path)
+    with open_file(path) as file:
+        order = _ORDERS[file.read(HEADER)[-2:]]
+        for kind, at, count in parts:
+            file.seek(at)
+            if kind == COMPRESSED and not _unpacks(file.read(count), order):
+                raise RecordingError(f"the variable at byte {at} fails its checksum; damaged")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the second reading loses what is imaginary
         # As stored (whole doubles in one byte each), and of the class that they had.
@@ -93,17 +100,6 @@ def _word(value: Any, dtype: np.dtype[Any]) -> str:
     )
 
 
-def _require_sums(path: Path) -> None:
-    """Every packed variable unpacks to the size that it states itself, and to its checksum."""
-    parts = elements(path)
-    with open_file(path) as file:
-        order = _ORDERS[file.read(HEADER)[-2:]]
-        for kind, at, count in parts:
-            file.seek(at)
-            if kind == COMPRESSED and not _unpacks(file.read(count), order):
-                raise RecordingError(f"the variable at byte {at} fails its checksum; damaged")
-
-
 def _unpacks(packed: bytes, order: str) -> bool:
     """Whether the packed bytes end where their own size and checksum (Adler-32) hold.
 
@@ -119,19 +115,18 @@ def _unpacks(packed: bytes, order: str) -> bool:
         if not some and len(unpack.unconsumed_tail) == len(packed):
             return False  # nothing more comes
         if not size:
-            stated = _stated(some, order)
+            # Bytes that a variable states, its tag of 8 among them.
+            if len(some) < 8:
+                stated = 8
+            else:
+                count = 8 + int(struct.unpack(f"{order}II", some)[1])
+                if count > MOST:
+                    raise RecordingError(
+                        f"a variable of {count} bytes unpacked, the limit is {MOST}"
+                    )
+                stated = count
         size += len(some)
         if size > stated + 8:  # with what fills its last eight
             return False
         packed = unpack.unconsumed_tail
     return not unpack.unused_data
-
-
-def _stated(tag: bytes, order: str) -> int:
-    """Bytes that a variable states, its tag of 8 among them."""
-    if len(tag) < 8:
-        return 8
-    count = 8 + int(struct.unpack(f"{order}II", tag)[1])
-    if count > MOST:
-        raise RecordingError(f"a variable of {count} bytes unpacked, the limit is {MOST}")
-    return count

@@ -143,7 +143,18 @@ def read_bag(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path.name}: not a ROS bag")
     if path.is_dir() and (one := _only_mcap(path)):
         return read_all(one, options)
-    _require_all(path)
+    # All files of a folder; of a single file, that it can be read without its metadata.
+    names, packed = _told(path if path.is_dir() else path.parent)
+    if path.is_dir():
+        if missing := [name for name in names if not (path / name).is_file()]:
+            raise RecordingError(
+                f"{path.name}: its {_YAML} names {len(names)} files, but {missing[0]} is missing; "
+                f"copy it too, or import the others one by one"
+            )
+    elif packed and path.name in names:
+        raise RecordingError(
+            f"{path.name}: each message is compressed, see {_YAML}; import the folder"
+        )
     for file in map(member, members(path)) if path.is_dir() else (path,):
         open_file(file, ANY_SIZE).close()
         if file.suffix != ".mcap":
@@ -171,21 +182,6 @@ def _only_mcap(folder: Path) -> Path | None:
     names, packed = _told(folder)
     there = [member(f) for f in members(folder) if f.suffix == ".mcap"]
     return there[0] if len(there) == 1 and len(names) < 2 and not packed else None
-
-
-def _require_all(path: Path) -> None:
-    """All files of a folder; of a single file, that it can be read without its metadata."""
-    names, packed = _told(path if path.is_dir() else path.parent)
-    if path.is_dir():
-        if missing := [name for name in names if not (path / name).is_file()]:
-            raise RecordingError(
-                f"{path.name}: its {_YAML} names {len(names)} files, but {missing[0]} is missing; "
-                f"copy it too, or import the others one by one"
-            )
-    elif packed and path.name in names:
-        raise RecordingError(
-            f"{path.name}: each message is compressed, see {_YAML}; import the folder"
-        )
 
 
 def _require_whole(path: Path) -> None:

@@ -99,7 +99,16 @@ def _three(what: str, values: Any) -> Sequence[float]:
 
 def read_markups(path: Path, options: Options) -> Recording:
     """Control points of all lists of the file as landmarks (1, k, 3) m; as `read_fcsv`."""
-    lists = _lists(path)
+    data = whole_file(path)
+    try:
+        if len(data) > _LARGEST:
+            raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
+        found = json_value(data)["markups"]
+        if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
+            raise ValueError("its 'markups' is not a list of lists")
+    except (ValueError, TypeError, KeyError) as error:
+        raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
+    lists = found
     systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
     units = {unit for m in lists for unit in _units(m)}
     if len(systems) > 1 or len(units) > 1:
@@ -118,19 +127,6 @@ def _units(markups: Mapping[str, Any]) -> list[str]:
     """The unit of a list, which may state one for each axis."""
     stated = markups.get("coordinateUnits", "mm")
     return [str(unit) for unit in stated] if isinstance(stated, list) and stated else [str(stated)]
-
-
-def _lists(path: Path) -> list[Mapping[str, Any]]:
-    data = whole_file(path)
-    try:
-        if len(data) > _LARGEST:
-            raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
-        found = json_value(data)["markups"]
-        if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
-            raise ValueError("its 'markups' is not a list of lists")
-    except (ValueError, TypeError, KeyError) as error:
-        raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
-    return found
 
 
 def _control(path: Path, point: Any) -> _Point:

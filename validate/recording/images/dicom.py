@@ -135,7 +135,13 @@ def _regions(
     planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
               and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
     if not planes:
-        x, y = _spacing(path, found["spacing"])
+        spacing = found["spacing"]
+        if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
+            raise UsageError(
+                f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
+                f"m_per_px=0.1mm"
+            )
+        x, y = 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
         return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm per pixel (PixelSpacing)"
     boxes = [
         (_box(path, r, width, height), (float(r[4]), float(r[5])))
@@ -143,15 +149,6 @@ def _regions(
     ]
     sides = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in boxes)
     return boxes, f"{sides} mm per pixel (SequenceOfUltrasoundRegions)"
-
-
-def _spacing(path: Path, spacing: Floats) -> tuple[float, float]:
-    if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
-        raise UsageError(
-            f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
-            f"m_per_px=0.1mm"
-        )
-    return 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
 
 
 def _box(path: Path, region: Floats, width: int, height: int) -> _Box:

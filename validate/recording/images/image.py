@@ -56,13 +56,47 @@ def decode_png(data: bytes) -> Pixels:
     """
     import cv2
 
-    header, packed = _checked(data)
-    _require_unpacked(packed, header.height * (1 + header.width * header.channels))
-    plain = np.frombuffer(_bare(data, packed), dtype=np.uint8)
-    image = cv2.imdecode(plain, cv2.IMREAD_UNCHANGED)
-    if image is None or image.shape[:2] != (header.height, header.width):
+    # Header and packed pixels of a PNG whose chunks are whole.
+    if not data.startswith(_SIGNATURE):
+        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
+    header, parts, ended = None, list[bytes](), False
+    for kind, content in _chunks(data):
+        if header is None:
+            header = _header(kind, content)
+        elif kind == b"IDAT":
+            parts.append(content)
+        ended = kind == b"IEND"
+    if header is None or not ended:
+        raise RecordingError(f"damaged PNG: {len(data)} bytes without an end")
+    packed = b"".join(parts)
+    size = header.height * (1 + header.width * header.channels)
+    unpacker = zlib.decompressobj()
+    try:
+        got = len(unpacker.decompress(packed, size + 1))
+    except zlib.error as error:
+        raise RecordingError(f"damaged PNG: its pixels cannot be unpacked ({error})") from None
+    if got != size or not unpacker.eof:
+        raise RecordingError(f"damaged PNG: {got} bytes of pixels, its header needs {size}")
+    # The same picture without text, profiles and other chunks.
+    start = len(_SIGNATURE) + 25
+    plain = np.frombuffer(
+        data[:start] + _chunk(b"IDAT", packed) + _chunk(b"IEND", b""), dtype=np.uint8
+    )
+    decoded = cv2.imdecode(plain, cv2.IMREAD_UNCHANGED)
+    if decoded is None or decoded.shape[:2] != (header.height, header.width):
         raise RecordingError("damaged PNG: its pixels cannot be decoded")
-    grey: Pixels = _grey(np.asarray(image, dtype=np.uint8))
+    image = np.asarray(decoded, dtype=np.uint8)
+    if image.ndim == 2:
+        grey: Pixels = image
+    else:
+        coloured = int((image[..., 1:3] != image[..., :1]).any(axis=-1).sum())
+        clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
+        if coloured or clear:
+            raise RecordingError(
+                f"{coloured} coloured and {clear} transparent pixels; remove the overlay and save "
+                f"it as grey"
+            )
+        grey = np.ascontiguousarray(image[..., 0])
     grey.setflags(write=False)
     return grey
 
@@ -75,22 +109,6 @@ def png_size(data: bytes) -> tuple[int, int]:
     kind, content = next(_chunks(data), (b"", b""))
     header = _header(kind, content)
     return header.width, header.height
-
-
-def _checked(data: bytes) -> tuple[_Header, bytes]:
-    """Header and packed pixels of a PNG whose chunks are whole."""
-    if not data.startswith(_SIGNATURE):
-        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
-    header, packed, ended = None, [], False
-    for kind, content in _chunks(data):
-        if header is None:
-            header = _header(kind, content)
-        elif kind == b"IDAT":
-            packed.append(content)
-        ended = kind == b"IEND"
-    if header is None or not ended:
-        raise RecordingError(f"damaged PNG: {len(data)} bytes without an end")
-    return header, b"".join(packed)
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -127,38 +145,9 @@ def _require_size(width: int, height: int) -> None:
         raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side")
 
 
-def _require_unpacked(packed: bytes, size: int) -> None:
-    unpacker = zlib.decompressobj()
-    try:
-        got = len(unpacker.decompress(packed, size + 1))
-    except zlib.error as error:
-        raise RecordingError(f"damaged PNG: its pixels cannot be unpacked ({error})") from None
-    if got != size or not unpacker.eof:
-        raise RecordingError(f"damaged PNG: {got} bytes of pixels, its header needs {size}")
-
-
-def _bare(data: bytes, packed: bytes) -> bytes:
-    """The same picture without text, profiles and other chunks."""
-    start = len(_SIGNATURE) + 25
-    return data[:start] + _chunk(b"IDAT", packed) + _chunk(b"IEND", b"")
-
-
 def _chunk(kind: bytes, content: bytes) -> bytes:
     crc = zlib.crc32(kind + content).to_bytes(4, "big")
     return len(content).to_bytes(4, "big") + kind + content + crc
-
-
-def _grey(image: Pixels) -> Pixels:
-    if image.ndim == 2:
-        return image
-    coloured = int((image[..., 1:3] != image[..., :1]).any(axis=-1).sum())
-    clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
-    if coloured or clear:
-        raise RecordingError(
-            f"{coloured} coloured and {clear} transparent pixels; remove the overlay and save it "
-            f"as grey"
-        )
-    return np.ascontiguousarray(image[..., 0])
 
 
 def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
@@ -297,14 +286,11 @@ def coverage(outline: Floats, shape: tuple[int, int], lines: int = 4) -> Floats:
     high = min(int(np.ceil(outline[:, 1].max() + 0.5)), height)
     for row in range(low, high):
         for offset in (np.arange(lines) + 0.5) / lines - 0.5:
-            crossings = _crossings(start, end, row + offset)
+            # Sorted x (2 m,) where the edges start -> end cross the line at y.
+            y = row + offset
+            cut = (start[:, 1] > y) != (end[:, 1] > y)
+            a, b = start[cut], end[cut]
+            crossings = np.sort(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
             for left, right in crossings.reshape(-1, 2):
                 covered[row] += np.clip(right - pixels, 0, 1) - np.clip(left - pixels, 0, 1)
     return covered / lines
-
-
-def _crossings(start: Floats, end: Floats, y: float) -> Floats:
-    """Sorted x (2 m,) where the edges start -> end cross the line at y."""
-    cut = (start[:, 1] > y) != (end[:, 1] > y)
-    a, b = start[cut], end[cut]
-    return np.sort(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))

@@ -129,7 +129,20 @@ def _stated(file: Path) -> dict[str, NDArray[Any]]:
         tags: Any = getattr(opened, "tag_v2", {})
         text = str(tags.get(_DESCRIPTION, ""))
         if pixels := _OME.search(text):
-            return _stated_by_ome(dict(_ATTRIBUTE.findall(pixels[0])), opened)
+            # Scale and interval of OME-XML's Pixels, whose units are um and s where it says none.
+            said = dict(_ATTRIBUTE.findall(pixels[0]))
+            pages = getattr(opened, "n_frames", 1)
+            times, channels, planes = (int(_amount(said.get(f"Size{c}", "1"))) for c in "TCZ")
+            _require_times(pages, times, channels, planes, "OME")
+            found: dict[str, NDArray[Any]] = {"by": np.array("OME")}
+            sides = [_amount(said.get(f"PhysicalSize{c}", "")) for c in "XY"]
+            units = {_plain(said.get(f"PhysicalSize{c}Unit", "um")) for c in "XY"}
+            if min(sides) > 0 and len(units) == 1:
+                found |= {"side": np.array(sides), "unit": np.array(units.pop())}
+            factor = _DECODE_SECONDS.get(said.get("TimeIncrementUnit", "s"))
+            if factor and "TimeIncrement" in said:
+                found["interval"] = np.array(factor * _amount(said["TimeIncrement"]))
+            return found
         if not text.startswith("ImageJ"):
             dots = opened.info.get("dpi")
             return {"dots": np.array(dots, dtype=np.float64)} if dots else {}
@@ -138,30 +151,11 @@ def _stated(file: Path) -> dict[str, NDArray[Any]]:
         if "finterval" not in lines and "fps" not in lines:
             times, planes = (int(_amount(lines.get(key, "1"))) for key in ("frames", "slices"))
             _require_times(getattr(opened, "n_frames", 1), times, 1, planes, "ImageJ")
-    found: dict[str, NDArray[Any]] = {"by": np.array("ImageJ")}
+    found = {"by": np.array("ImageJ")}
     if len(sides) == 2 and lines.get("unit", "pixel") not in ("pixel", "inch"):
         found |= {"side": np.array(sides), "unit": np.array(lines["unit"].replace("\\u00B5", "u"))}
     if "finterval" in lines:
         found["interval"] = np.array(float(lines["finterval"]))
-    return found
-
-
-def _stated_by_ome(said: dict[str, str], opened: Any) -> dict[str, NDArray[Any]]:
-    """Scale and interval of OME-XML's Pixels, whose units are um and s where it says none.
-
-    Raises `RecordingError` where an instant has several pages: channels or planes are no times.
-    """
-    pages = getattr(opened, "n_frames", 1)
-    times, channels, planes = (int(_amount(said.get(f"Size{c}", "1"))) for c in "TCZ")
-    _require_times(pages, times, channels, planes, "OME")
-    found = {"by": np.array("OME")}
-    sides = [_amount(said.get(f"PhysicalSize{c}", "")) for c in "XY"]
-    units = {_plain(said.get(f"PhysicalSize{c}Unit", "um")) for c in "XY"}
-    if min(sides) > 0 and len(units) == 1:
-        found |= {"side": np.array(sides), "unit": np.array(units.pop())}
-    factor = _DECODE_SECONDS.get(said.get("TimeIncrementUnit", "s"))
-    if factor and "TimeIncrement" in said:
-        found["interval"] = np.array(factor * _amount(said["TimeIncrement"]))
     return found
 
 

@@ -33,7 +33,9 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     a lens."""
     import cv2
 
-    text = _text(path)
+    text = read_text(path, _MOST)
+    plain = text.lstrip()
+    text = text if plain.startswith(("%YAML", "<", "{")) else f"%YAML:1.0\n---\n{plain}"
     file = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     model = file.getNode("distortion_model")
     if model.isString() and model.string() not in _MODELS:
@@ -46,12 +48,6 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         "size": np.array([_number(file, _WIDTH), _number(file, _HEIGHT)]),
         "error": np.array(_number(file, _ERROR)),
     }
-
-
-def _text(path: Path) -> str:
-    text = read_text(path, _MOST)
-    plain = text.lstrip()
-    return text if plain.startswith(("%YAML", "<", "{")) else f"%YAML:1.0\n---\n{plain}"
 
 
 def _matrix(file: Any, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -99,9 +99,20 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder of PNG images")
-    side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
+    # Side of a pixel, m.
+    text = options["m_per_px"]
+    number, unit = split(text) or (0.0, "")
+    side = in_si(number, unit or "m", "m")
+    if side is None or side <= 0:
+        raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
+    rate = above_zero(options, "rate")
     images, lens = straightened(_images(folder), options)
-    _require_meant(options["m_per_px"], side, images[0])
+    # A bare number beyond reason is asked back; one with its unit is meant.
+    text = options["m_per_px"]
+    height, width = images[0].shape
+    bare = (split(text) or (0.0, ""))[1] == ""
+    if bare and (odd := odd_pixel((side, side), (height, width))):
+        raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
@@ -147,23 +158,6 @@ def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
     if len(set(sizes)) == 1:
         return {topic: np.arange(len(images))}
     return {f"{topic}_{s}": np.flatnonzero(np.array(sizes) == s) for s in dict.fromkeys(sizes)}
-
-
-def _pixel(text: str) -> float:
-    """Side of a pixel, m."""
-    number, unit = split(text) or (0.0, "")
-    side = in_si(number, unit or "m", "m")
-    if side is None or side <= 0:
-        raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
-    return side
-
-
-def _require_meant(text: str, side: float, image: Pixels) -> None:
-    """A bare number beyond reason is asked back; one with its unit is meant."""
-    height, width = image.shape
-    bare = (split(text) or (0.0, ""))[1] == ""
-    if bare and (odd := odd_pixel((side, side), (height, width))):
-        raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
 
 
 def _images(folder: Path) -> tuple[Pixels, ...]:

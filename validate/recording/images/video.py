@@ -51,7 +51,13 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
 
     declared = (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
     video = _opened(path)
-    _require_square(video.get(cv2.CAP_PROP_SAR_NUM), video.get(cv2.CAP_PROP_SAR_DEN))
+    wide = video.get(cv2.CAP_PROP_SAR_NUM)
+    high = video.get(cv2.CAP_PROP_SAR_DEN)
+    if wide > 0 and high > 0 and wide != high:
+        raise RecordingError(
+            f"its pixels are {wide:g}:{high:g}, not square; convert them first, as with `ffmpeg "
+            f"-i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
+        )
     count, width, height = (video.get(key) for key in declared)
     _require_few(count, width, height, every)
     images, t, made, colour = [], [], 0, False
@@ -104,14 +110,6 @@ def _require_few(count: float, width: float, height: float, every: float) -> Non
         )
 
 
-def _require_square(wide: float, high: float) -> None:
-    if wide > 0 and high > 0 and wide != high:
-        raise RecordingError(
-            f"its pixels are {wide:g}:{high:g}, not square; convert them first, as with `ffmpeg "
-            f"-i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
-        )
-
-
 _GREY = 24  # levels between channels that a codec makes of grey
 
 
@@ -135,7 +133,10 @@ def read_video(path: Path, options: Options) -> Recording:
     _require_whole(path)
     if "m_per_px" not in options:
         raise UsageError(f"{path.name}: a video has no scale; give it, as --m-per-px 0.1mm")
-    side, every = length(options, "m_per_px", "0.1mm"), _every(options)
+    every = above_zero({"every": "1", **options}, "every")
+    if every != int(every):
+        raise UsageError(f"--map every={options['every']}: expected a whole number")
+    side, every = length(options, "m_per_px", "0.1mm"), int(every)
     found = decoded("validate.recording.images.video", path, {"every": every}, _SECONDS)
     declared, count = int(found["declared"]), int(found["decoded"])
     if count < declared and not _matroska(path):  # which declares a duration, no count
@@ -156,13 +157,6 @@ def read_video(path: Path, options: Options) -> Recording:
     }
     source = source_of(path, "a video keeps no checksum: integrity not provable")
     return recorded(path.stem, source, streams, said)
-
-
-def _every(options: Options) -> int:
-    every = above_zero({"every": "1", **options}, "every")
-    if every != int(every):
-        raise UsageError(f"--map every={options['every']}: expected a whole number")
-    return int(every)
 
 
 def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> tuple[Floats, str]:
@@ -189,13 +183,13 @@ def _require_whole(path: Path) -> None:
     if _matroska(path):
         at = _segment_end(path, size)
     else:
-        at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
+        at = (
+            (8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8)
+            if first.startswith(b"RIFF")
+            else _last_box(path, size)
+        )
     if at > size:
         raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
-
-
-def _riff_end(first: bytes) -> int:
-    return 8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8
 
 
 def _matroska(path: Path) -> bool:

@@ -39,7 +39,9 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
         if channel.encoding == "json":
             return _guarded(_json)
         if channel.encoding == "cbor":
-            return _cbor()
+            import cbor2
+
+            return _guarded(cbor2.loads)
     except ImportError as missing:
         return f"the library '{missing.name}' that reads it is not installed; {install_command()}"
     except Exception as error:  # a schema that its own library cannot parse
@@ -117,12 +119,6 @@ def _plain_protobuf(message: Any) -> Any:
 
 def _json(data: bytes) -> Any:
     return json_value(data.decode("utf-8"))
-
-
-def _cbor() -> Decoder:
-    import cbor2
-
-    return _guarded(cbor2.loads)
 
 
 def binary(value: Any) -> bytes:

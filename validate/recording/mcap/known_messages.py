@@ -106,7 +106,15 @@ def decode_picture(data: bytes) -> NDArray[Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # of bombs and of broken tags
             with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
-                _require_small(opened)
+                width, height = opened.size
+                if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+                    raise RecordingError(
+                        f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side"
+                    )
+                if opened.mode in ("I", "F"):
+                    raise RecordingError(
+                        f"an image of mode {opened.mode}: over 16 bits; save 16-bit grey"
+                    )
                 if opened.mode.startswith(_DEEP):
                     return np.asarray(opened).astype(np.uint16)
                 return np.asarray(opened.convert("L"), dtype=np.uint8).copy()
@@ -118,14 +126,6 @@ def decode_picture(data: bytes) -> NDArray[Any]:
         raise
     except _DAMAGE as error:
         raise RecordingError(f"damaged image ({' '.join(str(error).split())[:120]})") from None
-
-
-def _require_small(picture: Image.Image) -> None:
-    width, height = picture.size
-    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side")
-    if picture.mode in ("I", "F"):
-        raise RecordingError(f"an image of mode {picture.mode}: over 16 bits; save 16-bit grey")
 
 
 NOT_STATED = "not stated"
@@ -160,7 +160,15 @@ def parts_of(schema: str) -> Parts | None:
 def stamp_ns(stamp: Any) -> int:
     """Of {sec, nsec} or {sec, nanosec}, or of text as JSON of Protobuf has it (UTC)."""
     if isinstance(stamp, str):
-        return _moment_ns(stamp)
+        # Of 2023-11-14T22:13:20.5Z; raises `RecordingError` for other text.
+        whole, _, fraction = stamp.removesuffix("Z").partition(".")
+        try:
+            at = datetime.fromisoformat(whole).replace(tzinfo=UTC)
+            return int(at.timestamp()) * 10**9 + int(fraction.ljust(9, "0")[:9])
+        except ValueError:
+            raise RecordingError(
+                f"'{stamp[:40]}' is not a time, as 2023-11-14T22:13:20.5Z"
+            ) from None
     if not isinstance(stamp, Mapping):
         raise RecordingError(f"{type(stamp).__name__} is not a time")
     sec, nsec = stamp["sec"], stamp.get("nanosec", stamp.get("nsec"))
@@ -168,16 +176,6 @@ def stamp_ns(stamp: Any) -> int:
         return int(sec) * 10**9 + int(nsec)
     except OverflowError:
         raise RecordingError(f"{sec} s is not a time") from None
-
-
-def _moment_ns(text: str) -> int:
-    """Of 2023-11-14T22:13:20.5Z; raises `RecordingError` for other text."""
-    whole, _, fraction = text.removesuffix("Z").partition(".")
-    try:
-        at = datetime.fromisoformat(whole).replace(tzinfo=UTC)
-        return int(at.timestamp()) * 10**9 + int(fraction.ljust(9, "0")[:9])
-    except ValueError:
-        raise RecordingError(f"'{text[:40]}' is not a time, as 2023-11-14T22:13:20.5Z") from None
 
 
 def _header(message: Plain) -> tuple[int, str]:

@@ -33,7 +33,7 @@ from validate.recording.reader import (
     metres,
 )
 from validate.recording.scales import in_unit
-from validate.recording.types import Clock, Recording, by_kind, clock_of
+from validate.recording.types import Recording, by_kind, clock_of
 
 
 def read_recording(path: Path) -> Recording:
@@ -46,34 +46,30 @@ def read_recording(path: Path) -> Recording:
     with opened(path) as stream:
         verified = verify(stream, path)
         try:
-            collected = _topics(verified)
+            # The channels of ours, one a topic; a wrong count of messages is refused.
+            collected = ours(verified)
+            if not collected:
+                schemas = sorted({s.name for s in verified.schemas.values()})
+                raise RecordingError(
+                    "no topic with markers, signals or contours, nor calibrated images; "
+                    f"schemas found: {schemas}; see `validate inspect`"
+                )
+            topics = Counter(c.channel.topic for c in collected.values())
+            twice = sorted(topic for topic, n in topics.items() if n > 1)
+            if twice:
+                raise RecordingError(
+                    f"topics on two channels: {twice}; the order of their samples is not known"
+                )
+            if verified.claimed_messages not in (None, verified.messages):
+                raise RecordingError(
+                    f"its statistics claim {verified.claimed_messages} messages, it has "
+                    f"{verified.messages}; see `validate inspect`"
+                )
+
             fill(collected, messages_of(stream, verified, collected.keys()))
             return _recording(path, verified, list(collected.values()))
         except RecordingError as error:
             raise RecordingError(f"{path.name}: {error}") from None
-
-
-def _topics(verified: Verified) -> dict[int, Collected]:
-    """The channels of ours, one a topic; a wrong count of messages is refused."""
-    collected = ours(verified)
-    if not collected:
-        schemas = sorted({s.name for s in verified.schemas.values()})
-        raise RecordingError(
-            "no topic with markers, signals or contours, nor calibrated images; "
-            f"schemas found: {schemas}; see `validate inspect`"
-        )
-    topics = Counter(c.channel.topic for c in collected.values())
-    twice = sorted(topic for topic, n in topics.items() if n > 1)
-    if twice:
-        raise RecordingError(
-            f"topics on two channels: {twice}; the order of their samples is not known"
-        )
-    if verified.claimed_messages not in (None, verified.messages):
-        raise RecordingError(
-            f"its statistics claim {verified.claimed_messages} messages, it has "
-            f"{verified.messages}; see `validate inspect`"
-        )
-    return collected
 
 
 def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Recording:
@@ -81,15 +77,14 @@ def _recording(path: Path, verified: Verified, collected: list[Collected]) -> Re
     name = name_of(records, path)
     t0 = min(int(raw.checked().times_ns.min()) for raw in collected)
     streams = {raw.channel.topic: stream_of(raw, t0, records) for raw in collected}
-    clock = {raw.channel.topic: _clock(raw) for raw in collected}
+    clock = {
+        raw.channel.topic: clock_of(raw.channel.topic, raw.stamps_ns, raw.publish_ns, raw.log_ns)
+        for raw in collected
+    }
     unread = not_ours(verified)
     found = Recording(name, verified.source, t0, **by_kind(streams), clock=clock, unread=unread)
     own = own_records(found)
     return replace(found, metadata={n: r for n, r in records.items() if n not in own})
-
-
-def _clock(raw: Collected) -> Clock:
-    return clock_of(raw.channel.topic, raw.stamps_ns, raw.publish_ns, raw.log_ns)
 
 
 def read_all(path: Path, options: Options) -> Recording:

@@ -202,7 +202,10 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
     names: tuple[str, ...] = ()
     unit = ""
     if schema == MARKERS:
-        names, values = _names(message), _points(message)
+        names = _field(message, "names")
+        if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+            raise RecordingError("field 'names' is not a list of texts")
+        names, values = tuple(names), _points(message)
         if len(names) != len(values):
             raise RecordingError(f"{len(names)} names for {len(values)} points")
     elif schema == SIGNAL:
@@ -262,13 +265,6 @@ def _text(message: Json, name: str) -> str:
     if not isinstance(value, str):
         raise RecordingError(f"field '{name}' is {type(value).__name__}, expected text")
     return value
-
-
-def _names(message: Json) -> tuple[str, ...]:
-    names = _field(message, "names")
-    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
-        raise RecordingError("field 'names' is not a list of texts")
-    return tuple(names)
 
 
 def _stamp_ns(message: Json, name: str) -> int | None:

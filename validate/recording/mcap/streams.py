@@ -122,21 +122,17 @@ def parser_of(channel: Channel, schema: Schema) -> tuple[Parse, str]:
         found = decoder_of(schema, channel)
         if isinstance(found, str):
             return parse_json, f"{channel.topic!r}: {found}"
-        return _null_of_none(found), ""
+
+        # A list of no z is what JSON writes as null: points in a plane.
+        def parsed(data: bytes) -> dict[str, Any]:
+            message = found(data)
+            return {**message, "z": message.get("z") or None}
+
+        return parsed, ""
     return parse_json, (
         f"{channel.topic!r}: {schema.name} in '{encodings}', expected '{JSON_SCHEMA}/json' or "
         f"'{PROTOBUF}/protobuf'"
     )
-
-
-def _null_of_none(parse: Parse) -> Parse:
-    """A list of no z is what JSON writes as null: points in a plane."""
-
-    def parsed(data: bytes) -> dict[str, Any]:
-        message = parse(data)
-        return {**message, "z": message.get("z") or None}
-
-    return parsed
 
 
 def not_ours(verified: Verified) -> dict[str, str]:

@@ -99,13 +99,7 @@ def _parts(
             f"messages of unknown meaning ({name}); import a number with "
             f"--map {channel.topic}.FIELD=UNIT"
         )
-    return _both(decode, known)
-
-
-def _both(
-    decode: Callable[[bytes], Plain], parts: Callable[[Plain], Iterable[MessagePart]]
-) -> Callable[[bytes], Iterable[MessagePart]]:
-    return lambda data: parts(decode(data))
+    return lambda data: known(decode(data))
 
 
 def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[MessagePart]]:

@@ -136,7 +136,17 @@ def _write(
     writer.start(profile="", library=LIBRARY)
     for record, values in metadata.items():
         writer.add_metadata(record, dict(values))
-    numbers = _register(writer, channels)
+    # Channel numbers by topic; a schema shared by topics is written once.
+    numbered = {
+        schema.name: writer.register_schema(schema.name, schema.encoding, schema.data)
+        for schema in {c.schema.name: c.schema for c in channels}.values()
+    }
+    numbers = {
+        c.topic: writer.register_channel(
+            c.topic, ENCODINGS[c.schema.encoding], numbered[c.schema.name], dict(c.metadata)
+        )
+        for c in channels
+    }
     counts, before = dict.fromkeys(numbers, 0), 0
     for message in messages:
         topic, ns = message.topic, message.ns
@@ -152,20 +162,6 @@ def _write(
         )
         counts[topic], before = counts[topic] + 1, ns
     writer.finish()  # type: ignore[no-untyped-call]
-
-
-def _register(writer: Writer, channels: Sequence[WrittenChannel]) -> dict[str, int]:
-    """Channel numbers by topic; a schema shared by topics is written once."""
-    schemas = {
-        schema.name: writer.register_schema(schema.name, schema.encoding, schema.data)
-        for schema in {c.schema.name: c.schema for c in channels}.values()
-    }
-    return {
-        c.topic: writer.register_channel(
-            c.topic, ENCODINGS[c.schema.encoding], schemas[c.schema.name], dict(c.metadata)
-        )
-        for c in channels
-    }
 
 
 _SCHEMA_OF = {Markers: MARKERS, Signal: SIGNAL, Contours: CONTOUR, Frames: IMAGE}

@@ -196,12 +196,10 @@ def _require_whole(path: Path) -> None:
             f"{lies.points} points and {lies.analog} analog numbers: {lies.needs} bytes; "
             f"truncated or damaged"
         )
-    _require_parameters(path, head(path, lies.at(0)), BLOCK * max(first[0] - 1, 1))
-
-
-def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
-    """No parameter declares more values than the file has bytes left: ezc3d takes memory for them
-    before it reads, for seconds."""
+    # No parameter declares more values than the file has bytes left: ezc3d takes memory for
+    # them before it reads, for seconds.
+    raw = head(path, lies.at(0))
+    begin = BLOCK * max(first[0] - 1, 1)
     size = path.stat().st_size
     for group, name, at in records(raw, begin):
         dimensions = raw[at + 4 : at + 4 + raw[at + 3]] if group > 0 else b""

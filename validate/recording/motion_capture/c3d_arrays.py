@@ -49,19 +49,15 @@ class Layout:
 
 def layout(path: Path, first: bytes) -> Layout:
     """By the first block. The last frame of a trial that begins late is counted modulo 65536."""
-    processor = _processor(path, first)
+    # Whose numbers the whole file is in, as its parameters state: 84 Intel, 85 DEC, 86 SGI.
+    begin = BLOCK * (max(first[0], 2) - 1)
+    processor = (head(path, begin + 4)[begin + 3 :] or b"\0")[0]
     order = ">" if processor == BIG else "<"
     points, analog, begin, end = struct.unpack(f"{order}4H", first[2:10])
     (start,) = struct.unpack(f"{order}H", first[16:18])
     size = (4 if _negative(processor, first) else 2) * (4 * points + analog)
     frames = end - begin + 1 + (MOST + 1 if end < begin else 0)
     return Layout(processor, points, analog, frames, start, size)
-
-
-def _processor(path: Path, first: bytes) -> int:
-    """Whose numbers the whole file is in, as its parameters state: 84 Intel, 85 DEC, 86 SGI."""
-    begin = BLOCK * (max(first[0], 2) - 1)
-    return (head(path, begin + 4)[begin + 3 :] or b"\0")[0]
 
 
 def _negative(processor: int, first: bytes) -> bool:
@@ -163,39 +159,44 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises `RecordingError` for a file without all frames that its parameters tell of.
     """
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
-        return _held(turned(path, Path(folder) / "turned.c3d"), Path(folder) / "part.c3d")
+        # Of a file in an order that the library reads; a long trial is read by parts.
+        path = turned(path, Path(folder) / "turned.c3d")
+        import ezc3d
 
-
-def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
-    """Of a file in an order that the library reads; a long trial is read by parts."""
-    import ezc3d
-
-    found = ezc3d.c3d(str(path))
-    parameters = found["parameters"]
-    lies = layout(path, head(path, BLOCK))
-    frames = _count(parameters) if lies.frames == MOST else 0
-    size = path.stat().st_size
-    if size < lies.at(frames):
-        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
-    rest = parts_beyond(path, frames, part)
-    held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
-    header = found["header"]
-    rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
-             _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
-    return {
-        **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
-        "rates": np.array(rates),
-        "labels": _words(parameters, "POINT", "LABELS"),
-        "unit": _words(parameters, "POINT", "UNITS")[:1],
-        "channels": _words(parameters, "ANALOG", "LABELS"),
-        "channel_units": _words(parameters, "ANALOG", "UNITS"),
-        "bodies": _words(parameters, "ROTATION", "LABELS"),
-        "outputs": _outputs(parameters),
-        "first_frame": np.array(header["points"]["first_frame"] + 1),
-        "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
-        "events": _event_names(parameters),
-        "event_times": _event_times(parameters),
-    }
+        found = ezc3d.c3d(str(path))
+        parameters = found["parameters"]
+        lies = layout(path, head(path, BLOCK))
+        frames = _count(parameters) if lies.frames == MOST else 0
+        size = path.stat().st_size
+        if size < lies.at(frames):
+            raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
+        rest = parts_beyond(path, frames, (Path(folder) / "part.c3d"))
+        held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
+        header = found["header"]
+        rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
+                 _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
+        # Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise.
+        group = parameters.get("EVENT", {})
+        times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
+        # Labels and units of computed outputs, which lie among the points.
+        pairs = []
+        for group, units in _OUTPUTS.items():
+            unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
+            pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
+        return {
+            **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
+            "rates": np.array(rates),
+            "labels": _words(parameters, "POINT", "LABELS"),
+            "unit": _words(parameters, "POINT", "UNITS")[:1],
+            "channels": _words(parameters, "ANALOG", "LABELS"),
+            "channel_units": _words(parameters, "ANALOG", "UNITS"),
+            "bodies": _words(parameters, "ROTATION", "LABELS"),
+            "outputs": np.array(pairs, dtype=str).reshape(-1, 2),
+            "first_frame": np.array(header["points"]["first_frame"] + 1),
+            "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
+            "events": _event_names(parameters),
+            "event_times": times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0)),
+        }
 
 
 def _frames(found: Any) -> dict[str, NDArray[Any]]:
@@ -241,15 +242,6 @@ def _count(parameters: Any) -> int:
     return max((int(v) for v in told), default=0)
 
 
-def _outputs(parameters: Any) -> NDArray[Any]:
-    """Labels and units of computed outputs, which lie among the points."""
-    pairs = []
-    for group, units in _OUTPUTS.items():
-        unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
-        pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
-    return np.array(pairs, dtype=str).reshape(-1, 2)
-
-
 def _event_names(parameters: Any) -> NDArray[Any]:
     """Labels, each after its context (Left, Right), where as many are stated."""
     labels, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
@@ -257,13 +249,6 @@ def _event_names(parameters: Any) -> NDArray[Any]:
         return labels
     pairs = zip(sides.tolist(), labels.tolist(), strict=True)
     return np.array([f"{side} {label}".strip() for side, label in pairs], dtype=str)
-
-
-def _event_times(parameters: Any) -> NDArray[np.float64]:
-    """Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise."""
-    group = parameters.get("EVENT", {})
-    times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
-    return times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0))
 
 
 def _rate(parameters: Any, group: str, samples: NDArray[np.float64]) -> float:

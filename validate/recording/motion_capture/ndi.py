@@ -93,46 +93,38 @@ def tools_of(header: TextRow) -> tuple[Tool, ...]:
             continue
         position, turn, name = group
         port = next((m for c in cells[after:i] if (m := _PORT.fullmatch(c))), None)
+        # The unit of length in brackets, or none.
+        told = _BRACKETS.search(header.cells[i + position[0]])
         found.append(
             Tool(
                 name or (f"{port[1]}{port[2]}" if port else f"tool{len(found) + 1}"),
                 tuple(i + j for j in position),
                 tuple(i + j for j in turn),
                 None,
-                _unit(header.cells[i + position[0]]),
+                told[1].strip() if told and in_si(1.0, told[1].strip(), "m") else "",
             )
         )
         i += 7
         after = i
     labels = distinct([tool.name for tool in found], len(found))
-    states = _states(cells, found)
-    return tuple(replace(t, name=n, state=s) for t, n, s in zip(found, labels, states, strict=True))
-
-
-def _states(cells: Sequence[str], tools: Sequence[Tool]) -> list[int | None]:
-    """The column of each tool's state: one that carries its name, else the nearest before its own,
-    of one tool alone also after; those of single markers are none."""
+    # The column of each tool's state: one that carries its name, else the nearest before its
+    # own, of one tool alone also after; those of single markers are none.
     of = [j for j, c in enumerate(cells) if _STATE.fullmatch(c) and "marker" not in c]
     named = [
         next((j for j in of if tool.name.lower() in _IN_NAME.sub("", cells[j])), None)
-        for tool in tools
+        for tool in found
     ]
     of = [j for j in of if j not in named]
-    begins = [min(*tool.position, *tool.turn) for tool in tools]
+    begins = [min(*tool.position, *tool.turn) for tool in found]
     ends = [0, *(begin + 7 for begin in begins)]
     before = [
         next((j for j in reversed(of) if end <= j < begin), None)
         for end, begin in zip(ends, begins, strict=False)
     ]
-    if len(tools) == 1 and before[0] is None:
+    if len(found) == 1 and before[0] is None:
         before = [next((j for j in of if j >= ends[1]), None)]
-    return [b if n is None else n for n, b in zip(named, before, strict=True)]
-
-
-def _unit(cell: str) -> str:
-    """The unit of length in brackets, or none."""
-    told = _BRACKETS.search(cell)
-    return told[1].strip() if told and in_si(1.0, told[1].strip(), "m") else ""
+    states = [b if n is None else n for n, b in zip(named, before, strict=True)]
+    return tuple(replace(t, name=n, state=s) for t, n, s in zip(found, labels, states, strict=True))
 
 
 def _group(cells: Sequence[str]) -> tuple[tuple[int, ...], tuple[int, ...], str] | None:

@@ -87,12 +87,31 @@ def read_optitrack(path: Path, options: Options) -> Recording:
     damaged.
     """
     held = text_rows(path)
-    header = _header(held)
+    if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
+        raise RecordingError(
+            f"{held.name}: not a Motive CSV file: its first cell is not 'Format Version'"
+        )
+    first = held.rows[0].cells
+    header = dict(zip(first[::2], first[1::2], strict=False))
     table, left = _table(held)
     unit = header.get("Length Units", "")
     factor, stated = metres(options, _UNITS.get(unit, unit), path.name)
     frame = options.get("frame", header.get("Coordinate Space", "capture").lower())
-    poses, unread = _poses(table, factor, frame)
+    # Poses of rigid bodies where they were seen, and why others have none.
+    poses: dict[str, Stream] = {}
+    unread = {}
+    for name, at in table.triples((_BODY,)):
+        q = table.turn(name)
+        pose = table.values[:, [*at, *q]]
+        seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
+        if not q:
+            unread[name] = "its rotation is not a quaternion; export it as Rotation Type Quaternion"
+        elif not seen.any():
+            unread[name] = "never seen"
+        else:
+            R = rotations(pose[seen, 3:], f"{table.held.name}: {name}")
+            t = table.values[seen, _TIME]
+            poses |= pose_signals(name, t, R, factor * pose[seen, :3], frame)
     points, zeros = _points(table, factor, spread(options), frame)
     streams = {**points, **poses}
     if not streams:
@@ -104,15 +123,6 @@ def read_optitrack(path: Path, options: Options) -> Recording:
     }  # fmt: skip
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, unread)
-
-
-def _header(held: TextRows) -> dict[str, str]:
-    if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
-        raise RecordingError(
-            f"{held.name}: not a Motive CSV file: its first cell is not 'Format Version'"
-        )
-    first = held.rows[0].cells
-    return dict(zip(first[::2], first[1::2], strict=False))
 
 
 def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
@@ -150,27 +160,6 @@ def _points(
             count += zeros
             found[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
     return found, count
-
-
-def _poses(
-    table: MotiveTable, factor: float, frame: str
-) -> tuple[dict[str, Stream], dict[str, str]]:
-    """Poses of rigid bodies where they were seen, and why others have none."""
-    found: dict[str, Stream] = {}
-    unread = {}
-    for name, at in table.triples((_BODY,)):
-        q = table.turn(name)
-        pose = table.values[:, [*at, *q]]
-        seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
-        if not q:
-            unread[name] = "its rotation is not a quaternion; export it as Rotation Type Quaternion"
-        elif not seen.any():
-            unread[name] = "never seen"
-        else:
-            R = rotations(pose[seen, 3:], f"{table.held.name}: {name}")
-            t = table.values[seen, _TIME]
-            found |= pose_signals(name, t, R, factor * pose[seen, :3], frame)
-    return found, unread
 
 
 OPTITRACK = Reader(

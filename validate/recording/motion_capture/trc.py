@@ -47,8 +47,21 @@ def read_trc(path: Path, options: Options) -> Recording:
     `RecordingError` for a table that is no TRC, or damaged.
     """
     held = text_rows(path)
-    header = _header(held)
-    names = _names(held, header)
+    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
+        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
+    pairs = zip(held.rows[1].cells, held.rows[2].cells, strict=False)
+    header = {k: v for k, v in pairs if k}
+    # Every third cell of the fourth line; where programs left no blanks between, all of them.
+    cells = held.rows[3].cells[_BEFORE:]
+    named = [c for c in cells if c]
+    stated = header.get("NumMarkers", "")
+    if stated.isdecimal() and int(stated) != len(named):
+        raise RecordingError(
+            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
+        )
+    if not named:
+        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
+    names = distinct(named, len(named))
     values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
     shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
     x = whole_points(held, shown, names, rows)
@@ -65,27 +78,6 @@ def read_trc(path: Path, options: Options) -> Recording:
     source = source_of(path, "text file: integrity not provable")
     told |= counted | told_zeros(zeros) | told_left(left)
     return recorded(path.stem, source, {"markers": markers}, told)
-
-
-def _header(held: TextRows) -> dict[str, str]:
-    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
-        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
-    keys, values = held.rows[1].cells, held.rows[2].cells
-    return {k: v for k, v in zip(keys, values, strict=False) if k}
-
-
-def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
-    """Every third cell of the fourth line; where programs left no blanks between, all of them."""
-    cells = held.rows[3].cells[_BEFORE:]
-    named = [c for c in cells if c]
-    stated = header.get("NumMarkers", "")
-    if stated.isdecimal() and int(stated) != len(named):
-        raise RecordingError(
-            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
-        )
-    if not named:
-        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
-    return distinct(named, len(named))
 
 
 def _rows(held: TextRows) -> list[TextRow]:

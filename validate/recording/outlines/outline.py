@@ -61,7 +61,16 @@ def quality(grey: Grey, wall: Wall) -> Quality:
     at least a third of the outline's median contrast.
     """
     within, beside = (_band(grey, wall, *span) for span in ((0.1, 0.85), (1.1, 1.5)))
-    return Quality(_gcnr(within[0], beside[0]), _closed(within, beside))
+    values = beside[0]
+    seen = ~np.isnan(values)
+    width = _SECTOR / 360 * RAYS / 2
+    total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
+    count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
+    step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
+    return Quality(
+        _gcnr(within[0], beside[0]),
+        float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0,
+    )
 
 
 def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floats]:
@@ -77,16 +86,6 @@ def _gcnr(inside: Floats, outside: Floats) -> float:
     if not (a.sum() and b.sum()):
         return 0.0
     return float(1 - np.minimum(a / a.sum(), b / b.sum()).sum())
-
-
-def _closed(within: tuple[Floats, Floats], beside: tuple[Floats, Floats]) -> float:
-    values = beside[0]
-    seen = ~np.isnan(values)
-    width = _SECTOR / 360 * RAYS / 2
-    total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
-    count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
-    step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
-    return float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0
 
 
 def wall_sd(grey: Grey, wall: Wall) -> float:

@@ -103,26 +103,35 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
         if kind == ".nrrd":
             masks, named = _volume(path)
         else:
-            masks = _pictures(files) if kind == ".png" else _array(path)
-        return _masks(path, _of_label(path, masks, named, label), frames)
+            masks = (
+                [decode_png(read_bytes(file, MAX_FILE)) for file in files]
+                if kind == ".png"
+                else _array(path)
+            )
+        # The masks of one region: of the only value that is not zero, or of that which is said.
+        values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
+        if len(values) > _MOST:
+            raise RecordingError(
+                f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other "
+                "value"
+            )
+        names = {v: name for name, v in named.items()}
+        regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
+        meant = values[_meant(path, label, regions)] if values else 0
+        masks = [mask == meant for mask in masks] if values else masks
+        _require_each(path, len(masks), "masks", len(frames.images))
+        shape, found = frames.images[0].shape, {}
+        for i, mask in enumerate(masks):
+            if mask.shape != shape:
+                raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
+            if mask.any():
+                found[i] = _edge(mask, f"{path.name}: mask {i}")
+        return found
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
 
 
 # --- masks ----------------------------------------------------------------------------------------
-
-
-def _of_label(path: Path, masks: Any, named: Mapping[str, int], label: str) -> Any:
-    """The masks of one region: of the only value that is not zero, or of that which is said."""
-    values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
-    if len(values) > _MOST:
-        raise RecordingError(
-            f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other value"
-        )
-    names = {v: name for name, v in named.items()}
-    regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
-    meant = values[_meant(path, label, regions)] if values else 0
-    return [mask == meant for mask in masks] if values else masks
 
 
 def _meant(path: Path, label: str, regions: Sequence[tuple[str, str]]) -> int:
@@ -146,27 +155,12 @@ def _of_names(path: Path, label: str, names: Iterable[str]) -> str:
     return regions[_meant(path, label, regions)][0] if regions else label
 
 
-def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
-    _require_each(path, len(masks), "masks", len(frames.images))
-    shape, found = frames.images[0].shape, {}
-    for i, mask in enumerate(masks):
-        if mask.shape != shape:
-            raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
-        if mask.any():
-            found[i] = _edge(mask, f"{path.name}: mask {i}")
-    return found
-
-
 def _require_each(path: Path, count: int, what: str, images: int) -> None:
     if count != images:
         raise RecordingError(
             f"{path.name}: {count} {what} for {images} images do not show which belongs to which "
             f"image; give one per image (an empty mask for no outline), or a CSV of frame, x, y"
         )
-
-
-def _pictures(files: list[Path]) -> list[Any]:
-    return [decode_png(read_bytes(file, MAX_FILE)) for file in files]
 
 
 def _array(path: Path) -> Any:

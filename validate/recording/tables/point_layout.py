@@ -44,8 +44,7 @@ class FieldColumns:
         return (
             f"{held} of {columns}: a field of displacements or strains at one instant, not the "
             "motion of one point; export chosen points over time, one row per instant, as time "
-            "(s), "
-            "p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
+            "(s), p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
         )
 
 
@@ -235,23 +234,20 @@ def _points_of(names: Sequence[str]) -> dict[str, list[int]]:
     """Columns of x, y, z of each point (of x, y where none has a z); none where they differ."""
     found: dict[str, dict[str, int]] = {}
     for i, name in enumerate(names):
-        axis, whose = _axis_of(name)
+        # The axis and the point of a column's name; empty where it is none.
+        text = name.strip()
+        if text.lower() in ("x", "y", "z"):
+            axis, whose = text.lower(), _ALONE
+        elif (last := _LAST.fullmatch(text)) and _NO_PLACE.fullmatch(last["name"]):
+            axis, whose = "", ""
+        elif last and last["name"]:
+            axis, whose = (last["low"] or last["glued"]).lower(), last["name"]
+        else:
+            first = _FIRST.fullmatch(text)
+            axis, whose = (first["low"].lower(), first["name"]) if first else ("", "")
         if axis and found.setdefault(whose, {}).setdefault(axis, i) != i:
             return {}
     turns = {_W.sub("", n.strip()) for n in names if _W.search(n.strip())}
     whole = {n: a for n, a in found.items() if {"x", "y"} <= a.keys() and n not in turns}
     axes = [c for c in AXES if any(c in a for a in whole.values())]
     return {n: [a[c] for c in axes] for n, a in whole.items() if len(a) == len(axes)}
-
-
-def _axis_of(name: str) -> tuple[str, str]:
-    """The axis and the point of a column's name; empty where it is none."""
-    text = name.strip()
-    if text.lower() in ("x", "y", "z"):
-        return text.lower(), _ALONE
-    if (last := _LAST.fullmatch(text)) and _NO_PLACE.fullmatch(last["name"]):
-        return "", ""
-    if last and last["name"]:
-        return (last["low"] or last["glued"]).lower(), last["name"]
-    first = _FIRST.fullmatch(text)
-    return (first["low"].lower(), first["name"]) if first else ("", "")

@@ -309,7 +309,10 @@ def recording_of(
     written_as: str = "text file",
 ) -> Recording:
     """Return the recording of the table of one specimen; `data` are the bytes of the file."""
-    _require_test(table)
+    # Refuse rows of a displacement field; with times or a force they may be a test.
+    field = field_columns([c.name for c in table.columns])
+    if field and not {"time", "force"} & {role_of(c) for c in table.columns}:
+        raise RecordingError(field.refusal(f"{len(table.lines)} rows"))
     if NONE in (mapping.get("force"), mapping.get("displacement")):
         return alone(path, data, table, mapping, label, written_as)
     said = parse_mapping(mapping, table)
@@ -347,13 +350,6 @@ def recording_of(
             "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
     )
-
-
-def _require_test(table: Table) -> None:
-    """Refuse rows of a displacement field; with times or a force they may be a test."""
-    field = field_columns([c.name for c in table.columns])
-    if field and not {"time", "force"} & {role_of(c) for c in table.columns}:
-        raise RecordingError(field.refusal(f"{len(table.lines)} rows"))
 
 
 def _found(

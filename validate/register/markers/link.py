@@ -196,7 +196,12 @@ class _Front:
             predicted = self.before[young] + self._moved(young, x, u)
             self.to[young] = -1
             self._take(young, predicted, _REACH * self.spacing, np.ones(3))
-            self._cut_young(young)
+            rows, x, u = self._links()
+            new = np.isin(rows, young)
+            fit = local_fit(x, u, x[new], 24, 1, others=True, robust=True)
+            off = np.linalg.norm(u[new] - fit.values, axis=1)
+            allowed = np.maximum(4 * np.linalg.norm(fit.spread, axis=1), _OFF * self.spacing)
+            self.to[rows[new][off > allowed]] = -1
             age = np.where(self.to >= 0, age + 1, 0)
             if k > 3 and int((self.to[young] >= 0).sum()) - had < 0.002 * len(young):
                 return
@@ -223,14 +228,6 @@ class _Front:
         found = found[np.argsort(distance[found], kind="stable")]
         partner, first = np.unique(free[at[found]], return_index=True)
         self.to[rows[found[first]]] = partner
-
-    def _cut_young(self, young: Ints) -> None:
-        rows, x, u = self._links()
-        new = np.isin(rows, young)
-        fit = local_fit(x, u, x[new], 24, 1, others=True, robust=True)
-        off = np.linalg.norm(u[new] - fit.values, axis=1)
-        allowed = np.maximum(4 * np.linalg.norm(fit.spread, axis=1), _OFF * self.spacing)
-        self.to[rows[new][off > allowed]] = -1
 
     def cleaned(self, last: bool) -> int:
         """Cuts what deviates from a local quadratic of its neighbours; but for the `last` time,

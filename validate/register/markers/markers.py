@@ -159,7 +159,34 @@ class MarkerObservation:
 
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         if self.together:
-            return self._gathered(run, selection)
+            selection = selection.instants(run)
+            samples = selection.samples(self.t, run.t, self.name)
+            shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
+            x, error, late = self._seen(np.asarray(selection.t), samples)
+            off = (shown - x).reshape(-1, self.x.shape[2])
+            kept = np.isfinite(off).all(axis=1)
+            off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
+            t = np.repeat(np.asarray(selection.t), self.x.shape[1])[kept]
+            tre = rms(self.tre) / float(np.sqrt(3))
+            found = (
+                Deviation(
+                    g.quantity, off[:, list(g.axes)], "m",
+                    float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
+                    scale=_largest((self.x - self.rest)[..., list(g.axes)]),
+                    reference=moved[:, list(g.axes)],
+                    t=t if len(samples) > 1 else None,
+                    axes=tuple(_AXES[a] for a in g.axes),
+                )
+                for g in self.together
+            )  # fmt: skip
+            sd_t = float(np.sqrt(self.sd_t**2 + selection.sd_t**2 + late**2))
+            if sd_t == 0:
+                return tuple(found)
+            speed = self._speed(slice(None), samples, sd_t)
+            axes = (list(g.axes) for g in self.together)
+            return tuple(
+                with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True)
+            )
         each = (self._one(run, selection, j) for j in range(len(self.names)))
         return tuple(d for d in each if d is not None)
 
@@ -202,34 +229,6 @@ class MarkerObservation:
                 probe = np.stack([run.traces[f"{name}.{c}"].y for c in _AXES[:d]], axis=1)
                 x[:, j] = self.rest[j] + from_rest(run.t, probe, self.t)
         return x
-
-    def _gathered(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
-        selection = selection.instants(run)
-        samples = selection.samples(self.t, run.t, self.name)
-        shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
-        x, error, late = self._seen(np.asarray(selection.t), samples)
-        off = (shown - x).reshape(-1, self.x.shape[2])
-        kept = np.isfinite(off).all(axis=1)
-        off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
-        t = np.repeat(np.asarray(selection.t), self.x.shape[1])[kept]
-        tre = rms(self.tre) / float(np.sqrt(3))
-        found = (
-            Deviation(
-                g.quantity, off[:, list(g.axes)], "m",
-                float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
-                scale=_largest((self.x - self.rest)[..., list(g.axes)]),
-                reference=moved[:, list(g.axes)],
-                t=t if len(samples) > 1 else None,
-                axes=tuple(_AXES[a] for a in g.axes),
-            )
-            for g in self.together
-        )  # fmt: skip
-        sd_t = float(np.sqrt(self.sd_t**2 + selection.sd_t**2 + late**2))
-        if sd_t == 0:
-            return tuple(found)
-        speed = self._speed(slice(None), samples, sd_t)
-        axes = (list(g.axes) for g in self.together)
-        return tuple(with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True))
 
     def _seen(self, t: Floats, samples: Ints) -> tuple[Floats, Floats, float]:
         """Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating

@@ -163,7 +163,13 @@ def find_outliers(
     """
     k, d = source.shape
     bound = chi_square_bound(d, P_EXCESS / k)
-    robust = _absolute_fit(source, target, noise, scaled).apply(source) - target
+    # Least sum of distances by reweighting; distances below the noise count as the noise.
+    fit = fit_similarity if scaled else fit_rigid
+    weights = np.ones(len(source))
+    for _ in range(30):  # only picks suspects: `_judged` decides, converged or not
+        lengths = np.linalg.norm(fit(source, target, weights).apply(source) - target, axis=1)
+        weights = noise / np.maximum(lengths, noise)
+    robust = fit(source, target, weights).apply(source) - target
     limit = bound * max(noise, robust_noise(robust)) ** 2
     suspect = (robust**2).sum(axis=1) > limit
     if not suspect.any() or k - suspect.sum() < FEWEST:
@@ -194,16 +200,6 @@ def _judged(
         for i, value in zip(at, squared, strict=True)
         if value > chi_square_bound(d, P_EXCESS / k)
     )
-
-
-def _absolute_fit(source: Floats, target: Floats, noise: float, scaled: bool) -> Similarity:
-    """Least sum of distances by reweighting; distances below the noise count as the noise."""
-    fit = fit_similarity if scaled else fit_rigid
-    weights = np.ones(len(source))
-    for _ in range(30):  # only picks suspects: `_judged` decides, converged or not
-        lengths = np.linalg.norm(fit(source, target, weights).apply(source) - target, axis=1)
-        weights = noise / np.maximum(lengths, noise)
-    return fit(source, target, weights)
 
 
 def _turns(r: Floats, values: Floats) -> list[Floats]:
@@ -249,7 +245,12 @@ def relabellings(source: Floats, target: Floats, fit: Fit, noise: float) -> tupl
     if 2 * len(first.moved) < k and _explains(first, source, target, fit, noise):
         return (first,)
     found = {first.order.tobytes(): first}
-    for start in _starts(source, target):
+    # Centroid on centroid, size on size, principal axes on principal axes, turned.
+    A, B = _axes(source), _axes(target)
+    s = float(np.linalg.norm(spread(target)) / np.linalg.norm(spread(source)))
+    centre, onto = source.mean(axis=0), target.mean(axis=0)
+    rotations = [B @ turn @ A.T for turn in _symmetric_turns(source.shape[1])]
+    for start in [Similarity(R, onto - s * R @ centre, s) for R in rotations]:
         one = _closest(source, target, start, fit)
         found.setdefault(one.order.tobytes(), one)
     ranked = sorted(found.values(), key=lambda one: one.rms)
@@ -272,7 +273,11 @@ def label_fault(
         return None
     before = rms(fit(source, target).apply(source) - target)
     change = f"residual {1e3 * before:.3g} -> {1e3 * best.rms:.3g} mm"
-    moved = _listed([names[i] for i in best.moved])
+    names = [names[i] for i in best.moved]
+    if len(names) <= SHOWN:
+        moved = ", ".join(names[:-1]) + f" and {names[-1]}"
+    else:
+        moved = f"{', '.join(names[:SHOWN])} and {len(names) - SHOWN} others"
     if rivals:
         return (
             f"markers {moved} seem permuted ({change}), but {1 + len(rivals)} labellings fit "
@@ -325,15 +330,6 @@ def _settled(squared: Floats, spacing: float) -> Ints:
     return order
 
 
-def _starts(source: Floats, target: Floats) -> list[Similarity]:
-    """Centroid on centroid, size on size, principal axes on principal axes, turned."""
-    A, B = _axes(source), _axes(target)
-    s = float(np.linalg.norm(spread(target)) / np.linalg.norm(spread(source)))
-    centre, onto = source.mean(axis=0), target.mean(axis=0)
-    rotations = [B @ turn @ A.T for turn in _symmetric_turns(source.shape[1])]
-    return [Similarity(R, onto - s * R @ centre, s) for R in rotations]
-
-
 def _axes(points: Floats) -> Floats:
     """Principal axes as right-handed columns, the smallest last."""
     Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
@@ -356,9 +352,3 @@ def _spacing(points: Floats) -> float:
     distances = cdist(points, points)
     np.fill_diagonal(distances, np.inf)
     return float(np.median(distances.min(axis=1)))
-
-
-def _listed(names: Sequence[str]) -> str:
-    if len(names) <= SHOWN:
-        return ", ".join(names[:-1]) + f" and {names[-1]}"
-    return f"{', '.join(names[:SHOWN])} and {len(names) - SHOWN} others"

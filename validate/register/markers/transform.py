@@ -218,7 +218,17 @@ def fit_plane(points: ArrayLike, name: str = "points", up: ArrayLike | None = No
             f"{PLANAR:g}): use the rigid method, without `up`"
         )
     axes = Vt.T * np.array([1.0, 1.0, np.sign(np.linalg.det(Vt))])
-    return _on_side(Plane(centre, axes), name, up)
+    plane = Plane(centre, axes)
+    if up is None:
+        return plane
+    direction = checked(up, f"{name}: up", (3,), error=RegistrationError)
+    along = float(plane.axes[:, 2] @ direction)
+    if abs(along) <= 0.1 * np.linalg.norm(direction):
+        angle = f"normal part {abs(along):.2g} of length {np.linalg.norm(direction):.2g}"
+        raise RegistrationError(
+            f"{name}: `up` lies in the marker plane ({angle}): point it to the side of the pen"
+        )
+    return plane if along > 0 else _turned(plane)
 
 
 def fit_two_step(
@@ -267,19 +277,6 @@ def _in_plane(points: Floats, plane: Plane) -> np.ndarray[tuple[int], np.dtype[n
 def _turned(plane: Plane) -> Plane:
     """The same plane seen from its other side; the axes stay right-handed."""
     return Plane(plane.centre, plane.axes * np.array([1.0, -1.0, -1.0]))
-
-
-def _on_side(plane: Plane, name: str, up: ArrayLike | None) -> Plane:
-    if up is None:
-        return plane
-    direction = checked(up, f"{name}: up", (3,), error=RegistrationError)
-    along = float(plane.axes[:, 2] @ direction)
-    if abs(along) <= 0.1 * np.linalg.norm(direction):
-        angle = f"normal part {abs(along):.2g} of length {np.linalg.norm(direction):.2g}"
-        raise RegistrationError(
-            f"{name}: `up` lies in the marker plane ({angle}): point it to the side of the pen"
-        )
-    return plane if along > 0 else _turned(plane)
 
 
 _MOST = 50  # Gauss-Newton steps; a handful suffices from the isotropic fit

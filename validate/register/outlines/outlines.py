@@ -277,7 +277,10 @@ class OutlineObservation:
             off = float(np.hypot(sd_t, late)) if abs(late) > SAME else sd_t
             one = self._on_clock(one, float(t), off) if off > 0 else one
             found += [replace(d, t=np.full(len(d.values), t)) for d in one]
-        return _stacked(found)
+        # One deviation a quantity, over all instants; a scalar keeps its two values only alone.
+        quantities = dict.fromkeys(d.quantity for d in found)
+        groups = [[d for d in found if d.quantity == q] for q in quantities]
+        return tuple(replace(g[0], t=None) if len(g) == 1 else merged(g) for g in groups)
 
     def _between(
         self, start: tuple[Floats, Floats], end: tuple[Floats, Floats], t: float
@@ -308,12 +311,14 @@ class OutlineObservation:
         along, across = _noise((start[1], end[1]), _ANGLES)
         k, radius = len(end[1]), np.sqrt(true_area / np.pi)
         spread = self.sd * np.sqrt(2 / k)
+        # Independent numbers of the same spread of their mean square (Satterthwaite 1946).
+        freedom = max(1, int(np.trace(along) ** 2 / (along**2).sum()))
         return [
             Deviation(
                 "contour.material", moved[0] - moved[1], "m",
                 self.sd * float(np.sqrt((np.diag(along).mean() + across) / 2)), 0.0,
                 "displacement of the outline at equal polar angle about its centroid, every 10 "
-                "deg", freedom=_freedom(along), reference=moved[1],
+                "deg", freedom=freedom, reference=moved[1],
             ),
             *(self._corner(c, start, end) for c in self.corners),
             Deviation(
@@ -371,18 +376,6 @@ def _noise(outlines: Iterable[Floats], angles: Floats) -> tuple[Floats, float]:
     found = [angular_weights(outline, angles) for outline in outlines]
     along = np.sum([w @ w.T for w in found], axis=0)
     return np.asarray(along), sum(2 / w.shape[1] for w in found)
-
-
-def _freedom(along: Floats) -> int:
-    """Independent numbers of the same spread of their mean square (Satterthwaite 1946)."""
-    return max(1, int(np.trace(along) ** 2 / (along**2).sum()))
-
-
-def _stacked(found: list[Deviation]) -> tuple[Deviation, ...]:
-    """One deviation a quantity, over all instants; a scalar keeps its two values only alone."""
-    quantities = dict.fromkeys(d.quantity for d in found)
-    groups = [[d for d in found if d.quantity == q] for q in quantities]
-    return tuple(replace(g[0], t=None) if len(g) == 1 else merged(g) for g in groups)
 
 
 def merged(group: list[Deviation]) -> Deviation:

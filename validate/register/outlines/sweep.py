@@ -82,7 +82,22 @@ def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
     stack = Stack(
         sweep.pose, at, centres, radii, outlines, ends, sweep.sd, float(step / np.sqrt(12))
     )
-    _require_sections(stack)
+    worst = int((stack.off_round / stack.radii).argmax())
+    if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
+        raise RegistrationError(
+            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is not a section of an inclusion: "
+            f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
+            f"{1e3 * stack.radii[worst]:.2f} mm; repeat its outline"
+        )
+    moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
+    apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
+    i = int(apart.argmax())
+    if apart[i] > 0:
+        raise RegistrationError(
+            f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
+            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm from each other, more than a "
+            f"radius; outline them again"
+        )
     return stack
 
 
@@ -118,25 +133,6 @@ def _step(at: Floats) -> float:
             f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
         )
     return step
-
-
-def _require_sections(stack: Stack) -> None:
-    worst = int((stack.off_round / stack.radii).argmax())
-    if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
-        raise RegistrationError(
-            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is not a section of an inclusion: "
-            f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
-            f"{1e3 * stack.radii[worst]:.2f} mm; repeat its outline"
-        )
-    moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
-    apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
-    i = int(apart.argmax())
-    if apart[i] > 0:
-        raise RegistrationError(
-            f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
-            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm from each other, more than a "
-            f"radius; outline them again"
-        )
 
 
 def sweep_outlines(

@@ -71,8 +71,25 @@ def dwells(t: Floats, x: Floats, radius: float, least: float) -> tuple[Dwell, ..
     in which the tip still comes or already leaves are cut off.
     """
     smooth = median_filter(x, (_SPIKE, 1), mode="nearest")
-    radius = max(radius, _CLEAR * _noise(x))
-    spans = _joined(t, smooth, _stays(smooth, radius), radius)
+    # Standard deviation m along an axis of what changes from sample to sample, while a tip
+    # stands: from the median of second differences, which a motion over less than half of
+    # them leaves.
+    bends = np.abs(np.diff(x, n=2, axis=0))
+    radius = max(
+        radius,
+        _CLEAR * (float(np.median(bends)) / 0.6745 / float(np.sqrt(6)) if bends.size else 0.0),
+    )
+    # Spans, one behind the other, whose samples lie within the radius of the mean before
+    # them.
+    spans, begin = [], 0
+    mean = smooth[0].copy()
+    for i in range(1, len(smooth)):
+        if np.linalg.norm(smooth[i] - mean) <= radius:
+            mean += (smooth[i] - mean) / (i + 1 - begin)
+            continue
+        spans.append((begin, i))
+        begin, mean = i, smooth[i].copy()
+    spans = _joined(t, smooth, [*spans, (begin, len(smooth))], radius)
     found = [_settled_dwell(t, x, smooth, *span) for span in spans]
     return tuple(d for d in found if d.t[-1] - d.t[0] >= least)
 
@@ -90,26 +107,6 @@ def sd_of_mean(parts: tuple[Dwell, ...], whole: tuple[Dwell, ...]) -> float:
     follow = min(max(follow, 0.0), 1.0)
     count = float(np.mean([len(p.x) for p in parts]))
     return wander / float(np.sqrt(max(count * (1 - follow) / (1 + follow), 1.0)))
-
-
-def _noise(x: Floats) -> float:
-    """Standard deviation m along an axis of what changes from sample to sample, while a tip stands:
-    from the median of second differences, which a motion over less than half of them leaves."""
-    bends = np.abs(np.diff(x, n=2, axis=0))
-    return float(np.median(bends)) / 0.6745 / float(np.sqrt(6)) if bends.size else 0.0
-
-
-def _stays(x: Floats, radius: float) -> list[tuple[int, int]]:
-    """Spans, one behind the other, whose samples lie within the radius of the mean before them."""
-    spans, begin = [], 0
-    mean = x[0].copy()
-    for i in range(1, len(x)):
-        if np.linalg.norm(x[i] - mean) <= radius:
-            mean += (x[i] - mean) / (i + 1 - begin)
-            continue
-        spans.append((begin, i))
-        begin, mean = i, x[i].copy()
-    return [*spans, (begin, len(x))]
 
 
 def _joined(
@@ -204,7 +201,23 @@ def match_landmarks(known: Floats, seen: Floats, within: float) -> Match:
         raise RegistrationError(
             f"{len(seen)} places for {len(known)} landmarks; expected at most {_MOST}"
         )
-    found = _matches(known, seen, within)
+    # Every assignment that some triple of landmarks leads to, once.
+    far, near = cdist(known, known), cdist(seen, seen)
+    every: dict[tuple[tuple[int, ...], tuple[int, ...]], Match] = {}
+    places = np.array(list(permutations(range(len(seen)), 3))).reshape(-1, 3)
+    # Triples that are no line, those first whose nearest two lie furthest apart.
+    triples = [t for t in combinations(range(len(known)), 3) if _is_wide(known[list(t)])]
+    triples.sort(key=lambda t: -min(far[t[0], t[1]], far[t[1], t[2]], far[t[2], t[0]]))
+    for a, b, c in triples[:: max(1, -(-len(triples) // _TRIPLES))]:
+        sides = near[places[:, [0, 1, 2]], places[:, [1, 2, 0]]]
+        fits = (np.abs(sides - [far[a, b], far[b, c], far[c, a]]) < within).all(axis=1)
+        for triple in places[fits]:
+            if any(m.has((a, b, c), triple) for m in every.values()):
+                continue
+            match = _settled(known, seen, np.array([a, b, c]), triple, within)
+            if match:
+                every[tuple(match.known.tolist()), tuple(match.seen.tolist())] = match
+    found = list(every.values())
     most = max((len(m.known) for m in found), default=0)
     if most < min(FEWEST, len(known)) or most < FEWEST:
         raise RegistrationError(
@@ -222,30 +235,6 @@ def match_landmarks(known: Floats, seen: Floats, within: float) -> Match:
             "they were touched"
         )
     return (ordered or alike)[0]
-
-
-def _matches(known: Floats, seen: Floats, within: float) -> list[Match]:
-    """Every assignment that some triple of landmarks leads to, once."""
-    far, near = cdist(known, known), cdist(seen, seen)
-    found: dict[tuple[tuple[int, ...], tuple[int, ...]], Match] = {}
-    places = np.array(list(permutations(range(len(seen)), 3))).reshape(-1, 3)
-    for a, b, c in _wide(known, far):
-        sides = near[places[:, [0, 1, 2]], places[:, [1, 2, 0]]]
-        fits = (np.abs(sides - [far[a, b], far[b, c], far[c, a]]) < within).all(axis=1)
-        for triple in places[fits]:
-            if any(m.has((a, b, c), triple) for m in found.values()):
-                continue
-            match = _settled(known, seen, np.array([a, b, c]), triple, within)
-            if match:
-                found[tuple(match.known.tolist()), tuple(match.seen.tolist())] = match
-    return list(found.values())
-
-
-def _wide(known: Floats, far: Floats) -> list[tuple[int, int, int]]:
-    """Triples that are no line, those first whose nearest two lie furthest apart."""
-    triples = [t for t in combinations(range(len(known)), 3) if _is_wide(known[list(t)])]
-    triples.sort(key=lambda t: -min(far[t[0], t[1]], far[t[1], t[2]], far[t[2], t[0]]))
-    return triples[:: max(1, -(-len(triples) // _TRIPLES))]
 
 
 def _is_wide(points: Floats) -> bool:

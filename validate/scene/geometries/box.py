@@ -53,7 +53,17 @@ def member(cells: Sequence[int], share: float, even: Sequence[bool] = ()) -> Cel
     """
     k = _multiple(cells, even)
     if k == 1:
-        return _most_similar(tuple(cells), share)
+        # Return the grid with the most equal ratios near the share; itself is none.
+        cells = tuple(cells)
+        grids = {
+            tuple(max(1, round(s * n)) for n in cells)
+            for s in share * np.linspace(1 - _AROUND, 1 + _AROUND, 49)
+        }
+        others = [g for g in sorted(grids) if (share > 1) == (prod(g) > prod(cells)) and g != cells]
+        if not others:
+            return tuple(max(1, n + (1 if share > 1 else -1)) for n in cells)
+        wanted = share ** len(cells) * prod(cells)
+        return min(others, key=lambda g: (similarity(cells, g), abs(log(prod(g) / wanted))))
     j = round(share * k - _HALF)
     j = max(j, k + 1) if share > 1 else max(1, min(j, k - 1))
     return tuple(n // k * j for n in cells)
@@ -72,19 +82,6 @@ def similarity(cells: Sequence[int], others: Sequence[int]) -> float:
     """Return the largest over the smallest ratio of cells along the axes; 1 for similar grids."""
     ratios = [b / a for a, b in zip(cells, others, strict=True)]
     return max(ratios) / min(ratios)
-
-
-def _most_similar(cells: Cells, share: float) -> Cells:
-    """Return the grid with the most equal ratios near the share; itself is none."""
-    grids = {
-        tuple(max(1, round(s * n)) for n in cells)
-        for s in share * np.linspace(1 - _AROUND, 1 + _AROUND, 49)
-    }
-    others = [g for g in sorted(grids) if (share > 1) == (prod(g) > prod(cells)) and g != cells]
-    if not others:
-        return tuple(max(1, n + (1 if share > 1 else -1)) for n in cells)
-    wanted = share ** len(cells) * prod(cells)
-    return min(others, key=lambda g: (similarity(cells, g), abs(log(prod(g) / wanted))))
 
 
 def _multiple(cells: Sequence[int], even: Sequence[bool]) -> int:

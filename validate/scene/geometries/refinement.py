@@ -44,7 +44,11 @@ def coarser(mesh: Mesh, times: int = 1) -> Mesh:
     if len(mesh.nodes) < _FEW:
         raise SceneError(f"{len(mesh.nodes)} nodes: too few for a mesh with fewer")
     by = (3.0 if len(mesh.nodes) > _LARGE else 2.0) * 2.0 ** (times - 1)
-    triangles = _triangles(mesh.surface, mesh.bricks)
+    # Triangles (t, 3) of a surface; a brick's face is two.
+    if not mesh.bricks:
+        triangles = mesh.surface[:, :3]
+    else:
+        triangles = np.concatenate([mesh.surface[:, [0, 1, 2]], mesh.surface[:, [0, 2, 3]]])
     edge = _EDGE * float(np.cbrt(np.abs(cell_volumes(mesh)).mean()))
     if mesh.bricks:
         edge /= _EDGE
@@ -69,13 +73,6 @@ def size_against(own: Mesh, coarse: Mesh) -> float:
     """How many times as far apart the nodes of the coarse mesh are; cells of two shapes have no
     common size."""
     return float(np.cbrt(len(own.nodes) / len(coarse.nodes)))
-
-
-def _triangles(facets: Ints, bricks: bool) -> Ints:
-    """Triangles (t, 3) of a surface; a brick's face is two."""
-    if not bricks:
-        return facets[:, :3]
-    return np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
 
 
 @lru_cache(maxsize=4)

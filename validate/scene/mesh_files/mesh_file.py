@@ -10,7 +10,6 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, SceneError
 from validate.files import npz_arrays
 from validate.places import replacing
@@ -52,7 +51,11 @@ def filled(path: Path, unit: str, edge: float = 0.0, within: float = 1e-3) -> Fo
     except RecordingError as error:
         raise SceneError(str(error)) from None
     try:
-        mesh = _filled_mesh(factor * found["points"], found["cells.tetra"])
+        mesh = Mesh((factor * found["points"]), found["cells.tetra"], "tet4")
+        if cell_volumes(mesh).sum() < 0:
+            mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
+        require_positive_cells(mesh)
+
     except SceneError as error:
         raise SceneError(f"{path.name}: {error}") from error
     volume, enclosed, may = (
@@ -69,14 +72,6 @@ def filled(path: Path, unit: str, edge: float = 0.0, within: float = 1e-3) -> Fo
         )
     turned = f"{int(found['turned'])} of {int(found['triangles'])} triangles"
     return ForeignBody(mesh, {"surface": around, "turned": turned, "filled": share})
-
-
-def _filled_mesh(nodes: Floats, cells: Ints) -> Mesh:
-    mesh = Mesh(nodes, cells, "tet4")
-    if cell_volumes(mesh).sum() < 0:
-        mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
-    require_positive_cells(mesh)
-    return mesh
 
 
 MAX_BYTES = 64_000_000  # of all arrays together: some 400 000 tetrahedra

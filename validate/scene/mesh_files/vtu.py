@@ -61,7 +61,18 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises `SceneError` for a list that is none, for files elsewhere than beside it, other numbers
     of points, and points without a displacement.
     """
-    listed = _listed(path)
+    # Time and file of every step, in order of time.
+    text = read_bytes(path)
+    if b"<!" in text.replace(b"<!--", b""):
+        raise SceneError("declares XML entities, which a list of files does not need")
+    try:
+        sets = list(ET.fromstring(text).iter("DataSet"))
+        steps = sorted((float(s.attrib["timestep"]), s.attrib["file"]) for s in sets)
+    except (ET.ParseError, KeyError, ValueError) as error:
+        raise SceneError(f"not a list of files ({' '.join(str(error).split())[:100]})") from None
+    if not steps:
+        raise SceneError("it lists no file")
+    listed = [(t, inside(path.parent, name)) for t, name in steps]
     found = [_fields(file) for _, file in listed]
     if len({len(one["points"]) for one in found}) != 1:
         raise SceneError("files of different numbers of points")
@@ -73,21 +84,6 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     if all("reactions" in one for one in found):
         series["reactions"] = np.stack([one["reactions"] for one in found])
     return series
-
-
-def _listed(path: Path) -> list[tuple[float, Path]]:
-    """Time and file of every step, in order of time."""
-    text = read_bytes(path)
-    if b"<!" in text.replace(b"<!--", b""):
-        raise SceneError("declares XML entities, which a list of files does not need")
-    try:
-        sets = list(ET.fromstring(text).iter("DataSet"))
-        found = sorted((float(s.attrib["timestep"]), s.attrib["file"]) for s in sets)
-    except (ET.ParseError, KeyError, ValueError) as error:
-        raise SceneError(f"not a list of files ({' '.join(str(error).split())[:100]})") from None
-    if not found:
-        raise SceneError("it lists no file")
-    return [(t, inside(path.parent, name)) for t, name in found]
 
 
 def _fields(file: Path) -> dict[str, NDArray[Any]]:
