@@ -12,7 +12,7 @@ from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
 from validate.recording.clocks.alignment import declared_offset, shift
 from validate.recording.images.image import AS_IT_IS
-from validate.recording.mcap.recover import recover
+from validate.recording.mcap.read import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
 from validate.recording.motion_capture.poses import require_chain

@@ -120,7 +120,10 @@ def fit_modulus(
     cylinder = cylinder or cylinder_of(recording)
     log = loading(recording, test)
     d, force = log.d, log.force
-    noise = _first_noise(d, force, cylinder.height * high)
+    # Noise of the log's first part, up to `reach` (m) from its first displacement.
+    beyond = d - d[0] > (cylinder.height * high)
+    count = int(np.argmax(beyond)) if beyond.any() else len(d)
+    noise = load_noise(force[: max(count, MIN_SAMPLES)])
     offset, contact = zero_of(d, force, noise, cylinder.height * low)
     strain = (d - contact) / cylinder.height
     used = _loading(strain, high)
@@ -249,13 +252,6 @@ def _samples(recording: Recording, topic: str, unit: str) -> Signal:
             f"{recording.name}: '{topic}' has {found.y.shape[1]} columns, expected 1"
         )
     return found
-
-
-def _first_noise(d: Floats, force: Floats, reach: float) -> float:
-    """Noise of the log's first part, up to `reach` (m) from its first displacement."""
-    beyond = d - d[0] > reach
-    count = int(np.argmax(beyond)) if beyond.any() else len(d)
-    return load_noise(force[: max(count, MIN_SAMPLES)])
 
 
 def zero_of(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, float]:

@@ -167,7 +167,9 @@ def _shielded(reader: Reader) -> Reader:
 
     def read(path: Path, options: Options) -> Recording:
         try:
-            return _stamped(reader.read(path, options), reader)
+            recording = reader.read(path, options)
+            record = {**recording.metadata.get("provenance", {}), "read by": READERS.whose(reader)}
+            return replace(recording, metadata={**recording.metadata, "provenance": record})
         except ValidateError:
             raise
         except Exception as error:  # code of others: whatever it does
@@ -177,11 +179,6 @@ def _shielded(reader: Reader) -> Reader:
             ) from error
 
     return replace(reader, read=read)
-
-
-def _stamped(recording: Recording, reader: Reader) -> Recording:
-    record = {**recording.metadata.get("provenance", {}), "read by": READERS.whose(reader)}
-    return replace(recording, metadata={**recording.metadata, "provenance": record})
 
 
 def recognised(path: Path) -> Reader:

@@ -54,7 +54,15 @@ def odd_stream(stream: object) -> str:
             f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
             f"{_factor(size, _SPREADS)}"
         )
-    return _odd_outlines(stream) if isinstance(stream, Contours) else ""
+    if isinstance(stream, Contours):
+        size = _extent(stream)
+        low, high = _OUTLINES
+        if low <= size <= high:
+            return ""
+        return (
+            f"outlines of {size:.3g} m are outside {low:g} to {high:g} m{_factor(size, _OUTLINES)}"
+        )
+    return ""
 
 
 def another_unit(stream: object, size: float) -> str:
@@ -118,14 +126,6 @@ def _moved(x: Floats) -> float:
 
 def _extent(contours: Contours) -> float:
     return max(float(np.ptp(outline, axis=0).max()) for outline in contours.outlines)
-
-
-def _odd_outlines(contours: Contours) -> str:
-    size = _extent(contours)
-    low, high = _OUTLINES
-    if low <= size <= high:
-        return ""
-    return f"outlines of {size:.3g} m are outside {low:g} to {high:g} m{_factor(size, _OUTLINES)}"
 
 
 def _within(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> bool:

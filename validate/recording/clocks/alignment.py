@@ -146,7 +146,9 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
     tau = start
     for _ in range(_MAX_STEPS):
         along = np.column_stack([np.ones_like(t), smooth(t + tau)])
-        g = _without(along, slope(t + tau))
+        # x less its least-squares parts along the columns.
+        x = slope(t + tau)
+        g = np.asarray(x - along @ np.linalg.lstsq(along, x, rcond=None)[0])
         left = np.stack([_left(along, x_of(t + tau + x), y) for x in tries])
         falls, at_zero = np.polyfit(tries, left @ g, 1)
         if not falls < 0:
@@ -184,11 +186,6 @@ def correlation_at(reference: Signal, stream: Signal, seconds: float) -> float:
     there = met(known.t, t)
     values = np.interp(t[there], *_distinct(known))
     return float(np.corrcoef(values, seen.y[there, 0])[0, 1])
-
-
-def _without(along: Floats, x: Floats) -> Floats:
-    """x less its least-squares parts along the columns."""
-    return np.asarray(x - along @ np.linalg.lstsq(along, x, rcond=None)[0])
 
 
 def _left(along: Floats, x: Floats, y: Floats) -> Floats:

@@ -147,7 +147,10 @@ def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     i = int(crossings[0])
     flank = np.flatnonzero((level > 0.2) & (level < 0.8))
     if len(flank) < 3 or np.ptp(flank) + 1 != len(flank):
-        return _between(t, level, i)
+        # Where a line from sample i to the next crosses; the step may be anywhere between them.
+        gap = float(t[i + 1] - t[i])
+        part = (0.5 - level[i]) / (level[i + 1] - level[i])
+        return float(t[i] + part * gap), gap / float(np.sqrt(12))
     # Zero of the line through y(t), sd from the larger of the noise and what a cubic leaves.
     t = t[flank]
     y = level[flank] - 0.5
@@ -161,13 +164,6 @@ def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     spread = float(x @ x)
     sd = noise / abs(slope) * float(np.sqrt(1 / len(t) + zero**2 / spread))
     return float(t.mean() + zero), sd
-
-
-def _between(t: Floats, level: Floats, i: int) -> tuple[float, float]:
-    """Where a line from sample i to the next crosses; the step may be anywhere between them."""
-    gap = float(t[i + 1] - t[i])
-    part = (0.5 - level[i]) / (level[i + 1] - level[i])
-    return float(t[i] + part * gap), gap / float(np.sqrt(12))
 
 
 def _onset(t: Floats, y: Floats, unit: str) -> tuple[float, float]:

@@ -80,7 +80,14 @@ def no_stream(path: str, found: Arrays) -> str:
         shared = values.size >= 2 * kinds and not twice
         return told if shared and (all_occur or listed) else ""
     deep = values.dtype == np.uint8 and values.ndim == 3 and min(values.shape) > 1
-    return _volume(path, found) if deep else ""
+    if deep:
+        # By its name, or by a spacing in three directions beside it.
+        three = [n for n, a in found.items() if a.size == 3 and _SPACING.fullmatch(_leaf(n))]
+        if not three and not _VOLUME.fullmatch(_leaf(path)):
+            return ""
+        by = f"{three[0]} has three numbers" if three else "its name says so"
+        return f"a volume ({by}), not images over time; images are read as uint8 (h, w, nt)"
+    return ""
 
 
 def field_at(path: str, found: Arrays) -> FieldColumns | None:
@@ -95,15 +102,6 @@ def field_at(path: str, found: Arrays) -> FieldColumns | None:
 
 def _leaf(path: str) -> str:
     return path.rpartition(".")[2]
-
-
-def _volume(path: str, found: Arrays) -> str:
-    """By its name, or by a spacing in three directions beside it."""
-    three = [n for n, a in found.items() if a.size == 3 and _SPACING.fullmatch(_leaf(n))]
-    if not three and not _VOLUME.fullmatch(_leaf(path)):
-        return ""
-    by = f"{three[0]} has three numbers" if three else "its name says so"
-    return f"a volume ({by}), not images over time; images are read as uint8 (h, w, nt)"
 
 
 # --- Arrays of a file that states neither meaning nor unit, as the streams that a user names.
@@ -208,7 +206,17 @@ def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) ->
     scaled = said.sign * factor * values
     frame = options.get("frame", "matlab")
     if "x" in order:
-        return _markers(key, scaled, order, unit, t, options, frame)
+        if unit != "m":
+            raise UsageError(f"{key}: coordinates in '{unit}'; expected a length, as :mm")
+        whole = np.transpose(scaled, [order.index(c) for c in "tpx" if c in order])
+        whole = whole[..., :3].reshape(
+            whole.shape[0] if "t" in order else 1,
+            -1 if "p" in order else 1,
+            min(whole.shape[-1], 3),
+        )
+        names = tuple(str(i + 1) for i in range(whole.shape[1]))
+        times = _times(key, len(whole), t, options) if "t" in order else np.zeros(1)
+        return Markers(times, names, whole, spread(options), frame)
     y = scaled.reshape(len(scaled), -1) if order[0] == "t" else scaled.T
     times, kept = _times(key, len(y), t, options), ~np.isnan(y).any(axis=1)
     return (
@@ -246,20 +254,6 @@ def _misfit(key: str, shape: tuple[int, ...], nt: int | None) -> str:
         f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, r those and a residual, "
         "c channels; one letter an axis)"
     )
-
-
-def _markers(
-    key: str, x: Floats, order: str, unit: str, t: Floats | None, options: Options, frame: str
-) -> Markers:
-    if unit != "m":
-        raise UsageError(f"{key}: coordinates in '{unit}'; expected a length, as :mm")
-    whole = np.transpose(x, [order.index(c) for c in "tpx" if c in order])
-    whole = whole[..., :3].reshape(
-        whole.shape[0] if "t" in order else 1, -1 if "p" in order else 1, min(whole.shape[-1], 3)
-    )
-    names = tuple(str(i + 1) for i in range(whole.shape[1]))
-    times = _times(key, len(whole), t, options) if "t" in order else np.zeros(1)
-    return Markers(times, names, whole, spread(options), frame)
 
 
 def _times(key: str, count: int, t: Floats | None, options: Options) -> Floats:
@@ -312,7 +306,31 @@ def read_matlab(path: Path, options: Options) -> Recording:
         if key.startswith(AXES) and key.removeprefix(AXES) not in asked:
             raise UsageError(f"--map {key}=...: no stream of that name; {sorted(asked) or 'none'}")
     if asked:
-        streams, used, notes = _named(path, asked, found, options)
+        # The streams that the user names, the paths of their arrays, and what is to be told.
+        if "unit" in options:
+            raise UsageError(
+                "--map unit=...: give the unit with each named array, as --map tip=x.tip:mm"
+            )
+        streams: dict[str, Stream] = {}
+        notes: dict[str, str] = {}
+        said = {key: named_array(key, text, found) for key, text in asked.items()}
+        for key, array in said.items():
+            try:
+                if array.unit == "px":
+                    _require_stream(array.path, found)
+                    streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
+                    continue
+                made = streams[key] = named_stream(key, array, found, options)
+                if isinstance(made, Markers):
+                    _require_stream(array.path, found)
+                if "time" not in options and (field := field_at(array.path, found)):
+                    raise RecordingError(field.refusal(f"an array {found[array.path].shape}"))
+                if note := note_on(key, array, found, made, options):
+                    notes[key] = f"{asked[key]}: {note}"
+            except RecordingError as error:
+                raise RecordingError(f"{path.name}: {array.path}: {error}") from None
+        time = {options["time"].split(":")[0]} if "time" in options else set()
+        used = {array.path for array in said.values()} | time
     else:
         (streams, used), notes = _unnamed(path, found, options), {}
     unread = {
@@ -322,36 +340,6 @@ def read_matlab(path: Path, options: Options) -> Recording:
     }
     told = {"kind": _version(path), **options, **notes}
     return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
-
-
-def _named(
-    path: Path, asked: Options, found: Arrays, options: Options
-) -> tuple[dict[str, Stream], set[str], dict[str, str]]:
-    """The streams that the user names, the paths of their arrays, and what is to be told."""
-    if "unit" in options:
-        raise UsageError(
-            "--map unit=...: give the unit with each named array, as --map tip=x.tip:mm"
-        )
-    streams: dict[str, Stream] = {}
-    notes: dict[str, str] = {}
-    said = {key: named_array(key, text, found) for key, text in asked.items()}
-    for key, array in said.items():
-        try:
-            if array.unit == "px":
-                _require_stream(array.path, found)
-                streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
-                continue
-            made = streams[key] = named_stream(key, array, found, options)
-            if isinstance(made, Markers):
-                _require_stream(array.path, found)
-            if "time" not in options and (field := field_at(array.path, found)):
-                raise RecordingError(field.refusal(f"an array {found[array.path].shape}"))
-            if note := note_on(key, array, found, made, options):
-                notes[key] = f"{asked[key]}: {note}"
-        except RecordingError as error:
-            raise RecordingError(f"{path.name}: {array.path}: {error}") from None
-    time = {options["time"].split(":")[0]} if "time" in options else set()
-    return streams, {array.path for array in said.values()} | time, notes
 
 
 def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Stream], set[str]]:

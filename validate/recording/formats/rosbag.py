@@ -41,6 +41,8 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
 
     Types of their own are named as ROS 2 names them (`sensor_msgs/msg/Image`).
     """
+    from mcap.writer import CompressionType, Writer
+
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         out = Path(folder) / "bag.mcap"
         with _opened(path, Path(folder)) as bag:
@@ -49,7 +51,18 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
             if unknown and not known:
                 first = " of type ".join(unknown[0])
                 raise RecordingError(f"no definition of any of its {len(unknown)} types: {first}")
-            _write(bag, [(c, known[id(c)]) for c in bag.reader.connections if id(c) in known], out)
+            defined = [(c, known[id(c)]) for c in bag.reader.connections if id(c) in known]
+
+            with out.open("wb") as file:
+                writer: Any = Writer(file, compression=CompressionType.NONE)
+                writer.start(profile="ros2", library="rosbags")
+                to = {}
+                for c, text in defined:
+                    schema = writer.register_schema(c.msgtype, "ros2msg", text.encode())
+                    to[c.id, c.topic] = writer.register_channel(c.topic, "cdr", schema)
+                for c, ns, raw in bag.reader.messages([c for c, _ in defined]) if defined else ():
+                    writer.add_message(to[c.id, c.topic], ns, bag.cdr(raw, c.msgtype), ns)
+                writer.finish()
         return {
             "mcap": np.fromfile(out, dtype=np.uint8),
             "undefined": np.array(unknown, dtype=str).reshape(-1, 2),
@@ -104,21 +117,6 @@ def _defined(connection: Any) -> str:
     if connection.msgtype not in store.fielddefs:
         return ""
     return str(store.generate_msgdef(connection.msgtype, ros_version=2)[0])
-
-
-def _write(bag: _Bag, known: list[tuple[Any, str]], out: Path) -> None:
-    from mcap.writer import CompressionType, Writer
-
-    with out.open("wb") as file:
-        writer: Any = Writer(file, compression=CompressionType.NONE)
-        writer.start(profile="ros2", library="rosbags")
-        to = {}
-        for c, text in known:
-            schema = writer.register_schema(c.msgtype, "ros2msg", text.encode())
-            to[c.id, c.topic] = writer.register_channel(c.topic, "cdr", schema)
-        for c, ns, raw in bag.reader.messages([c for c, _ in known]) if known else ():
-            writer.add_message(to[c.id, c.topic], ns, bag.cdr(raw, c.msgtype), ns)
-        writer.finish()
 
 
 _SQLITE, _TABLES = b"SQLite format 3\0", (b"topics", b"messages")

@@ -76,7 +76,15 @@ def _deep(fields: Mapping[str, str]) -> str:
 
 def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any], ...]:
     """Images n x (h, w); none where the sequence has transforms alone."""
-    width, height, count = _sizes(path, fields)
+    # Width, height and count; of four numbers the third is the depth of each image: 1.
+    sizes = _whole(path, fields, "DimSize")
+    if len(sizes) not in (2, 3, 4) or min(sizes) < 0:
+        raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2, 3 or 4 numbers")
+    if len(sizes) == 4 and sizes[2] > 1:
+        raise RecordingError(
+            f"{path.name}: DimSize {sizes}: volumes {sizes[2]} px deep; images (depth 1) are read"
+        )
+    width, height, count = sizes[0], sizes[1], sizes[-1] if len(sizes) > 2 else 1
     if not width * height * count:
         return ()
     # The type of a level, in the file's order of bytes.
@@ -111,18 +119,6 @@ def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any
 
     pixels = np.frombuffer(data, dtype=depth).reshape(count, height, width, channels)
     return tuple(pixels[..., 0] if channels == 1 else luma(pixels))
-
-
-def _sizes(path: Path, fields: dict[str, str]) -> tuple[int, int, int]:
-    """Width, height and count; of four numbers the third is the depth of each image: 1."""
-    sizes = _whole(path, fields, "DimSize")
-    if len(sizes) not in (2, 3, 4) or min(sizes) < 0:
-        raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2, 3 or 4 numbers")
-    if len(sizes) == 4 and sizes[2] > 1:
-        raise RecordingError(
-            f"{path.name}: DimSize {sizes}: volumes {sizes[2]} px deep; images (depth 1) are read"
-        )
-    return sizes[0], sizes[1], sizes[-1] if len(sizes) > 2 else 1
 
 
 def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:

@@ -198,7 +198,10 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
     """
     message = parse(data)
     if schema == IMAGE:
-        return _image(message)
+        if _text(message, "format") != "png":
+            raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
+        ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
+        return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
     names: tuple[str, ...] = ()
     unit = ""
     if schema == MARKERS:
@@ -224,13 +227,6 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
 
 def _number(message: Json, name: str) -> float:
     return float(_array(name, [_field(message, name)], {int, float})[0])
-
-
-def _image(message: Json) -> Sample:
-    if _text(message, "format") != "png":
-        raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
-    ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
-    return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
 
 
 def _picture(message: Json) -> bytes:

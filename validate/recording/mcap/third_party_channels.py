@@ -177,7 +177,12 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
             continue
         for name, whole in _by_size(one.samples):
             topic = f"{one.channel.topic}{name}"
-            samples, gone = _with_numbers(whole)
+            # Without samples that hold NaN, as where a tool was lost; all where none is left.
+            kept = [s for s in whole if s[0].names or not np.isnan(s[0].values).any()]
+            lost = len(whole) - len(kept)
+            samples, gone = (
+                (kept, f"{lost} samples without numbers left out") if kept and lost else (whole, "")
+            )
             why = _why_none([part for part, _, _ in samples], side)
             if why or topic in make:
                 never[topic] = why or "two channels have this topic"
@@ -200,14 +205,6 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
-
-
-def _with_numbers(samples: list[Sample]) -> tuple[list[Sample], str]:
-    """Samples without those of numbers that hold NaN, as where a tool was lost; all where none is
-    left."""
-    kept = [s for s in samples if s[0].names or not np.isnan(s[0].values).any()]
-    gone = len(samples) - len(kept)
-    return (kept, f"{gone} samples without numbers left out") if kept and gone else (samples, "")
 
 
 def _times(samples: Sequence[Sample]) -> tuple[Ints, str]:

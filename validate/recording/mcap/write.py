@@ -88,9 +88,54 @@ def write_channels(
     of an undeclared topic, a time that runs backward or is no int64 nanoseconds, or a path that
     cannot be written.
     """
-    _check(path, channels)
+    topics = [c.topic for c in channels]
+    twice = sorted({t for t in topics if topics.count(t) > 1})
+    if twice:
+        raise RecordingError(f"{path.name}: topics used twice: {twice}; rename one")
+    known: dict[str, MessageSchema] = {}
+    for channel in channels:
+        if known.setdefault(channel.schema.name, channel.schema) != channel.schema:
+            raise RecordingError(
+                f"{path.name}: schema '{channel.schema.name}' of {channel.topic!r} differs from "
+                "that of another topic; rename one schema"
+            )
     with replacing(path) as stream:
-        _write(stream, path.name, channels, messages, metadata)
+        writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        writer.start(profile="", library=LIBRARY)
+        for record, values in metadata.items():
+            writer.add_metadata(record, dict(values))
+        # Channel numbers by topic; a schema shared by topics is written once.
+        numbered = {
+            schema.name: writer.register_schema(schema.name, schema.encoding, schema.data)
+            for schema in {c.schema.name: c.schema for c in channels}.values()
+        }
+        numbers = {
+            c.topic: writer.register_channel(
+                c.topic, ENCODINGS[c.schema.encoding], numbered[c.schema.name], dict(c.metadata)
+            )
+            for c in channels
+        }
+        counts, before = dict.fromkeys(numbers, 0), 0
+        for message in messages:
+            topic, ns = message.topic, message.ns
+            if topic not in numbers:
+                raise RecordingError(
+                    f"{path.name}: topic {topic!r} is not one of {sorted(numbers)}"
+                )
+            if not before <= ns <= LAST_NS:
+                raise RecordingError(
+                    f"{path.name}: {topic!r} at {ns} ns, expected {before} .. {LAST_NS}: put the "
+                    "messages in order of time"
+                )
+            writer.add_message(
+                numbers[topic],
+                log_time=ns,
+                publish_time=ns,
+                sequence=counts[topic],
+                data=message.data,
+            )
+            counts[topic], before = counts[topic] + 1, ns
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 @contextmanager
@@ -109,59 +154,6 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         raise RecordingError(f"{path.name}: cannot be written ({why})") from error
     except UnicodeEncodeError as error:
         raise RecordingError(f"{path.name}: text that is not UTF-8 ({error.reason})") from error
-
-
-def _check(path: Path, channels: Sequence[WrittenChannel]) -> None:
-    topics = [c.topic for c in channels]
-    twice = sorted({t for t in topics if topics.count(t) > 1})
-    if twice:
-        raise RecordingError(f"{path.name}: topics used twice: {twice}; rename one")
-    known: dict[str, MessageSchema] = {}
-    for channel in channels:
-        if known.setdefault(channel.schema.name, channel.schema) != channel.schema:
-            raise RecordingError(
-                f"{path.name}: schema '{channel.schema.name}' of {channel.topic!r} differs from "
-                "that of another topic; rename one schema"
-            )
-
-
-def _write(
-    stream: BinaryIO,
-    name: str,
-    channels: Sequence[WrittenChannel],
-    messages: Iterable[WrittenMessage],
-    metadata: Mapping[str, Mapping[str, str]],
-) -> None:
-    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(profile="", library=LIBRARY)
-    for record, values in metadata.items():
-        writer.add_metadata(record, dict(values))
-    # Channel numbers by topic; a schema shared by topics is written once.
-    numbered = {
-        schema.name: writer.register_schema(schema.name, schema.encoding, schema.data)
-        for schema in {c.schema.name: c.schema for c in channels}.values()
-    }
-    numbers = {
-        c.topic: writer.register_channel(
-            c.topic, ENCODINGS[c.schema.encoding], numbered[c.schema.name], dict(c.metadata)
-        )
-        for c in channels
-    }
-    counts, before = dict.fromkeys(numbers, 0), 0
-    for message in messages:
-        topic, ns = message.topic, message.ns
-        if topic not in numbers:
-            raise RecordingError(f"{name}: topic {topic!r} is not one of {sorted(numbers)}")
-        if not before <= ns <= LAST_NS:
-            raise RecordingError(
-                f"{name}: {topic!r} at {ns} ns, expected {before} .. {LAST_NS}: put the messages "
-                "in order of time"
-            )
-        writer.add_message(
-            numbers[topic], log_time=ns, publish_time=ns, sequence=counts[topic], data=message.data
-        )
-        counts[topic], before = counts[topic] + 1, ns
-    writer.finish()  # type: ignore[no-untyped-call]
 
 
 _SCHEMA_OF = {Markers: MARKERS, Signal: SIGNAL, Contours: CONTOUR, Frames: IMAGE}

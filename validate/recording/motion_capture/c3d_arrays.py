@@ -166,7 +166,19 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         found = ezc3d.c3d(str(path))
         parameters = found["parameters"]
         lies = layout(path, head(path, BLOCK))
-        frames = _count(parameters) if lies.frames == MOST else 0
+        if lies.frames == MOST:
+            # Frames of a long trial as programs tell of them: Vicon's first and last field, of two
+            # words each, else a number beside or in place of the one that counts to 65535.
+            ends = ("START", "END")
+            fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ends]
+            if all(len(words) == 2 for words in fields):
+                begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
+                frames = end - begin + 1
+            else:
+                told = (_values(parameters, "POINT", n) for n in ("LONG_FRAMES", "FRAMES"))
+                frames = max((int(v) for values in told for v in values), default=0)
+        else:
+            frames = 0
         size = path.stat().st_size
         if size < lies.at(frames):
             raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
@@ -229,17 +241,6 @@ def _numbers(parameters: Any, group: str, name: str, many: int) -> NDArray[np.fl
     """The first numbers of a parameter and its continuations; where too few, a scale of 1."""
     held = [float(v) for v in _values(parameters, group, name)][:many]
     return np.array(held + [1.0] * (many - len(held)))
-
-
-def _count(parameters: Any) -> int:
-    """Frames of a long trial as programs tell of them: Vicon's first and last field, of two words
-    each, else a number beside or in place of the one that counts to 65535."""
-    fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ("START", "END")]
-    if all(len(words) == 2 for words in fields):
-        begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
-        return end - begin + 1
-    told = [v for name in ("LONG_FRAMES", "FRAMES") for v in _values(parameters, "POINT", name)]
-    return max((int(v) for v in told), default=0)
 
 
 def _event_names(parameters: Any) -> NDArray[Any]:

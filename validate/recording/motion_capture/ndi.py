@@ -196,7 +196,14 @@ def read_ndi(path: Path, options: Options) -> Recording:
     clock = clock_of_columns(header)
     body = _rows(held, header, [i for i, _ in clock])
     columns = [*(i for tool in tools for i in (*tool.position, *tool.turn)), *(i for i, _ in clock)]
-    values, rows, left = numbers(held, body, _width(header, body), columns)
+    # Columns; those after a name that ends in dots, as of NDI's own sample, go on.
+    last = next((c for c in reversed(header.cells) if c), "")
+    values, rows, left = numbers(
+        held,
+        body,
+        max((len(r.cells) for r in body), default=0) if last.endswith("...") else len(header.cells),
+        columns,
+    )
     whose = _whose(header, rows, tools)
     t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
     stated = tools[0].unit or above.get("units", "")
@@ -262,14 +269,6 @@ def _recording(
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, never)
-
-
-def _width(header: TextRow, body: Sequence[TextRow]) -> int:
-    """Columns; those after a name that ends in dots, as of NDI's own sample, go on."""
-    last = next((c for c in reversed(header.cells) if c), "")
-    return (
-        max((len(r.cells) for r in body), default=0) if last.endswith("...") else len(header.cells)
-    )
 
 
 def _rows(held: TextRows, header: TextRow, clock: Sequence[int]) -> list[TextRow]:

@@ -142,7 +142,13 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     open_end = not any(r.cell(width - 1) for r in body)
     fitting = [one for one in every if over[one] == 0 or (open_end and over[one] == 1)]
     if len(fitting) > 1:
-        timed = _timed(body, rate)
+        # Whether the first two columns of two rows go on as a frame's number and its time do.
+        two = [[as_number(c) for c in r.cells[:2]] for r in body[:2]]
+        cells = [c for row in two for c in row if c is not None]
+        if len(cells) < 4:
+            timed = False
+        else:
+            timed = cells[2] - cells[0] == 1 and abs(cells[3] - cells[1] - 1 / rate) < _ROUNDED
         fitting.sort(key=lambda one: ((one[0] > 0) != timed, over[one]))
     before, each = fitting[0] if fitting else (clock if width > 3 * points else 0, 3)
     width = before + each * len(names)
@@ -255,15 +261,6 @@ def _turned(what: str, columns: Floats) -> Floats:
             f"{off[bad.argmax()]:.3g}); expected the columns of Qualisys 6D, or the file is damaged"
         )
     return np.asarray(R)
-
-
-def _timed(rows: list[TextRow], rate: float) -> bool:
-    """Whether the first two columns of two rows go on as a frame's number and its time do."""
-    two = [[as_number(c) for c in r.cells[:2]] for r in rows[:2]]
-    cells = [c for row in two for c in row if c is not None]
-    if len(cells) < 4:
-        return False
-    return cells[2] - cells[0] == 1 and abs(cells[3] - cells[1] - 1 / rate) < _ROUNDED
 
 
 QUALISYS = Reader(

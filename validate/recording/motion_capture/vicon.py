@@ -179,22 +179,19 @@ def _signals(
     t = np.asarray(values[:, 0] * each + values[:, 1]) / block.rate
     found, gone = {}, list(left)
     frame = options.get("frame", "capture")
-    for i, topic in enumerate(_channels(block, more), start=_BEFORE):
+    # A topic for every column of a device: its name stands above the first of them.
+    device, topics = "device", []
+    for column in range(_BEFORE, block.width):
+        if column < len(block.names) and block.names[column]:
+            device = block.names[column]
+        topics.append(f"analog/{device}.{block.columns[column]}{more}")
+    for i, topic in enumerate(distinct(topics, len(topics)), start=_BEFORE):
         if np.isnan(values[:, i]).any():
             gone.append(f"{topic}: {int(np.isnan(values[:, i]).sum())} blank cells")
             continue
         unit = block.units[i] if i < len(block.units) else ""
         found[topic] = Signal(t, values[:, [i]], unit or "not stated", 0.0, frame)
     return found, {"analog_rate_hz": repr(block.rate), **told_left(gone)}
-
-
-def _channels(block: CsvBlock, more: str) -> tuple[str, ...]:
-    """A topic for every column of a device: its name stands above the first of them."""
-    device, topics = "device", []
-    for i in range(_BEFORE, block.width):
-        device = block.names[i] if i < len(block.names) and block.names[i] else device
-        topics.append(f"analog/{device}.{block.columns[i]}{more}")
-    return distinct(topics, len(topics))
 
 
 def _recognises(path: Path) -> bool:

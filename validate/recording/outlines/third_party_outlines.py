@@ -60,7 +60,16 @@ def foreign_outlines(
     scale = _scale(path, frames, unit)
     at = sorted(found)
     outlines = tuple(found[i] * scale for i in at)
-    _require_inside(path, dict(zip(at, outlines, strict=True)), frames)
+    # No point far off its image: then the unit is another, or the images are.
+    for i, outline in zip(at, outlines, strict=True):
+        places, size = outline / frames.m_per_px, np.array(frames.images[i].shape[1::-1])
+        out = ~np.all((places > -_BEYOND * size) & (places < (1 + _BEYOND) * size), axis=1)
+        if out.any():
+            x, y = places[out][0]
+            raise RecordingError(
+                f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
+                f"{size[0]} x {size[1]}: check the size of the images it was drawn in, and --unit"
+            )
     return Contours(frames.t[at], outlines, sd, frames.pose, frames.frame, images)
 
 
@@ -70,19 +79,6 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
         raise UsageError(f"unit {unit} of {path.name}: expected px, or a unit of length as mm")
     drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
-
-
-def _require_inside(path: Path, outlines: Outlines, frames: Frames) -> None:
-    """No point far off its image: then the unit is another, or the images are."""
-    for i, outline in outlines.items():
-        at, size = outline / frames.m_per_px, np.array(frames.images[i].shape[1::-1])
-        out = ~np.all((at > -_BEYOND * size) & (at < (1 + _BEYOND) * size), axis=1)
-        if out.any():
-            x, y = at[out][0]
-            raise RecordingError(
-                f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
-                f"{size[0]} x {size[1]}: check the size of the images it was drawn in, and --unit"
-            )
 
 
 def _read(path: Path, frames: Frames, label: str) -> Outlines:
@@ -99,9 +95,23 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
             return _table(path)
         if kind == ".json":
             return _polygons(path, files, frames, label)
-        named: Mapping[str, int] = {}
+        named: dict[str, int] = {}
         if kind == ".nrrd":
-            masks, named = _volume(path)
+            # Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image: x first, as it is
+            # stored; the values of regions by name, as 3D Slicer has them.
+            held = decoded("validate.recording.images.nrrd", path)
+            masks: Any = held["pixels"]
+            if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
+                raise RecordingError(
+                    f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) "
+                    "of whole numbers"
+                )
+            texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
+            for key, text in texts.items():
+                name = f"{key.removesuffix('LabelValue')}Name"
+                if key.endswith("LabelValue") and name in texts and text.isdigit():
+                    named[texts[name]] = int(text)
+            masks = masks.T if masks.ndim == 3 else masks.T[None]
         else:
             masks = (
                 [decode_png(read_bytes(file, MAX_FILE)) for file in files]
@@ -177,24 +187,6 @@ def _array(path: Path) -> Any:
     if masks.ndim not in (2, 3):
         raise RecordingError(f"{path.name}: {masks.shape}, expected masks (n, h, w) or (h, w)")
     return masks if masks.ndim == 3 else masks[None]
-
-
-def _volume(path: Path) -> tuple[Any, Mapping[str, int]]:
-    """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored. The
-    values of regions by name, as 3D Slicer has them."""
-    held = decoded("validate.recording.images.nrrd", path)
-    masks = held["pixels"]
-    if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
-        raise RecordingError(
-            f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) of "
-            "whole numbers"
-        )
-    texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
-    values = {k.removesuffix("LabelValue"): v for k, v in texts.items() if k.endswith("LabelValue")}
-    named = {
-        texts[f"{k}Name"]: int(v) for k, v in values.items() if f"{k}Name" in texts and v.isdigit()
-    }
-    return (masks.T if masks.ndim == 3 else masks.T[None]), named
 
 
 def _edge(inside: Any, what: str) -> Floats:

@@ -162,7 +162,17 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
     if start:
         note = f"{start} first rows, from line {table.lines[0]} on, occur twice: they are read once"
         table, times = table.take(range(start, len(rows)), note), times[start:]
-    return table if keep is None else _one_per_time(table, times, keep)
+    if keep is None:
+        return table
+    count = len(times)
+    if keep == "first":
+        kept = [i for i in range(count) if i == 0 or times[i] != times[i - 1]]
+    else:
+        kept = [i for i in range(count) if i == count - 1 or times[i] != times[i + 1]]
+    note = (
+        f"{count - len(kept)} rows left out: the {keep} row of each time is read, as given by --map"
+    )
+    return table.take(kept, note)
 
 
 def _times(table: Table) -> list[float | None] | None:
@@ -176,18 +186,6 @@ def _repeated(rows: Sequence[tuple[str, ...]]) -> int:
         if rows[k] == rows[0] and list(rows[:k]) == list(rows[k : 2 * k]):
             return k
     return 0
-
-
-def _one_per_time(table: Table, times: Sequence[float | None], keep: str) -> Table:
-    count = len(times)
-    if keep == "first":
-        kept = [i for i in range(count) if i == 0 or times[i] != times[i - 1]]
-    else:
-        kept = [i for i in range(count) if i == count - 1 or times[i] != times[i + 1]]
-    note = (
-        f"{count - len(kept)} rows left out: the {keep} row of each time is read, as given by --map"
-    )
-    return table.take(kept, note)
 
 
 # -------------------------------------------------------------------------------------------------
@@ -275,7 +273,15 @@ def _poses(row: Sequence[str]) -> str:
 
 def _blocks(split: Split) -> list[TextBlock]:
     lines, run = split.lines, split.run
-    tops = _tops(lines)
+    # Indices of the lines of names that rows follow: the nearest line of names above each.
+    tops: list[int] = []
+    top = -1
+    for i, (_, cells) in enumerate(lines):
+        if is_names(cells):
+            top = i
+        elif top >= 0 and is_data(cells):
+            tops.append(top)
+            top = -1
     if not tops or tops[0] > run:
         between = {"\t": " <tab> "}.get(split.separator, split.separator)
         raise RecordingError(
@@ -317,19 +323,6 @@ def _blocks(split: Split) -> list[TextBlock]:
     blocks[-1] = replace(blocks[-1], header=blocks[-1].header + above)
     note = (f"tables not used: {'; '.join(small)}",) if small else ()
     return [replace(b, notes=b.notes + note) for b in blocks]
-
-
-def _tops(lines: Sequence[Line]) -> list[int]:
-    """Indices of the lines of names that rows follow: the nearest line of names above each."""
-    tops: list[int] = []
-    names = -1
-    for i, (_, cells) in enumerate(lines):
-        if is_names(cells):
-            names = i
-        elif names >= 0 and is_data(cells):
-            tops.append(names)
-            names = -1
-    return tops
 
 
 def _size(lines: Sequence[Line], tops: Sequence[int], k: int) -> int:

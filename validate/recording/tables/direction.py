@@ -113,7 +113,16 @@ def signs(
             )
         shown = Kind(given, "follows from the sign given by --map") if given else kind
         return Signs(flip_d, flip_f, "sign given by --map", shown)
-    kind = kind or _by_strain(d, f, strain, stress)
+    if not kind:
+        # Compression, where what derives from the test says so: tension is positive by
+        # convention.
+        derived = [p for p in (strain, stress) if p]
+        ways = {excursion(p.values) for p in derived} - {0}
+        names = " and ".join(f"'{p.column.label}'" for p in derived)
+        if ways == {-1} and (d * f >= 0 or len(derived) == 2):
+            kind = Kind(
+                "compression", f"{names} go negative, and tension is positive by convention"
+            )
     if kind is None:
         raise UsageError(
             f"unclear whether compression or tension: '{displacement.column.label}' goes "
@@ -141,19 +150,6 @@ def _reason(d: int, f: int, kind: Kind) -> str:
     if d * f < 0:
         return f"opposite signs in a {kind.name} test"
     return f"{_way(d or f)} as written in a {kind.name} test"
-
-
-def _by_strain(d: int, f: int, strain: Pick | None, stress: Pick | None) -> Kind | None:
-    """Compression, where what derives from the test says so: tension is positive by convention.
-
-    Positive strain tells nothing: many machines write compression so.
-    """
-    derived = [p for p in (strain, stress) if p]
-    ways = {excursion(p.values) for p in derived} - {0}
-    names = " and ".join(f"'{p.column.label}'" for p in derived)
-    if ways == {-1} and (d * f >= 0 or len(derived) == 2):
-        return Kind("compression", f"{names} go negative, and tension is positive by convention")
-    return None
 
 
 def excursion(x: Floats) -> int:

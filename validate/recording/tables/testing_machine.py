@@ -331,9 +331,37 @@ def recording_of(
     picks, made = {role: one.pick for role, one in found.items()}, _made(found)
     kind = kind or next((one.kind for one in made.values() if one.kind), None)
     specimen = with_sizes(specimen, mapping)
-    flips, notes = _checked(table, found, specimen, kind, sizes)
-    time, signals = _signals(picks, flips)
-    stamps = np.round(time * 1e9).astype(np.int64)
+    # All checks; the flips and what the derived columns said.
+    time, displacement, force = (found[role].pick for role in NEEDED)
+    strain, stress = derived_pick("strain", table), derived_pick("stress", table)
+    check_time(time, table.lines)
+    if not made:
+        check_swapped(time, displacement, force, strain, stress)
+    pairs = (
+        (displacement, strain, specimen.get("height_m")),
+        (force, stress, loaded_area(specimen, kind.name if kind else "")),
+    )
+    notes = [
+        check_derived(base, beside, size, table.lines)
+        for base, beside, size in pairs
+        if beside is not None and size is not None and base.role not in made
+    ]
+    if "speed_m_per_s" in specimen and "displacement" not in made:
+        check_speed(time, displacement, specimen["speed_m_per_s"])
+    flips = signs(displacement, force, kind, strain, stress)
+    closing = displacement.values * flips.displacement
+    if "displacement" in made and sizes.length:
+        require_left(made["displacement"], closing, sizes.length)
+    elif "height_m" in specimen:
+        check_height(displacement, closing, specimen["height_m"])
+    t = time.values
+    signals = {
+        "displacement": Signal(
+            t, _column(displacement.values * flips.displacement), "m", 0.0, "machine"
+        ),
+        "force": Signal(t, _column(force.values * flips.force), "N", 0.0, "machine"),
+    }
+    stamps = np.round(t * 1e9).astype(np.int64)
     digest = hashlib.sha256(data).hexdigest()
     origin = {"file": path.name, "sha256": digest, "specimen in file": label}
     shown = {key: repr(value) for key, value in specimen.items()}
@@ -399,49 +427,6 @@ def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:
 
 def _by_sizes(made: Mapping[str, Sized]) -> Record:
     return {"sizes": "; ".join(one.words for one in made.values())} if made else {}
-
-
-def _checked(
-    table: Table,
-    found: Mapping[str, Sized],
-    specimen: Mapping[str, float],
-    kind: Kind | None,
-    sizes: Sizes,
-) -> tuple[Signs, list[str]]:
-    """All checks; the flips and what the derived columns said."""
-    time, displacement, force = (found[role].pick for role in NEEDED)
-    strain, stress = derived_pick("strain", table), derived_pick("stress", table)
-    made = _made(found)
-    check_time(time, table.lines)
-    if not made:
-        check_swapped(time, displacement, force, strain, stress)
-    pairs = (
-        (displacement, strain, specimen.get("height_m")),
-        (force, stress, loaded_area(specimen, kind.name if kind else "")),
-    )
-    notes = [
-        check_derived(base, beside, size, table.lines)
-        for base, beside, size in pairs
-        if beside is not None and size is not None and base.role not in made
-    ]
-    if "speed_m_per_s" in specimen and "displacement" not in made:
-        check_speed(time, displacement, specimen["speed_m_per_s"])
-    flips = signs(displacement, force, kind, strain, stress)
-    closing = displacement.values * flips.displacement
-    if "displacement" in made and sizes.length:
-        require_left(made["displacement"], closing, sizes.length)
-    elif "height_m" in specimen:
-        check_height(displacement, closing, specimen["height_m"])
-    return flips, notes
-
-
-def _signals(picks: Mapping[str, Pick], flips: Signs) -> tuple[Floats, dict[str, Signal]]:
-    t = picks["time"].values
-    d, f = picks["displacement"].values, picks["force"].values
-    return t, {
-        "displacement": Signal(t, _column(d * flips.displacement), "m", 0.0, "machine"),
-        "force": Signal(t, _column(f * flips.force), "N", 0.0, "machine"),
-    }
 
 
 def _column(x: Floats) -> Floats:

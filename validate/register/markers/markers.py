@@ -314,7 +314,12 @@ def observe_markers(
             robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
         )  # fmt: skip
     d = mesh.dimension
-    sds = _along_axes(registration, d)
+    # Noise m along the first d axes of the scene where it differs between directions.
+    if registration.noise is None:
+        sds = ()
+    else:
+        R = registration.transform.R
+        sds = tuple(np.sqrt(np.diag(R @ registration.noise @ R.T))[:d].tolist())
     places = rest[:, :d]
     rows = _rows(mesh, places, sampling, stands)
     if sampling == "barycentric":
@@ -332,14 +337,6 @@ def _rows(mesh: Mesh, places: Floats, sampling: Sampling, stands: float) -> Rows
     if sampling == "nearest_node":
         return nearest_node_rows(mesh, places)
     return (standing_rows if stands else barycentric_rows)(mesh, places)
-
-
-def _along_axes(found: Registration, d: int) -> tuple[float, ...]:
-    """Noise m along the first d axes of the scene where it differs between directions."""
-    if found.noise is None:
-        return ()
-    R = found.transform.R
-    return tuple(np.sqrt(np.diag(R @ found.noise @ R.T))[:d].tolist())
 
 
 def placed_markers(

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.scene.mesh import (
     Mesh,
@@ -45,7 +44,8 @@ def quarter_cylinder(
         np.arange(radial + 1), np.arange(radial + 1), np.arange(axial + 1), indexing="ij"
     )
     ring = np.maximum(i, j)
-    angle = np.pi / 4 * _ratio(np.where(i >= j, j, i), ring)
+    part = np.where(i >= j, j, i)
+    angle = np.pi / 4 * np.asarray(np.divide(part, ring, out=np.zeros(part.shape), where=ring > 0))
     angle = np.where(i >= j, angle, np.pi / 2 - angle)
     corner = diameter / 2 * (1.0 if inscribed else _outside(radial))
     r = corner * (1 - (1 - ring / radial) ** grading)
@@ -75,10 +75,6 @@ def _outside(radial: float) -> float:
     """
     share = 4 * radial / np.pi * np.sin(np.pi / (4 * radial))
     return float(1 / np.sqrt(share))
-
-
-def _ratio(part: Floats, whole: Floats) -> Floats:
-    return np.asarray(np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0))
 
 
 def hexahedral_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:

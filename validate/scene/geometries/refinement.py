@@ -66,7 +66,23 @@ def coarser(mesh: Mesh, times: int = 1) -> Mesh:
             f"a filling with edges of {1e3 * by * edge:.3g} mm has {len(coarse.nodes)} nodes, the "
             f"mesh {len(mesh.nodes)}: its surface has details that need small cells"
         )
-    return Mesh(coarse.nodes, coarse.cells, coarse.kind, _sets(mesh, coarse))
+    # The facet sets of the coarse mesh's surface by their nearest facets on the fine one.
+    count = 4 if mesh.bricks else 3
+    own, surface = mesh.surface[:, :count], coarse.surface
+    centres = mesh.nodes[own].mean(axis=1)
+    _, nearest = KDTree(centres).query(coarse.nodes[surface].mean(axis=1))
+    keys = {tuple(sorted(facet)): i for i, facet in enumerate(own.tolist())}
+    found = {}
+    for name, facets in mesh.facets.items():
+        rows = [keys.get(tuple(sorted(facet))) for facet in facets[:, :count].tolist()]
+        inside = np.zeros(len(own), dtype=bool)
+        inside[[row for row in rows if row is not None]] = True
+        if inside.any():
+            chosen = inside[nearest]
+            if not chosen.any():  # smaller than a facet here
+                chosen[KDTree(coarse.nodes[surface].mean(axis=1)).query(centres[inside])[1]] = True
+            found[name] = surface[chosen]
+    return Mesh(coarse.nodes, coarse.cells, coarse.kind, found)
 
 
 def size_against(own: Mesh, coarse: Mesh) -> float:
@@ -95,26 +111,6 @@ def _filling(points: bytes, triangles: bytes, edge: float, within: float) -> Mes
         kept.parent.mkdir(parents=True, exist_ok=True)
         write_mesh(mesh, kept)
     return mesh
-
-
-def _sets(fine: Mesh, coarse: Mesh) -> dict[str, Ints]:
-    """The facet sets of the coarse mesh's surface by their nearest facets on the fine one."""
-    corners = 4 if fine.bricks else 3
-    own, new = fine.surface[:, :corners], coarse.surface
-    middles = fine.nodes[own].mean(axis=1)
-    _, nearest = KDTree(middles).query(coarse.nodes[new].mean(axis=1))
-    keys = {tuple(sorted(facet)): i for i, facet in enumerate(own.tolist())}
-    found = {}
-    for name, facets in fine.facets.items():
-        rows = [keys.get(tuple(sorted(facet))) for facet in facets[:, :corners].tolist()]
-        inside = np.zeros(len(own), dtype=bool)
-        inside[[row for row in rows if row is not None]] = True
-        if inside.any():
-            chosen = inside[nearest]
-            if not chosen.any():  # smaller than a facet here
-                chosen[KDTree(coarse.nodes[new].mean(axis=1)).query(middles[inside])[1]] = True
-            found[name] = new[chosen]
-    return found
 
 
 # -------------------------------------------------------------------------------------------------

@@ -120,27 +120,23 @@ def read_mesh(path: Path, unit: str | None = None) -> Mesh:
     except RecordingError as error:
         raise SceneError(str(error)) from None
     try:
-        mesh = _mesh(arrays)
+        missing = [name for name in ("kind", "nodes", "cells") if name not in arrays]
+        if missing:
+            raise SceneError(
+                f"no {missing} among its arrays {sorted(arrays)[:8]}; write them: np.savez(FILE, "
+                "kind='tet4', nodes=(n, 3) floats in metres, cells=(e, 4) whole numbers from 0)"
+            )
+        facets = {k.removeprefix(_FACETS): v for k, v in arrays.items() if k.startswith(_FACETS)}
+        for name, a in {"cells": arrays["cells"], **facets}.items():
+            if a.dtype.kind not in "iu":
+                raise SceneError(f"'{name}' holds {a.dtype}, expected integers")
+        if arrays["nodes"].dtype.kind != "f":
+            raise SceneError(f"'nodes' holds {arrays['nodes'].dtype}, expected floats")
+        mesh = Mesh(arrays["nodes"], arrays["cells"], _kind(arrays["kind"]), facets)
         require_positive_cells(mesh)
         return mesh
     except SceneError as error:
         raise SceneError(f"{path.name}: {error}") from error
-
-
-def _mesh(arrays: dict[str, NDArray[Any]]) -> Mesh:
-    missing = [name for name in ("kind", "nodes", "cells") if name not in arrays]
-    if missing:
-        raise SceneError(
-            f"no {missing} among its arrays {sorted(arrays)[:8]}; write them: np.savez(FILE, "
-            "kind='tet4', nodes=(n, 3) floats in metres, cells=(e, 4) whole numbers from 0)"
-        )
-    facets = {k.removeprefix(_FACETS): v for k, v in arrays.items() if k.startswith(_FACETS)}
-    for name, a in {"cells": arrays["cells"], **facets}.items():
-        if a.dtype.kind not in "iu":
-            raise SceneError(f"'{name}' holds {a.dtype}, expected integers")
-    if arrays["nodes"].dtype.kind != "f":
-        raise SceneError(f"'nodes' holds {arrays['nodes'].dtype}, expected floats")
-    return Mesh(arrays["nodes"], arrays["cells"], _kind(arrays["kind"]), facets)
 
 
 def _kind(value: NDArray[Any]) -> Kind:
