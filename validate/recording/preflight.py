@@ -9,7 +9,7 @@ so is a file that stops short, as if its writer was ended; only other damage is 
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -168,7 +168,10 @@ def inspect_recording(path: Path | str) -> Inspection:
     path = Path(path)
     seen = AllSeen()
     with opened(path) as stream:
-        verified = _verified(stream, path, seen)
+        try:
+            verified = verify(stream, path, seen, cut=True)
+        except RecordingError as error:
+            raise no_mcap(path, error) from None
         # Channels without messages, and images whose calibration came after them.
         late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
         seen.channels.update(
@@ -177,6 +180,13 @@ def inspect_recording(path: Path | str) -> Inspection:
         for message in messages_of(stream, verified, late.keys()):
             seen.take(message.channel_id, [message.data])
     found: list[str] = []
+    if (cut := verified.cut) is not None:
+        what = "the file, behind its data," if cut.ended else "the data section"
+        found.append(
+            f"no end of {what}: complete up to byte {cut.at} of {verified.source.bytes}, "
+            f"{verified.messages} messages; the writer was stopped; save them with `validate "
+            f"import {verified.source.path} --recover -o X.mcap`"
+        )
     if verified.claimed_messages not in (None, verified.messages):
         found.append(
             f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
@@ -193,9 +203,10 @@ def inspect_recording(path: Path | str) -> Inspection:
             found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
     names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
     found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
-    defects = [*_cut(verified), *found, *([seen.limit] if seen.limit else [])]
+    if seen.limit:
+        found.append(seen.limit)
     topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
-    return _inspection(verified, topics, [*defects, *_chained(path, verified)])
+    return _inspection(verified, topics, [*found, *_chained(path, verified)])
 
 
 def _chained(path: Path, verified: Verified) -> list[str]:
@@ -206,18 +217,6 @@ def _chained(path: Path, verified: Verified) -> list[str]:
         return list(chain_faults(read_recording(path)))
     except RecordingError:
         return []  # told where it was inspected
-
-
-def _cut(verified: Verified) -> list[str]:
-    cut, source = verified.cut, verified.source
-    if cut is None:
-        return []
-    what = "the file, behind its data," if cut.ended else "the data section"
-    return [
-        f"no end of {what}: complete up to byte {cut.at} of {source.bytes}, {verified.messages} "
-        f"messages; the writer was stopped; save them with `validate import {source.path} "
-        f"--recover -o X.mcap`"
-    ]
 
 
 def _inspection(
@@ -234,7 +233,11 @@ def _inspection(
         metadata=tuple(record.name for record in verified.metadata),
         topics=tuple(topic for topic, _ in topics),
         defects=(*defects, *(line for _, found in topics for line in found)),
-        clock_offsets=tuple(_offset_lines(verified)),
+        clock_offsets=tuple(  # nothing is moved without being shown
+            f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
+            for record in verified.metadata
+            if record.name.startswith(CLOCK_OFFSET)
+        ),
         facts=(
             *_assumed(verified),
             *(
@@ -243,22 +246,6 @@ def _inspection(
             ),
         ),
     )
-
-
-def _verified(stream: BinaryIO, path: Path, seen: AllSeen) -> Verified:
-    try:
-        return verify(stream, path, seen, cut=True)
-    except RecordingError as error:
-        raise no_mcap(path, error) from None
-
-
-def _offset_lines(verified: Verified) -> list[str]:
-    """What `alignment.shift` wrote: nothing is moved without being shown."""
-    return [
-        f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
-        for record in verified.metadata
-        if record.name.startswith(CLOCK_OFFSET)
-    ]
 
 
 def _assumed(verified: Verified) -> list[str]:
@@ -280,29 +267,25 @@ def _topic(
     times = publish if stamps is None else stamps
     clock = clock_of(channel.topic, stamps, publish, log) if len(publish) else None
     first = seen.first if seen else None
+    name = schema.name if schema else ""
+    kind = "foreign" if seen is None else _KINDS.get(name, "foreign")
+    if name == MIRROR and MIRROR_OF in channel.metadata:
+        kind = "mirror"
     topic = Topic(
         name=channel.topic,
-        kind=_kind(channel, schema.name if schema else "", seen),
-        schema=schema.name if schema else "",
+        kind=kind,
+        schema=name,
         schema_encoding=schema.encoding if schema else "",
         message_encoding=channel.encoding,
         count=len(publish),
         first_ns=int(times.min()) if len(times) else None,
         last_ns=int(times.max()) if len(times) else None,
-        unit={SIGNAL: first.unit, IMAGE: "grey level"}.get(schema.name, "m")
-        if schema and first
-        else "",
+        unit={SIGNAL: first.unit, IMAGE: "grey level"}.get(name, "m") if schema and first else "",
         frame=first.frame if first else "",
         clock=clock,
     )
     silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
     return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
-
-
-def _kind(channel: Channel, schema: str, seen: ChannelSeen | None) -> str:
-    if schema == MIRROR and MIRROR_OF in channel.metadata:
-        return "mirror"
-    return "foreign" if seen is None else _KINDS.get(schema, "foreign")
 
 
 def _content(

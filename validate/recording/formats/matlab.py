@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
+from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, MAGIC_73, elements
 from validate.recording.formats.streams import begun, recorded
 from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.reader import (
@@ -270,7 +270,6 @@ def _times(key: str, count: int, t: Floats | None, options: Options) -> Floats:
 
 Variable = NDArray[Any]
 
-_MAGIC_73 = b"MATLAB 7.3"
 _GENERAL = (
     UNIT,
     SD,
@@ -299,7 +298,7 @@ def read_matlab(path: Path, options: Options) -> Recording:
     """
     require_known([key for key, text in options.items() if not text], _GENERAL)
     integrity = _integrity(path)
-    found = _arrays(path)
+    found = decoded("validate.recording.formats.matlab_arrays", path)
     general = {option.name for option in _GENERAL}
     asked = {k: v for k, v in options.items() if k not in general and not k.startswith(AXES)}
     for key in options:
@@ -376,21 +375,11 @@ def _require_stream(name: str, found: Arrays) -> None:
 def held_in(path: Path) -> dict[str, str]:
     """Every array of a MATLAB file with its shape and type, and what is none by its word."""
     _integrity(path)
-    return listing(_arrays(path))
-
-
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    new = head(path, len(_MAGIC_73)) == _MAGIC_73
-    return decoded(
-        "validate.recording.formats.matlab73_arrays"
-        if new
-        else "validate.recording.formats.matlab_arrays",
-        path,
-    )
+    return listing(decoded("validate.recording.formats.matlab_arrays", path))
 
 
 def _version(path: Path) -> str:
-    return head(path, len(_MAGIC_73)).decode("ascii", "replace")
+    return head(path, len(MAGIC_73)).decode("ascii", "replace")
 
 
 def _integrity(path: Path) -> str:
@@ -399,7 +388,7 @@ def _integrity(path: Path) -> str:
         raise RecordingError(
             f"{path}: no such file" if not path.exists() else f"{path}: not a file"
         )
-    if head(path, len(_MAGIC_73)) == _MAGIC_73:
+    if head(path, len(MAGIC_73)) == MAGIC_73:
         return "HDF5 of MATLAB 7.3 keeps no checksum of its numbers: integrity not provable"
     try:
         kinds = [kind for kind, _, _ in elements(path)]
@@ -454,7 +443,7 @@ def _said(what: str, key: str, example: str, options: Options, lacks: str) -> No
 MATLAB = Reader(
     "matlab",
     "MATLAB 5 or 7.3",
-    lambda p: head(p, len(MAGIC)) == MAGIC or head(p, len(_MAGIC_73)) == _MAGIC_73,
+    lambda p: head(p, len(MAGIC)) == MAGIC or head(p, len(MAGIC_73)) == MAGIC_73,
     read_matlab,
     "it begins with 'MATLAB 5.0' or 'MATLAB 7.3'",
     holds=held_in,

@@ -55,18 +55,13 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     stated = [r.cells for r in held.rows if r.cell(0).startswith("#")]
     header = dict(c[0].lstrip("# ").partition(" = ")[::2] for c in stated)
     system = header.get("CoordinateSystem", header.get("coordinateSystem", "0"))
-    names = _columns(stated)
+    named = "# columns = "
+    columns = ((c[0].removeprefix(named), *c[1:]) for c in stated if c[0].startswith(named))
+    names = next(columns, _COLUMNS)
     rows = [r for r in held.rows if any(r.cells) and not r.cell(0).startswith("#")]
     _require_whole(held, rows)
     points = [_point(held, row, names) for row in rows]
     return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
-
-
-def _columns(stated: Sequence[Sequence[str]]) -> Sequence[str]:
-    for cells in stated:
-        if cells[0].startswith("# columns = "):
-            return (cells[0].removeprefix("# columns = "), *cells[1:])
-    return _COLUMNS
 
 
 def _require_whole(held: TextRows, rows: Sequence[TextRow]) -> None:

@@ -186,7 +186,20 @@ def extract_outline(
     border.
     """
     grey = _darkened(image, m_per_px, bright)
-    return _placed(grey, *_first(_walls(grey, centre, radius), bright), shape, bright)
+    refusals = []
+    # The first wall that is closed, apart in grey level and large.
+    for wall, judged in _walls(grey, centre, radius):
+        refusal = _refusal(wall, judged)
+        if not refusal:
+            break
+        refusals.append(refusal)
+    else:
+        raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
+    found = placed(grey, wall, bright)
+    middle, size = _enclosed(found.points)
+    sd = wall_sd(grey, wall)
+    free = Outline(found.points, sd, middle, size, judged.gcnr, judged.closed, found.moved, "free")
+    return free if shape == "free" else _fitted(free, shape, grey)
 
 
 @dataclass(frozen=True)
@@ -236,12 +249,6 @@ def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: b
     plain = image.astype(np.float64)
     dark = 255.0 - plain if bright else plain
     return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
-
-
-def _placed(grey: Grey, wall: Wall, judged: Quality, shape: Shape, bright: bool) -> Outline:
-    found = placed(grey, wall, bright)
-    free = _outline(found.points, wall_sd(grey, wall), judged, found.moved)
-    return free if shape == "free" else _fitted(free, shape, grey)
 
 
 def outlines_of(
@@ -314,17 +321,6 @@ def _walls(
         yield wall, quality(grey, wall)
 
 
-def _first(walls: Iterator[tuple[Wall, Quality]], bright: bool) -> tuple[Wall, Quality]:
-    """The first whose wall is closed, apart in grey level and large."""
-    refusals = []
-    for wall, judged in walls:
-        refusal = _refusal(wall, judged)
-        if not refusal:
-            return wall, judged
-        refusals.append(refusal)
-    raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
-
-
 def _strength(wall: Wall, judged: Quality) -> float:
     return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
 
@@ -363,11 +359,6 @@ def _refusal(wall: Wall, judged: Quality) -> str:
             f"(needs {100 * MIN_CLOSED:g} %); give its rough centre and radius"
         )
     return ""
-
-
-def _outline(points: Floats, sd: float, judged: Quality, moved: float) -> Outline:
-    centre, radius = _enclosed(points)
-    return Outline(points, sd, centre, radius, judged.gcnr, judged.closed, moved, "free")
 
 
 def _enclosed(points: Floats) -> tuple[Floats, float]:

@@ -134,7 +134,9 @@ def signs(
             f"tension test ({kind.why}); {ASK}"
         )
     wanted = 1 if kind.name == "compression" else -1
-    return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, _reason(d, f, kind), kind)
+    written = "opposite signs" if d * f < 0 else f"{_way(d or f)} as written"
+    why = f"{written} in a {kind.name} test"
+    return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, why, kind)
 
 
 def _of_neither(displacement: Pick, force: Pick) -> str:
@@ -144,12 +146,6 @@ def _of_neither(displacement: Pick, force: Pick) -> str:
         return ""
     return ("; a bent or an indented body is neither: give compression if the tool moves into it "
             "and answer experiment = body in `validate new`")  # fmt: skip
-
-
-def _reason(d: int, f: int, kind: Kind) -> str:
-    if d * f < 0:
-        return f"opposite signs in a {kind.name} test"
-    return f"{_way(d or f)} as written in a {kind.name} test"
 
 
 def excursion(x: Floats) -> int:
