@@ -126,7 +126,11 @@ def fit_modulus(
     noise = load_noise(force[: max(count, MIN_SAMPLES)])
     offset, contact = zero_of(d, force, noise, cylinder.height * low)
     strain = (d - contact) / cylinder.height
-    used = _loading(strain, high)
+    # The first loading: samples before the first beyond the window, else to the largest
+    # strain.
+    beyond = strain > high
+    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
+    used = np.arange(len(strain)) < end
     used &= (strain >= low) & (strain <= high)
     low, high = window
     count = int(used.sum())
@@ -291,13 +295,6 @@ def _parabola_start(d: Floats, force: Floats, toe: float) -> float:
         return float(force[:count][d[:count] == d[0]].mean())
     x = (d[:count] - d[0]) / np.ptp(d[:count])
     return float(np.polyfit(x, force[:count], 2)[-1])
-
-
-def _loading(strain: Floats, high: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """The first loading: samples before the first beyond the window, else to the largest strain."""
-    beyond = strain > high
-    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
-    return np.arange(len(strain)) < end
 
 
 def _fit(

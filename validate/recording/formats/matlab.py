@@ -337,7 +337,7 @@ def read_matlab(path: Path, options: Options) -> Recording:
         for name, said in listing(found).items()
         if name not in used
     }
-    told = {"kind": _version(path), **options, **notes}
+    told = {"kind": head(path, len(MAGIC_73)).decode("ascii", "replace"), **options, **notes}
     return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
 
 
@@ -378,10 +378,6 @@ def held_in(path: Path) -> dict[str, str]:
     return listing(decoded("validate.recording.formats.matlab_arrays", path))
 
 
-def _version(path: Path) -> str:
-    return head(path, len(MAGIC_73)).decode("ascii", "replace")
-
-
 def _integrity(path: Path) -> str:
     """What the file's bytes prove; raises `RecordingError` for one that is not whole."""
     if not path.is_file():
@@ -406,18 +402,14 @@ def _stream(path: Path, name: str, values: Variable, options: Options) -> Marker
         if values.dtype == np.uint8 and len(shape) in (2, 3):
             return _frames(f"{path.name}: {name}", values, options)
         if values.dtype.kind in "fiu" and len(shape) == 2 and shape[0] > 1 and shape[1] in (2, 3):
-            return _points(f"{path.name}: {name}", values, options)
+            _said(f"{path.name}: {name}", "unit", "mm", options, "unit of length")
+            unit = length(options, "unit", "mm")
+            names = tuple(str(i + 1) for i in range(len(values)))
+            x = unit * values[None].astype(np.float64)
+            return Markers(np.zeros(1), names, x, spread(options), options.get("frame", "matlab"))
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {name}: {error}") from None
     return None
-
-
-def _points(what: str, values: Variable, options: Options) -> Markers:
-    _said(what, "unit", "mm", options, "unit of length")
-    unit = length(options, "unit", "mm")
-    names = tuple(str(i + 1) for i in range(len(values)))
-    x = unit * values[None].astype(np.float64)
-    return Markers(np.zeros(1), names, x, spread(options), options.get("frame", "matlab"))
 
 
 def _frames(what: str, values: Variable, options: Options) -> Frames:

@@ -59,17 +59,13 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     columns = ((c[0].removeprefix(named), *c[1:]) for c in stated if c[0].startswith(named))
     names = next(columns, _COLUMNS)
     rows = [r for r in held.rows if any(r.cells) and not r.cell(0).startswith("#")]
-    _require_whole(held, rows)
-    points = [_point(held, row, names) for row in rows]
-    return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
-
-
-def _require_whole(held: TextRows, rows: Sequence[TextRow]) -> None:
     cells = [len(r.cells) for r in rows]
     if held.open_end and cells and cells[-1] < max(cells):
         raise RecordingError(
             f"{held.name}: line {rows[-1].line} has {cells[-1]} cells, others {max(cells)}; cut"
         )
+    points = [_point(held, row, names) for row in rows]
+    return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
 
 
 def _point(held: TextRows, row: TextRow, names: Sequence[str]) -> _Point:

@@ -89,7 +89,16 @@ def read_dicom(path: Path, options: Options) -> Recording:
     found = decoded("validate.recording.images.dicom_arrays", path, None, _SECONDS, "dicom")
     images, levels = shallow(list(found["images"]), options)
     height, width = images[0].shape
-    t = _times(path, found, options)
+    count = len(found["images"])
+    if "rate" in options:
+        t = np.arange(count) / above_zero(options, "rate")
+    else:
+        if len(found["t"]) != count:
+            raise UsageError(
+                f"{path.name}: {count} images without times; give --map rate=HZ (a volume is not "
+                "read)"
+            )
+        t = np.asarray(np.rint(1e9 * found["t"]) / 1e9)
     frame = options.get("frame", "image")
     regions, scale = _regions(path, found, options)
     streams: dict[str, Stream] = {}
@@ -106,17 +115,6 @@ def read_dicom(path: Path, options: Options) -> Recording:
     name = path.resolve().name if path.is_dir() else path.stem
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, told)
-
-
-def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
-    count = len(found["images"])
-    if "rate" in options:
-        return np.arange(count) / above_zero(options, "rate")
-    if len(found["t"]) != count:
-        raise UsageError(
-            f"{path.name}: {count} images without times; give --map rate=HZ (a volume is not read)"
-        )
-    return np.asarray(np.rint(1e9 * found["t"]) / 1e9)
 
 
 def _timed(found: Mapping[str, Any], options: Options) -> str:

@@ -251,7 +251,10 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
                                  f"is {MAX_SIDE} per side")  # fmt: skip
     if all(image.dtype == np.uint8 for image in deep):
         return tuple(np.ascontiguousarray(image) for image in deep), AS_IT_IS
-    low, top = _range(deep)
+    # The least and the largest level; a NaN is black.
+    known = [np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=-np.inf) for image in deep]
+    low = float(min(image.min() for image in known))
+    top = float(max(image.max() for image in known))
     if low < 0 or not np.isfinite(top):
         raise RecordingError(f"levels from {low:g} to {top:g}; save them from 0 on")
     white = above_zero(options, "white") if "white" in options else top or 1.0
@@ -259,12 +262,6 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
     said = "entered" if "white" in options else "the largest"
     told = f"{bits} converted to 8: 0 to {white:g} ({said}) became 0 to 255"
     return tuple(_scaled(image, white) for image in deep), told
-
-
-def _range(deep: Sequence[NDArray[Any]]) -> tuple[float, float]:
-    """The least and the largest level; a NaN is black."""
-    known = [np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=-np.inf) for image in deep]
-    return float(min(image.min() for image in known)), float(max(image.max() for image in known))
 
 
 def _scaled(image: NDArray[Any], white: float) -> Pixels:

@@ -86,7 +86,13 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
         )
     try:
         with Image.open(file) as opened:
-            _require_few(opened)
+            # What the pages declare, before any is decoded: packed, they may be small.
+            pages, (width, height) = getattr(opened, "n_frames", 1), opened.size
+            if pages * width * height > MOST:
+                raise RecordingError(
+                    f"{pages} images of {width} x {height} px, more than {MOST} bytes; split the "
+                    "stack"
+                )
             for page in ImageSequence.Iterator(opened):
                 coloured = page.mode not in _GREY
                 plain = page.convert("L") if coloured or page.mode in ("1", "LA") else page
@@ -97,15 +103,6 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
     except Exception as error:  # whatever a codec raises on damage
         why = " ".join(str(error).split())[:150] or type(error).__name__
         raise RecordingError(f"{file.name}: damaged ({why})") from None
-
-
-def _require_few(opened: Any) -> None:
-    """What the pages declare, before any is decoded: packed, they may be small."""
-    pages, (width, height) = getattr(opened, "n_frames", 1), opened.size
-    if pages * width * height > MOST:
-        raise RecordingError(
-            f"{pages} images of {width} x {height} px, more than {MOST} bytes; split the stack"
-        )
 
 
 def _has_colour(page: Any) -> bool:
@@ -206,7 +203,20 @@ def read_image_stack(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path.name}: no image in it")
     images, levels = shallow(deep, options)
     images, lens = straightened(images, options)
-    sides, scale = _sides(path, found, options)
+    if "m_per_px" in options:
+        side = length(options, "m_per_px", "0.1mm")
+        sides, scale = (side, side), f"{options['m_per_px']} (entered)"
+    else:
+        unit = str(found["unit"]) if "unit" in found else ""
+        factor = in_si(1.0, unit, "m") if unit else None
+        if factor is None:
+            raise UsageError(
+                f"{path.name}: has no scale{f' (unit {unit})' if unit else ''}; give it, as "
+                f"--m-per-px 0.1mm{offered(found['dots']) if 'dots' in found else ''}"
+            )
+        x, y = (factor * float(side) for side in found["side"])
+        sides = x, y
+        scale = f"{found['side'][0]:.6g} {unit} per pixel (declared by {found['by']})"
     t, times = _times(path, len(images), found, options)
     topic, frame = options.get("topic", "images"), options.get("frame", "image")
     streams = {
@@ -223,23 +233,6 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     whole = "images keep no common checksum: integrity not provable"
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, said)
-
-
-def _sides(
-    path: Path, found: Mapping[str, Any], options: Options
-) -> tuple[tuple[float, float], str]:
-    if "m_per_px" in options:
-        side = length(options, "m_per_px", "0.1mm")
-        return (side, side), f"{options['m_per_px']} (entered)"
-    unit = str(found["unit"]) if "unit" in found else ""
-    factor = in_si(1.0, unit, "m") if unit else None
-    if factor is None:
-        raise UsageError(
-            f"{path.name}: has no scale{f' (unit {unit})' if unit else ''}; give it, as "
-            f"--m-per-px 0.1mm{offered(found['dots']) if 'dots' in found else ''}"
-        )
-    x, y = (factor * float(side) for side in found["side"])
-    return (x, y), f"{found['side'][0]:.6g} {unit} per pixel (declared by {found['by']})"
 
 
 def _times(

@@ -106,7 +106,12 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     if side is None or side <= 0:
         raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
     rate = above_zero(options, "rate")
-    images, lens = straightened(_images(folder), options)
+    pixels: list[Pixels] = []
+    for file in numbered(folder):
+        pixels.append(_read(file))
+        if sum(image.size for image in pixels) > MAX_STACK:
+            raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
+    images, lens = straightened(tuple(pixels), options)
     # A bare number beyond reason is asked back; one with its unit is meant.
     text = options["m_per_px"]
     height, width = images[0].shape
@@ -158,15 +163,6 @@ def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
     if len(set(sizes)) == 1:
         return {topic: np.arange(len(images))}
     return {f"{topic}_{s}": np.flatnonzero(np.array(sizes) == s) for s in dict.fromkeys(sizes)}
-
-
-def _images(folder: Path) -> tuple[Pixels, ...]:
-    images: list[Pixels] = []
-    for file in numbered(folder):
-        images.append(_read(file))
-        if sum(image.size for image in images) > MAX_STACK:
-            raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
-    return tuple(images)
 
 
 def _read(file: Path) -> Pixels:

@@ -130,7 +130,20 @@ def read_video(path: Path, options: Options) -> Recording:
     `RecordingError` for a file that is cut, damaged, or shorter than it declares, or whose pixels
     are not square.
     """
-    _require_whole(path)
+    # Raises `RecordingError` for a file that ends before its own account of lengths.
+    if not path.is_file():
+        raise RecordingError(f"{path.name}: not a file")
+    size, first = path.stat().st_size, head(path, 12)
+    if _matroska(path):
+        at = _segment_end(path, size)
+    else:
+        at = (
+            (8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8)
+            if first.startswith(b"RIFF")
+            else _last_box(path, size)
+        )
+    if at > size:
+        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
     if "m_per_px" not in options:
         raise UsageError(f"{path.name}: a video has no scale; give it, as --m-per-px 0.1mm")
     every = above_zero({"every": "1", **options}, "every")
@@ -173,23 +186,6 @@ def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> 
     if len(steps) and np.ptp(steps) > _EVEN:
         words = f"from the container, uneven: steps of {steps.min():.3g} to {steps.max():.3g} ms"
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9), words
-
-
-def _require_whole(path: Path) -> None:
-    """Raises `RecordingError` for a file that ends before its own account of lengths."""
-    if not path.is_file():
-        raise RecordingError(f"{path.name}: not a file")
-    size, first = path.stat().st_size, head(path, 12)
-    if _matroska(path):
-        at = _segment_end(path, size)
-    else:
-        at = (
-            (8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8)
-            if first.startswith(b"RIFF")
-            else _last_box(path, size)
-        )
-    if at > size:
-        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
 
 
 def _matroska(path: Path) -> bool:

@@ -207,7 +207,9 @@ def recover(path: Path, out: Path) -> Recovered:
             "missing": _missing(stream, source.bytes, verified.cut, last),
         }
         with replacing(out) as target:
-            _copy(stream, target, verified.cut, _metadata(told))
+            pairs = b"".join(_text(text) for pair in told.items() for text in pair)
+            content = _text(RECORD) + len(pairs).to_bytes(4, "little") + pairs
+            _copy(stream, target, verified.cut, HEAD.pack(Op.METADATA, len(content)) + content)
     counts = {c.topic: len(verified.log_ns[n]) for n, c in verified.channels.items()}
     return Recovered(counts, tuple(f"{key}: {value}" for key, value in told.items()))
 
@@ -230,12 +232,6 @@ def _missing(stream: BinaryIO, size: int, cut: Cut, last: int) -> str:
             f"{(end - last) / 1e9:.6f} s after the last saved message"
         )
     return f"{found}; {after}"
-
-
-def _metadata(told: dict[str, str]) -> bytes:
-    pairs = b"".join(_text(text) for pair in told.items() for text in pair)
-    content = _text(RECORD) + len(pairs).to_bytes(4, "little") + pairs
-    return HEAD.pack(Op.METADATA, len(content)) + content
 
 
 def _text(text: str) -> bytes:

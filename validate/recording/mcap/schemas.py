@@ -208,7 +208,10 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
         names = _field(message, "names")
         if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
             raise RecordingError("field 'names' is not a list of texts")
-        names, values = tuple(names), _points(message)
+        columns = [_numbers(message, axis, null=True) for axis in "xy"]
+        if _field(message, "z") is not None:
+            columns.append(_numbers(message, "z", null=True))
+        names, values = tuple(names), _columns(columns)
         if len(names) != len(values):
             raise RecordingError(f"{len(names)} names for {len(values)} points")
     elif schema == SIGNAL:
@@ -296,13 +299,6 @@ def _array(name: str, values: list[Any], allowed: set[type]) -> Floats:
     if np.isinf(array).any():
         raise RecordingError(f"field '{name}' holds a number beyond float64")
     return array
-
-
-def _points(message: Json) -> Floats:
-    columns = [_numbers(message, axis, null=True) for axis in "xy"]
-    if _field(message, "z") is not None:
-        columns.append(_numbers(message, "z", null=True))
-    return _columns(columns)
 
 
 def _columns(columns: list[Floats]) -> Floats:

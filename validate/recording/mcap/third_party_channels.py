@@ -4,7 +4,7 @@ Of a type that is not known a field becomes a signal by `--map /topic.field.sub=
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -187,7 +187,18 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
             if why or topic in make:
                 never[topic] = why or "two channels have this topic"
                 continue
-            times, unset = _times(samples)
+            # When the samples were measured, ns: by their stamps; where those were never set, which
+            # makes them 0, by when they were published.
+            stamps = np.array(
+                [p if part.ns is None else part.ns for part, p, _ in samples], np.int64
+            )
+            zero = stamps == 0
+            if not zero.any() or 0 < stamps.max() < _DATE:
+                times, unset = stamps, ""
+            else:
+                published = np.array([p for _, p, _ in samples], np.int64)
+                times = np.where(zero, published, stamps)
+                unset = f"{int(zero.sum())} stamps of 0: replaced by the publish time"
             order = np.argsort(times, kind="stable")
             moved = int((order != np.arange(len(order))).sum())
             try:
@@ -205,19 +216,6 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
-
-
-def _times(samples: Sequence[Sample]) -> tuple[Ints, str]:
-    """When the samples were measured, ns: by their stamps; where those were never set, which makes
-    them 0, by when they were published."""
-    stamps = np.array([p if part.ns is None else part.ns for part, p, _ in samples], np.int64)
-    zero = stamps == 0
-    if not zero.any() or 0 < stamps.max() < _DATE:
-        return stamps, ""
-    published = np.array([p for _, p, _ in samples], np.int64)
-    return np.where(
-        zero, published, stamps
-    ), f"{int(zero.sum())} stamps of 0: replaced by the publish time"
 
 
 def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:

@@ -112,7 +112,18 @@ def read_optitrack(path: Path, options: Options) -> Recording:
             R = rotations(pose[seen, 3:], f"{table.held.name}: {name}")
             t = table.values[seen, _TIME]
             poses |= pose_signals(name, t, R, factor * pose[seen, :3], frame)
-    points, zeros = _points(table, factor, spread(options), frame)
+    # Markers by topic, and how many points were three zeros; those of a kind that the file
+    # does not have are left out.
+    sd = spread(options)
+    points: dict[str, Stream] = {}
+    zeros = 0
+    for topic, kinds in _POINTS.items():
+        if columns := table.triples(kinds):
+            names = distinct([name for name, _ in columns], len(columns))
+            x, count = without_zeros(table.values[:, [at for _, at in columns]])
+            x = factor * whole_points(table.held, x, names, table.rows)
+            zeros += count
+            points[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
     streams = {**points, **poses}
     if not streams:
         raise RecordingError(f"{path.name}: neither markers nor poses of bodies: {unread}")
@@ -142,24 +153,6 @@ def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
     values = np.full((len(rows), width), np.nan)
     values[:, kept] = found
     return MotiveTable(held, above[0], above[1], parts, axes, rows, values), left
-
-
-def _points(
-    table: MotiveTable, factor: float, sd: float, frame: str
-) -> tuple[dict[str, Stream], int]:
-    """Markers by topic, and how many points were three zeros; those of a kind that the file does
-    not have are left out."""
-    found: dict[str, Stream] = {}
-    count = 0
-    for topic, kinds in _POINTS.items():
-        points = table.triples(kinds)
-        if points:
-            names = distinct([name for name, _ in points], len(points))
-            x, zeros = without_zeros(table.values[:, [at for _, at in points]])
-            x = factor * whole_points(table.held, x, names, table.rows)
-            count += zeros
-            found[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
-    return found, count
 
 
 OPTITRACK = Reader(

@@ -9,7 +9,6 @@ from validate.errors import RecordingError
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
-    TextRow,
     TextRows,
     as_number,
     numbers,
@@ -62,7 +61,12 @@ def read_trc(path: Path, options: Options) -> Recording:
     if not named:
         raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
     names = distinct(named, len(named))
-    values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
+    # From the first that begins with a number, blank lines apart.
+    body = held.rows[4:]
+    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
+    values, rows, left = numbers(
+        held, [r for r in body[begin:] if any(r.cells)], _BEFORE + 3 * len(names)
+    )
     shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
     x = whole_points(held, shown, names, rows)
     factor, stated = metres(options, header.get("Units", ""), path.name)
@@ -78,13 +82,6 @@ def read_trc(path: Path, options: Options) -> Recording:
     source = source_of(path, "text file: integrity not provable")
     told |= counted | told_zeros(zeros) | told_left(left)
     return recorded(path.stem, source, {"markers": markers}, told)
-
-
-def _rows(held: TextRows) -> list[TextRow]:
-    """From the first that begins with a number, blank lines apart."""
-    body = held.rows[4:]
-    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
-    return [r for r in body[begin:] if any(r.cells)]
 
 
 def _times(

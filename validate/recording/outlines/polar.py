@@ -326,7 +326,14 @@ def candidates(image: Floats, m_per_px: tuple[float, float], most: int = 4) -> l
                 best.append(Candidate(centre, radius * scale, float(score[row, column])))
         found += best
         radius *= _GROWTH
-    return _apart(sorted(found, key=lambda c: -c.score), most)
+    kept: list[Candidate] = []
+    for c in sorted(found, key=lambda c: -c.score):
+        near = (np.linalg.norm(c.centre - k.centre) < 0.5 * max(c.radius, k.radius) for k in kept)
+        if not any(near):
+            kept.append(c)
+        if len(kept) == most:
+            break
+    return kept
 
 
 def scanned(image: Floats) -> Floats:
@@ -339,14 +346,3 @@ def scanned(image: Floats) -> Floats:
     if not outside.any() or outside.all():
         return image
     return np.where(outside, image[~outside].mean(), image)
-
-
-def _apart(found: list[Candidate], most: int) -> list[Candidate]:
-    kept: list[Candidate] = []
-    for c in found:
-        near = (np.linalg.norm(c.centre - k.centre) < 0.5 * max(c.radius, k.radius) for k in kept)
-        if not any(near):
-            kept.append(c)
-        if len(kept) == most:
-            break
-    return kept

@@ -57,14 +57,28 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     text amid the rows, and where no line is a row.
     """
     count = max(i + 1 for i, cell in enumerate(names[1]) if cell)
-    rows, footer = _rows(lines, count)
+    # Rows, and the text lines below the table.
+    rows: list[Line] = []
+    footer: list[Line] = []
+    for line, cells in lines:
+        # A remark below a table (at most key and value); a damaged row is a row, not a remark.
+        if is_remark(cells) and sum(map(bool, cells)) < min(count, 3):
+            footer.append((line, cells))
+            continue
+        if footer:
+            refuse_text(*footer[0])
+        rows.append((line, cells))
     if not rows:
         raise RecordingError(
             f"line {names[0]} names {count} columns, but no row of samples follows; export the "
             f"samples too"
         )
     notes = []
-    beside = _beside(rows, count)
+    # Lines with cells right of the table that cannot be its own: behind a gap, or remarks.
+    right = [(line, cells[count:]) for line, cells in rows if any(cells[count:])]
+    behind = all(not cells[0] for _, cells in right)
+    remarks = all(not looks_numeric(c) and c.lower() not in NOTHING for _, r in right for c in r)
+    beside = [line for line, _ in right] if behind or remarks else []
     if beside:
         notes.append(f"cells right of the table: {len(beside)} rows, first line {beside[0]}")
         rows = [(line, cells[:count]) for line, cells in rows]
@@ -84,35 +98,12 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     return Fitted([(line, cells[:count]) for line, cells in padded], footer, tuple(notes))
 
 
-def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
-    """Rows, and the text lines below the table."""
-    rows: list[Line] = []
-    footer: list[Line] = []
-    for line, cells in lines:
-        # A remark below a table (at most key and value); a damaged row is a row, not a remark.
-        if is_remark(cells) and sum(map(bool, cells)) < min(count, 3):
-            footer.append((line, cells))
-            continue
-        if footer:
-            refuse_text(*footer[0])
-        rows.append((line, cells))
-    return rows, footer
-
-
 def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
     """Raise `RecordingError` for words that stand amid samples."""
     raise RecordingError(
         f"line {line}: text '{' '.join(words).strip()[:60]}' between the rows; export one test "
         f"per file and correct this line"
     )
-
-
-def _beside(rows: Sequence[Line], count: int) -> list[int]:
-    """Lines with cells right of the table that cannot be its own: behind a gap, or remarks."""
-    right = [(line, cells[count:]) for line, cells in rows if any(cells[count:])]
-    behind = all(not cells[0] for _, cells in right)
-    remarks = all(not looks_numeric(c) and c.lower() not in NOTHING for _, r in right for c in r)
-    return [line for line, _ in right] if behind or remarks else []
 
 
 def is_sparse(cells: Sequence[str]) -> bool:
@@ -150,7 +141,11 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
     them. `keep` is the user's: of rows that only share their time the `first` or the `last` is
     used; None leaves them, to be refused. Raises `UsageError` for another `keep`.
     """
-    times = None if time is not None and time.column == "every" else _times(table)
+    if time is not None and time.column == "every":
+        times = None
+    else:
+        column = time_column(table)
+        times = [number(cell, table.decimal) for cell in column.cells] if column else None
     if keep not in (None, "first", "last"):
         raise UsageError(f"--map repeated={keep}: expected first or last")
     if times is None:
@@ -173,11 +168,6 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
         f"{count - len(kept)} rows left out: the {keep} row of each time is read, as given by --map"
     )
     return table.take(kept, note)
-
-
-def _times(table: Table) -> list[float | None] | None:
-    column = time_column(table)
-    return [number(cell, table.decimal) for cell in column.cells] if column else None
 
 
 def _repeated(rows: Sequence[tuple[str, ...]]) -> int:

@@ -168,8 +168,16 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
         ),
         None,
     )
+    # The column that numbers images; one of text is of something else, as a frame's name.
+    at = (i for i, n in enumerate(names) if _FRAMES.fullmatch(n))
     layout = PointLayout(
-        points, time, None, cells, tuple(units), below, frames=_frames(names, below)
+        points,
+        time,
+        None,
+        cells,
+        tuple(units),
+        below,
+        frames=next((i for i in at if all(_is_count(r.cell(i)) for r in below)), None),
     )
     if layout.instant is not None and (whose := _whose(names, layout)) is not None:
         return replace(layout, whose=whose)
@@ -185,12 +193,6 @@ def _is_words(row: TextRow, columns: Sequence[int]) -> bool:
 def _labels(names: Sequence[str]) -> list[int]:
     """The columns that may name the points of a row."""
     return [i for i, n in enumerate(names) if words(n) & _LABELS and not _FRAMES.fullmatch(n)]
-
-
-def _frames(names: Sequence[str], rows: Sequence[TextRow]) -> int | None:
-    """The column that numbers images; one of text is of something else, as a frame's name."""
-    at = (i for i, n in enumerate(names) if _FRAMES.fullmatch(n))
-    return next((i for i in at if all(_is_count(r.cell(i)) for r in rows)), None)
 
 
 def _is_count(cell: str) -> bool:

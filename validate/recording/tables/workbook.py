@@ -136,7 +136,14 @@ def _read(path: Path, options: Options, *, old: bool = False) -> Recording:
         sheets = _sheets(path, options, old)
         sheet = _chosen(sheets, options.get("sheet"))
         label, table = chosen(sheet.tables, said.get("specimen"))
-        return recording_of(path, data, _noted(table, sheet, sheets), said, label, "workbook")
+        others = [f"sheet '{s.name}' not used" for s in sheets if s is not sheet]
+        table = replace(
+            table,
+            encoding=f"sheet '{sheet.name}'",
+            encoding_why="of a workbook",
+            notes=(*table.notes, *others),
+        )
+        return recording_of(path, data, table, said, label, "workbook")
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
     except UsageError as error:
@@ -196,16 +203,6 @@ def _tests(sheets: list[_Sheet], said: str | None) -> list[_Sheet]:
         why = sheets[0].why if sheets else "no sheet"
         raise RecordingError(f"no table in the sheets {names} of this workbook: {why}")
     return tests
-
-
-def _noted(table: Table, used: _Sheet, sheets: list[_Sheet]) -> Table:
-    others = [f"sheet '{s.name}' not used" for s in sheets if s is not used]
-    return replace(
-        table,
-        encoding=f"sheet '{used.name}'",
-        encoding_why="of a workbook",
-        notes=(*table.notes, *others),
-    )
 
 
 def _is_workbook(path: Path) -> bool:

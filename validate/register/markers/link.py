@@ -51,7 +51,13 @@ def local_fit(
     distance, index = (np.asarray(part) for part in both)
     index, distance = index[:, others:], distance[:, others:]
     reach = np.maximum(distance[:, -1:], 1e-300)
-    A = _terms((points[index] - at[:, None]) / reach[..., None], order)
+    # Monomials (..., p) up to `order` of places (..., d).
+    x = (points[index] - at[:, None]) / reach[..., None]
+    d = x.shape[-1]
+    terms = [np.ones(x.shape[:-1]), *np.moveaxis(x, -1, 0)]
+    if order == 2:
+        terms += [x[..., i] * x[..., j] for i in range(d) for j in range(i, d)]
+    A = np.stack(terms, axis=-1)
     y, w = values[index], np.ones(distance.shape)
     for _ in range(3 if robust else 1):
         normal, c = _solved(A, y, w)
@@ -68,15 +74,6 @@ def _solved(A: Floats, y: Floats, w: Floats) -> tuple[Floats, Floats]:
     weighted = (A * w[..., None]).swapaxes(1, 2)
     normal = weighted @ A + _EVEN * np.eye(A.shape[-1])
     return normal, np.asarray(np.linalg.solve(normal, weighted @ y))
-
-
-def _terms(x: Floats, order: int) -> Floats:
-    """Monomials (..., p) up to `order` of places (..., d)."""
-    d = x.shape[-1]
-    terms = [np.ones(x.shape[:-1]), *np.moveaxis(x, -1, 0)]
-    if order == 2:
-        terms += [x[..., i] * x[..., j] for i in range(d) for j in range(i, d)]
-    return np.stack(terms, axis=-1)
 
 
 def noise(points: Floats, values: Floats, neighbours: int = 20) -> tuple[Floats, Floats]:

@@ -162,7 +162,18 @@ class MarkerObservation:
             selection = selection.instants(run)
             samples = selection.samples(self.t, run.t, self.name)
             shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
-            x, error, late = self._seen(np.asarray(selection.t), samples)
+            # Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating
+            # them, and s by which the sample of a hold lies off it: there the body stands, and what
+            # lies between two holds says nothing of them.
+            t = np.asarray(selection.t)
+            if len(t) == 1:
+                x, error = self.x[samples], np.zeros(self.x.shape[2])
+                late = abs(float(self.t[samples][0] - t[0]))
+                late = late if late > SAME else 0.0
+            else:
+                x, squared = interpolated(self.t, self.x.reshape(len(self.t), -1), t)
+                error = np.sqrt(squared.reshape(self.x.shape[1:]).mean(axis=0))
+                x, late = x.reshape(len(t), *self.x.shape[1:]), 0.0
             off = (shown - x).reshape(-1, self.x.shape[2])
             kept = np.isfinite(off).all(axis=1)
             off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
@@ -229,17 +240,6 @@ class MarkerObservation:
                 probe = np.stack([run.traces[f"{name}.{c}"].y for c in _AXES[:d]], axis=1)
                 x[:, j] = self.rest[j] + from_rest(run.t, probe, self.t)
         return x
-
-    def _seen(self, t: Floats, samples: Ints) -> tuple[Floats, Floats, float]:
-        """Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating
-        them, and s by which the sample of a hold lies off it: there the body stands, and what lies
-        between two holds says nothing of them."""
-        if len(t) == 1:
-            late = abs(float(self.t[samples][0] - t[0]))
-            return self.x[samples], np.zeros(self.x.shape[2]), late if late > SAME else 0.0
-        x, squared = interpolated(self.t, self.x.reshape(len(self.t), -1), t)
-        error = np.sqrt(squared.reshape(self.x.shape[1:]).mean(axis=0))
-        return x.reshape(len(t), *self.x.shape[1:]), error, 0.0
 
     def _one(self, run: Simulated, selection: Selection, j: int) -> Deviation | None:
         """One marker's displacement, by the run's probe of its name."""
@@ -321,7 +321,10 @@ def observe_markers(
         R = registration.transform.R
         sds = tuple(np.sqrt(np.diag(R @ registration.noise @ R.T))[:d].tolist())
     places = rest[:, :d]
-    rows = _rows(mesh, places, sampling, stands)
+    if sampling == "nearest_node":
+        rows = nearest_node_rows(mesh, places)
+    else:
+        rows = (standing_rows if stands else barycentric_rows)(mesh, places)
     if sampling == "barycentric":
         require_inside(rows, markers.names, max(stands, _INSIDE))
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
@@ -331,12 +334,6 @@ def observe_markers(
         rms(sds) if sds else registration.expected_sd,
         registration.tre_at(rest), registration, together, sd_t, sds,
     )  # fmt: skip
-
-
-def _rows(mesh: Mesh, places: Floats, sampling: Sampling, stands: float) -> Rows:
-    if sampling == "nearest_node":
-        return nearest_node_rows(mesh, places)
-    return (standing_rows if stands else barycentric_rows)(mesh, places)
 
 
 def placed_markers(

@@ -174,17 +174,6 @@ def find_outliers(
     suspect = (robust**2).sum(axis=1) > limit
     if not suspect.any() or k - suspect.sum() < FEWEST:
         return ()
-    return _judged(names, source, target, suspect, noise, scaled)
-
-
-def _judged(
-    names: Sequence[str],
-    source: Floats,
-    target: Floats,
-    suspect: Mask,
-    noise: float,
-    scaled: bool,
-) -> tuple[Outlier, ...]:
     kept = ~suspect
     transform = least_squares(scaled)(source[kept], target[kept])
     off = transform.apply(source) - target

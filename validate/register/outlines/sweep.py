@@ -70,7 +70,21 @@ def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
     at = _placed(sweep.t, t, positions)
     order = np.argsort(at, kind="stable")
     at, outlines = at[order], tuple(sweep.outlines[i] for i in order)
-    step = _step(at)
+    # The step m between slices at growing positions `at` (n,) m, none missing, none twice.
+    gaps = np.diff(at)
+    step = float(np.median(gaps))
+    near, far = int(gaps.argmin()), int(gaps.argmax())
+    if gaps[near] <= 0.1 * step:
+        raise RegistrationError(
+            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, in "
+            f"steps of {1e3 * step:.2f} mm otherwise; keep one of them"
+        )
+    if gaps[far] > _GAP * step:
+        raise RegistrationError(
+            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, and "
+            f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
+        )
+
     discs = [shapely.Polygon(o) for o in outlines]
     centres = np.array([shapely.get_coordinates(d.centroid)[0] for d in discs])
     radii = np.sqrt([d.area / np.pi for d in discs])
@@ -115,24 +129,6 @@ def _placed(seen: Floats, t: Floats, positions: Floats) -> Floats:
             f"known at {t[0]:.2f}..{t[-1]:.2f} s; record it over the whole sweep"
         )
     return np.asarray(np.interp(seen, t, positions))
-
-
-def _step(at: Floats) -> float:
-    """The step m between slices at growing positions `at` (n,) m, none missing, none twice."""
-    gaps = np.diff(at)
-    step = float(np.median(gaps))
-    near, far = int(gaps.argmin()), int(gaps.argmax())
-    if gaps[near] <= 0.1 * step:
-        raise RegistrationError(
-            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, in "
-            f"steps of {1e3 * step:.2f} mm otherwise; keep one of them"
-        )
-    if gaps[far] > _GAP * step:
-        raise RegistrationError(
-            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, and "
-            f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
-        )
-    return step
 
 
 def sweep_outlines(
