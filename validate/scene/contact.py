@@ -262,7 +262,7 @@ class Indenter:
         if self.shape == "cylinder":
             axis = self._axis(along)
             across = across - np.outer(across @ axis, axis)
-        depth, aside = depth, np.linalg.norm(across, axis=1)
+        aside = np.linalg.norm(across, axis=1)
         flat = self.shape in ("plate", "punch")
         under = aside < self.radius if self.shape != "plate" else np.ones(len(x), bool)
         if not under.any():

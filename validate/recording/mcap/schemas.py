@@ -13,7 +13,8 @@
 `stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
 written in their shortest exact form, so they return bit for bit. Own schemas because the well-
 known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
-(`own_protobuf`), where NaN is a point not seen, no z is points in a plane, and an image is bytes.
+(`protobuf_messages`), where NaN is a point not seen, no z is points in a plane, and an image is
+bytes.
 """
 
 import base64

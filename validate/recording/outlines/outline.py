@@ -1,11 +1,11 @@
 """Outline of an anechoic inclusion in a B-mode image, with uncertainty or a reason for refusal.
 
 No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
-(`discs`), unless a centre and radius are given; the wall is the closed path in polar
-coordinates that best parts two kinds of speckle (`polar`); it is then moved to where half
-of the power is left (`wall`) and judged (`quality`). Refusals rest on numbers that
-do not depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall
-that is closed or lies outside the image.
+(`polar.candidates`), unless a centre and radius are given. The wall is the closed path in polar
+coordinates that best parts two kinds of speckle (`polar.trace`). It is then moved to where half of
+the power is left (`polar.placed`) and judged (`quality`). Refusals rest on numbers that do not
+depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall that is
+closed or lies outside the image.
 
 Limits: the region must be star-shaped about its centroid; regions under about 20 speckles are lost.
 """

@@ -17,10 +17,10 @@ Gosline, Salcudean, Yan, "Haptic simulation of linear elastic media with fluid p
 section 4.5: the undeformed markers are fitted to a plane, then linear least squares compensates
 for rotation and scaling within it.
 
-Step 1: total least squares plane through each set (smallest singular vector of the centred
-points) and the proper rotation that lays the source plane on the target plane. Step 2: with in-
-plane coordinates as complex numbers a (source) and b (target), the linear least squares factor z
-of b = z a is z = a^H b / a^H a : angle arg z, scale |z|.
+Step 1: total least squares plane through each set (smallest singular vector of the centred points)
+and the proper rotation that lays the source plane on the target plane.
+Step 2: with in-plane coordinates as complex numbers a (source) and b (target), the linear least
+squares factor z of  b = z a  is  z = a^H b / a^H a : angle arg z, scale |z|.
 
 A plane has two sides, and only one of the two normals gives the right handedness. `up` declares
 the side; without it the proper rotation with the lower residual of the two is taken. Laying the

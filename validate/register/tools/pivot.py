@@ -68,7 +68,7 @@ def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
     x = R @ tip + T
     points = np.array([x[used][point[used] == k].mean(axis=0) for k in np.unique(point[used])])
     of = np.searchsorted(np.unique(point[used]), point).clip(max=len(points) - 1)
-    points, off = points, np.asarray(x - points[of])
+    off = np.asarray(x - points[of])
     found = Pivot(tip, _sd(R[used], T[used], point[used]), points, off, used, turns)
     travel = rms(_centred(T[used], point[used])) / float(np.sqrt(3))
     if found.rms > _STILL * travel:
