@@ -17,8 +17,8 @@ from validate.pipeline.experiment.experiment import Experiment, Variant
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.runs import Road
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.markers.identity_frame import as_declared
 from validate.register.markers.markers import Together, observe_markers
+from validate.register.markers.quality import as_declared
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.material import Material

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
+from validate.recording.images.image import coverage
 from validate.recording.outlines.outline import extract_outline
-from validate.recording.outlines.raster import coverage
-from validate.register.outlines.distances import normal_distances
+from validate.register.outlines.outlines import normal_distances
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
 LEVELS = (-12.0, -18.0, -24.0, -30.0)  # dB of the inclusion below tissue

@@ -31,7 +31,7 @@ from attacks import damaged
 
 from validate.errors import ValidateError
 from validate.recording.readers import READERS
-from validate.scene.geometries.tetrahedral_filling import SUFFIXES as SURFACES
+from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
 
 SPARSE = 4 * 2**30  # bytes
 BODIES = tuple(f"body {name}" for name in test_bodies_robust.MAKE)

@@ -5,7 +5,7 @@ python docs/format_tables.py
 
 from pathlib import Path
 
-from validate.recording.specification import with_tables
+from validate.recording.readers import with_tables
 
 PAGE = Path(__file__).with_name("formats.md")
 

@@ -20,13 +20,13 @@ from validate.places import (
     why_not,
     write_whole,
 )
-from validate.recording.mcap.channels import (
+from validate.recording.mcap.schemas import to_bytes
+from validate.recording.mcap.write import (
     WrittenChannel,
     WrittenMessage,
     json_schema,
     write_channels,
 )
-from validate.recording.mcap.schemas import to_bytes
 from validate.report.stored.folder import MARK, replace_folder, try_results
 
 

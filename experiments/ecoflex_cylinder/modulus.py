@@ -15,20 +15,20 @@ from validate.arrays import Floats, rms
 from validate.compare.score import Score
 from validate.fem.system import build as build_system
 from validate.identify.budget import Votes, by_specimen
-from validate.identify.law import LawFit, fit_scale
 from validate.identify.modulus import (
     ModulusSummary,
     fit_modulus,
     gent_correction,
 )
 from validate.identify.profile import mesh_share
+from validate.identify.scaled_curve import LawFit, fit_scale
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import CORNER_ORDER, Identified
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree, changed_by
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
-from validate.scene.geometries.similar_grids import member
+from validate.scene.geometries.box import member
 
 from .cylinder import (
     LoggedCylinder,

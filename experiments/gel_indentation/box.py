@@ -17,12 +17,11 @@ from validate.parameters import known, quantity
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
 from validate.register.markers.displacements import DisplacementObservation
-from validate.register.markers.scattered import best_neighbours, local_fit, noise
+from validate.register.markers.link import best_neighbours, local_fit, noise
 from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.geometries.box import grid
-from validate.scene.geometries.similar_grids import member
+from validate.scene.geometries.box import grid, member
 from validate.scene.mesh import Kind, Mesh, quadratic
 from validate.scene.places import Chosen, Labelled, Site, nodes_of
 from validate.scene.scene import DriveShape, Scene

@@ -23,8 +23,7 @@ from validate.errors import RecordingError, UsageError
 from validate.files import read_bytes, read_text
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording, Source
-from validate.register.markers.link import Linked, link
-from validate.register.markers.scattered import local_fit, noise
+from validate.register.markers.link import Linked, link, local_fit, noise
 
 FOLDER = "field/gel-indentation"
 STREAM = "particles"

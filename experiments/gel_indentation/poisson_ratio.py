@@ -20,7 +20,7 @@ from validate.fem.assembly.assemble import stiffness
 from validate.fem.linear_solvers.factor import factorise
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Tree
-from validate.register.markers.scattered import noise
+from validate.register.markers.link import noise
 from validate.scene.material import Material
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene

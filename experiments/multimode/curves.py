@@ -16,8 +16,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.tables.stretch import Curve, read_stretch_stress, signals_of
 from validate.recording.types import Recording
 from validate.register.registration import Registered
-from validate.register.signals import driving
-from validate.register.stresses import StressObservation
+from validate.register.signals import StressObservation, driving
 from validate.scene.meshless import MaterialPoint, StretchMode
 
 from .laws import (

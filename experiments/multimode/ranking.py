@@ -15,7 +15,7 @@ from validate.arrays import Floats, rms
 from validate.pipeline.run.method_run import Followed
 from validate.register.observation import EVERYTHING
 from validate.register.registration import Registered
-from validate.register.stresses import StressObservation
+from validate.register.signals import StressObservation
 from validate.scene.laws import Lost, law_kind, lost_stability
 from validate.scene.meshless import StretchMode
 from validate.solve.static.stretch_test import StretchTest

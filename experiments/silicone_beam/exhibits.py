@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.identify.ringing import Ringing, spectrum
+from validate.identify.recorded_motion import Ringing, spectrum
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.run.method_run import MAIN, Cases, Followed
 

@@ -8,7 +8,7 @@ mass, less with one.
 import numpy as np
 
 from validate.errors import ComparisonError
-from validate.identify.ringing import ringing
+from validate.identify.recorded_motion import ringing
 from validate.parameters import known
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording

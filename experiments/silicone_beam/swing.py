@@ -16,9 +16,8 @@ from scipy.optimize import minimize_scalar
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.ringing import Ringing, ringing
-from validate.register.draws import AnyDraw
-from validate.register.observation import Deviation, Role, Selection, Simulated
+from validate.identify.recorded_motion import Ringing, ringing
+from validate.register.observation import AnyDraw, Deviation, Role, Selection, Simulated
 
 from .recording import over
 

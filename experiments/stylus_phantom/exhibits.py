@@ -16,8 +16,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.types import Recording
 from validate.register.markers.transform import Similarity
-from validate.register.tools.dwell import Dwell
-from validate.register.tools.landmarks import Digitised, TouchedLandmarks
+from validate.register.tools.landmarks import Digitised, Dwell, TouchedLandmarks
 from validate.report.scenes.points import Place, points_picture
 
 from .phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of

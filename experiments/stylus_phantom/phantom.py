@@ -22,8 +22,14 @@ from validate.recording.readers import recognised
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.register.tools.dwell import dwells, sd_of_mean, tip_path
-from validate.register.tools.landmarks import Digitised, TouchedLandmarks, match_landmarks
+from validate.register.tools.landmarks import (
+    Digitised,
+    TouchedLandmarks,
+    dwells,
+    match_landmarks,
+    sd_of_mean,
+    tip_path,
+)
 from validate.scene.meshless import RigidBody
 
 FOLDER = "markers/stylus"

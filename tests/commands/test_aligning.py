@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 from validate.arrays import Floats
 from validate.commands import align as aligning
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks.channels import channel
+from validate.recording.clocks.events import channel
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Markers, Recording, Signal, Source

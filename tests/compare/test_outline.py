@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
-from validate.register.outlines.distances import angular_points, enclosed, normal_distances
+from validate.register.outlines.outlines import angular_points, enclosed, normal_distances
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 orders = pytest.mark.parametrize("order", [[0, 1, 2, 3], [2, 3, 0, 1], [3, 2, 1, 0], [0, 3, 2, 1]])

@@ -11,7 +11,7 @@ import pytest
 
 from validate.fem.laws.law import NeoHooke
 from validate.recording.reader import Reader
-from validate.recording.specification import with_tables
+from validate.recording.readers import with_tables
 from validate.scene.laws import LAWS, LawKind
 from validate.scene.material import Material
 from validate.solve.dynamic.newmark import Newmark

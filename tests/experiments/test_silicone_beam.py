@@ -20,10 +20,8 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.pipeline import compare
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.types import Markers, Recording, Source
-from validate.register.draws import Draw
-from validate.register.observation import Selection
+from validate.recording.types import Markers, Recording, Source, clock_of
+from validate.register.observation import Draw, Selection
 from validate.solve.types import Outcome, Run, Trace
 
 BEAM = "markers/silicone-beam/beam_{}.c3d"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
-from validate.identify.law import fit_scale
+from validate.identify.scaled_curve import fit_scale
 
 CURVE = np.linspace(0, 2, 50) ** 2
 

@@ -19,8 +19,8 @@ from validate.pipeline.plates.choices import Compression
 from validate.pipeline.plates.compression import compression
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.merge import REPEATS, SHARE, repeats_share
 from validate.recording.motion_capture.text_rows import ASSUMED
-from validate.recording.scatter import REPEATS, SHARE, repeats_share
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
 from validate.register.signals import validating

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
-from validate.identify import ringing as module
-from validate.identify.ringing import ringing, spectrum
+from validate.identify import recorded_motion as module
+from validate.identify.recorded_motion import ringing, spectrum
 
 # private: _peak: replaced, to bring a case about.
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
-from validate.identify.budget import IdentifiedValue, dependence
-from validate.identify.residual_pattern import pattern
+from validate.identify.budget import IdentifiedValue, dependence, pattern
 from validate.identify.scaled_curve import (
     UnitCurve,
     fit_modulus_of,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from validate.identify.space import Range, Space
+from validate.identify.least_squares import Range, Space
 
 SPACE = Space((Range("E", 1e3, 1e6), Range("nu", 0.2, 0.5)))
 

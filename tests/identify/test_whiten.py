@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import ComparisonError
-from validate.identify.whiten import whitened
+from validate.identify.least_squares import whitened
 
 
 def test_chi_square_is_that_of_noise_and_what_all_points_share() -> None:

@@ -20,7 +20,7 @@ from validate.pipeline.experiment.tree import Meshes, Tree
 from validate.pipeline.run import cost
 from validate.pipeline.run.cost import fits
 from validate.recording.types import Recording, Source
-from validate.scene.geometries.similar_grids import divided, fitting, member, similarity
+from validate.scene.geometries.box import divided, fitting, member, similarity
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support

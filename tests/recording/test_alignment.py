@@ -9,17 +9,18 @@ import pytest
 from mcap_samples import sample_recording
 
 from validate.errors import RecordingError
-from validate.recording.clocks import lag
+from validate.recording.clocks import alignment
 from validate.recording.clocks.alignment import (
     Offset,
+    _only_peak,
     declared_offset,
     matched,
     offset_by_correlation,
     rebased,
+    refined_lag,
     shift,
 )
 from validate.recording.clocks.events import event_time, offset_by_event
-from validate.recording.clocks.lag import _only_peak, refined_lag
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.preflight import inspect_recording
@@ -272,7 +273,7 @@ def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
 def test_a_grid_of_too_many_samples_is_refused() -> None:
     long = Signal(np.array([0.0, 1.0, 2e4]), np.zeros((3, 1)), "N", 0.0, "machine")
     with pytest.raises(RecordingError, match=r"20000001 samples of 0.001 s.*2097152"):
-        lag._on_grid(long, 1e-3)
+        alignment._on_grid(long, 1e-3)
 
 
 def test_streams_that_do_not_follow_each_other_have_no_best_offset() -> None:

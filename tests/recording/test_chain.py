@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.chain import chain_faults, links, require_chain
 from validate.recording.mcap.write import write_recording
-from validate.recording.motion_capture.poses import pose_signals
+from validate.recording.motion_capture.poses import chain_faults, links, pose_signals, require_chain
 from validate.recording.preflight import inspect_recording
 from validate.recording.readers import read_recording, recognised
 from validate.recording.scales import odd_scales

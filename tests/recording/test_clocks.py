@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.clocks.clock_check import clock_of
+from validate.recording.types import clock_of
 
 
 def _ns(*ms: int) -> np.ndarray:

@@ -22,7 +22,7 @@ from validate.recording.outlines.outline import (
 )
 from validate.recording.outlines.polar import Grey, closed_path, speckle_area
 from validate.recording.types import Frames
-from validate.register.outlines.distances import normal_distances
+from validate.register.outlines.outlines import normal_distances
 from validate.twin.ultrasound import Scanner, Target, b_mode
 
 # private: _fitted: points of a known misfit.

@@ -10,8 +10,8 @@ from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.readers import READERS
 from validate.recording.tables import blocks as repeats
-from validate.recording.tables import encoding, specimen_export
-from validate.recording.tables import stress as sized
+from validate.recording.tables import encoding, workbook
+from validate.recording.tables import specimen_sizes as sized
 from validate.recording.tables.columns import Pick, Said
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
@@ -245,7 +245,7 @@ def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     with pytest.raises(
         UsageError, match=r"--map specimen=.*: x.mcap is .*, which has no specimens"
     ):
-        specimen_export.every_specimen(mcap, tmp_path / "x.mcap", {})
+        workbook.every_specimen(mcap, tmp_path / "x.mcap", {})
     (tmp_path / "a.csv").write_bytes(b"12345")
     monkeypatch.setattr(encoding, "MAX_BYTES", 4)
     with pytest.raises(RecordingError, match=r"a.csv: 5 bytes, the limit is 4"):

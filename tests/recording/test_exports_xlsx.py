@@ -18,9 +18,15 @@ from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
 from validate.recording.formats import subprocess_decoder
 from validate.recording.readers import recognised
-from validate.recording.tables import sheets_arrays, xlsx_arrays
-from validate.recording.tables.specimen_export import every_specimen
-from validate.recording.tables.workbook import _chosen, _Sheet, _tests, read_sheets, read_xlsx
+from validate.recording.tables import workbook
+from validate.recording.tables.workbook import (
+    _chosen,
+    _Sheet,
+    _tests,
+    every_specimen,
+    read_sheets,
+    read_xlsx,
+)
 
 # private: _Sheet, _chosen, _tests: sheets of a known kind.
 
@@ -106,12 +112,12 @@ def test_what_unpacks_to_too_much_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path, Data=TEST)
-    monkeypatch.setattr(xlsx_arrays, "MOST_CELLS", 50)
+    monkeypatch.setattr(workbook, "MOST_CELLS", 50)
     with pytest.raises(RecordingError, match="more than 50 cells"):
-        xlsx_arrays.arrays(path)
-    monkeypatch.setattr(xlsx_arrays, "MOST_BYTES", 100)
+        workbook.arrays(path)
+    monkeypatch.setattr(workbook, "MOST_BYTES", 100)
     with pytest.raises(RecordingError, match="bytes unpacked, the limit is 100"):
-        xlsx_arrays.arrays(path)
+        workbook.arrays(path)
 
 
 def test_without_the_library_the_extra_is_named(
@@ -190,7 +196,7 @@ def test_a_displacement_field_is_no_test(tmp_path: Path) -> None:
 def test_an_old_workbook_that_is_cut_within_a_sector_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.xls").write_bytes(bytes(1000))
     with pytest.raises(RecordingError, match=r"1000 bytes.*size 512: truncated"):
-        sheets_arrays.arrays(tmp_path / "x.xls")
+        workbook.arrays(tmp_path / "x.xls", old=True)
 
 
 def test_a_sheet_that_is_named_and_has_no_table_is_reported() -> None:

@@ -18,18 +18,17 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.images import png_stack
 from validate.recording.images.image import (
     MAX_SIDE,
+    coverage,
     decode_png,
     demosaiced,
     encode_png,
     png_size,
     sampled,
 )
-from validate.recording.images.numbered_files import numbered
-from validate.recording.images.png_stack import read_png_stack
+from validate.recording.images.png_stack import numbered, read_png_stack
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import IMAGE, SCHEMAS
 from validate.recording.mcap.write import write_recording
-from validate.recording.outlines.raster import coverage
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Contours, Frames, Markers, Recording
 

@@ -12,12 +12,12 @@ from PIL import Image, TiffImagePlugin
 
 from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import image_stack, stack_arrays
-from validate.recording.images import packed as raw
+from validate.recording.images import image_stack
 from validate.recording.images.image import MAX_SIDE, shallow
 from validate.recording.images.image_stack import read_image_stack
-from validate.recording.images.packed import RawImage, decode_picture
 from validate.recording.images.video import read_video
+from validate.recording.mcap import known_messages as raw
+from validate.recording.mcap.known_messages import RawImage, decode_picture
 from validate.recording.readers import recognised
 
 # private: _numbers: called alone, case by case.
@@ -255,10 +255,10 @@ def test_images_beyond_all_bytes_of_a_stack_are_refused(
     for i in range(3):
         Image.fromarray(gradient(i).astype(np.uint8)).save(tmp_path / f"{i}.png")
     size = gradient(0).size
-    assert len(stack_arrays.arrays(tmp_path)) >= 4
-    monkeypatch.setattr(stack_arrays, "MOST", 2 * size)
+    assert len(image_stack.arrays(tmp_path)) >= 4
+    monkeypatch.setattr(image_stack, "MOST", 2 * size)
     with pytest.raises(RecordingError, match=f"more than {2 * size} bytes of images; split"):
-        stack_arrays.arrays(tmp_path)
+        image_stack.arrays(tmp_path)
 
 
 def test_rows_of_a_raw_image_that_are_cut_are_refused() -> None:

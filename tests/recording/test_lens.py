@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import lens, lens_arrays
+from validate.recording.images import lens
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.images.png_stack import read_png_stack
 
@@ -143,7 +143,7 @@ def test_images_of_another_size_are_refused_and_the_lens_is_printed(
 def test_another_lens_is_called_by_its_name(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "lens.yaml").write_text(text)
     with pytest.raises(RecordingError, match=says):
-        lens_arrays.arrays(tmp_path / "lens.yaml")
+        lens.arrays(tmp_path / "lens.yaml")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from validate.commands.main import main
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats import (
     matlab,
-    matlab73_arrays,
     matlab_arrays,
 )
 from validate.recording.formats import (
@@ -57,7 +56,6 @@ def _here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> No
     if "command" not in request.node.name and "damaged" not in request.node.name:
         homes = {
             "validate.recording.formats.matlab_arrays": matlab_arrays,
-            "validate.recording.formats.matlab73_arrays": matlab73_arrays,
         }
         monkeypatch.setattr(matlab, "decoded", lambda name, path: homes[name].arrays(path))
 
@@ -385,9 +383,9 @@ def test_times_have_no_sign_and_as_many_samples_as_what_they_tell(
     assert matlab_named._times("force", 4, t, {}) is t
     with h5py.File(tmp_path / "x.mat", "w") as out:
         out["P"] = np.zeros((4, 5))
-    monkeypatch.setattr(matlab73_arrays, "MOST", 19)
+    monkeypatch.setattr(matlab_arrays, "MOST_NUMBERS", 19)
     with pytest.raises(RecordingError, match="20 numbers, the limit is 19; split it"):
-        matlab73_arrays.arrays(tmp_path / "x.mat")
+        matlab_arrays.arrays(tmp_path / "x.mat")
 
 
 def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> None:

@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from validate.errors import RecordingError
-from validate.recording.mcap.channels import (
+from validate.recording.mcap.schemas import to_bytes
+from validate.recording.mcap.write import (
     LAST_NS,
     WrittenChannel,
     WrittenMessage,
     json_schema,
     write_channels,
 )
-from validate.recording.mcap.schemas import to_bytes
 from validate.recording.preflight import inspect_recording
 
 NUMBER = WrittenChannel("/a", json_schema("own.Number", {"type": "object"}), {"unit": "N"})

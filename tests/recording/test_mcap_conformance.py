@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from validate.errors import RecordingError
-from validate.recording.mcap.peek import messages_in
+from validate.recording.mcap.decoders import messages_in
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import Inspection, inspect_recording
 

@@ -24,9 +24,18 @@ from validate.installation import install_command
 from validate.recording.mcap import decoders, known_messages, third_party_channels
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.metadata import by_name
-from validate.recording.mcap.records import HEAD, Channel, Message, Metadata, Schema, records_in
-from validate.recording.mcap.verified_file import Verified, messages_of, opened
+from validate.recording.mcap.records import (
+    HEAD,
+    Channel,
+    Message,
+    Metadata,
+    Schema,
+    Verified,
+    messages_of,
+    opened,
+    records_in,
+)
+from validate.recording.mcap.schemas import by_name
 
 # private: _guarded, _packed, _points, _protobuf: called alone, case by case.
 # private: _ros2: replaced, to bring a case about.

@@ -26,7 +26,7 @@ from PIL import Image
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.mcap import third_party_channels
-from validate.recording.mcap.peek import messages_in
+from validate.recording.mcap.decoders import messages_in
 from validate.recording.mcap.read import read_all
 from validate.recording.preflight import inspect_recording
 

@@ -14,8 +14,8 @@ from mcap.writer import Writer as TheirWriter
 from rosbags.typesys import Stores, get_typestore
 
 from validate.errors import RecordingError
-from validate.recording.chain import chain_faults
 from validate.recording.mcap.read import read_all
+from validate.recording.motion_capture.poses import chain_faults
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 

@@ -12,9 +12,8 @@ from mcap.reader import NonSeekingReader
 from mcap_samples import T0, markers_json, signal_json, write_foreign
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.mcap import recover as module
-from validate.recording.mcap.read import read_recording
-from validate.recording.mcap.recover import recover
+from validate.recording.mcap import read as module
+from validate.recording.mcap.read import read_recording, recover
 from validate.recording.preflight import inspect_recording
 
 # private: _copy: called alone, case by case.

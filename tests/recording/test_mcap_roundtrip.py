@@ -143,7 +143,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     def full(self: object, *_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("validate.recording.mcap.channels.Writer.add_message", full)
+    monkeypatch.setattr("validate.recording.mcap.write.Writer.add_message", full)
     with pytest.raises(RecordingError, match=r"a\.mcap: cannot be written .No space"):
         write_recording(sample_recording(), path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.mcap"]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from validate.errors import RecordingError
-from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
 from validate.recording.mcap.protobuf_messages import protobuf_message, protobuf_schema
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import (
@@ -21,6 +20,7 @@ from validate.recording.mcap.schemas import (
     markers_message,
     signal_message,
 )
+from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Recording
 

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from test_mcap_ros2 import MADE, STORE, same
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats import rosbag_arrays
+from validate.recording.formats import rosbag
 from validate.recording.formats.rosbag import read_bag
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.readers import recognised
@@ -232,7 +232,7 @@ def test_another_missing_key_is_no_missing_definition(
         folder.mkdir()
         with (
             pytest.raises(raised, match=r"topics|types without a definition"),
-            rosbag_arrays._opened(tmp_path / "x.db3", folder),
+            rosbag._opened(tmp_path / "x.db3", folder),
         ):
             pass
 

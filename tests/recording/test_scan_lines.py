@@ -9,9 +9,9 @@ import shapely
 from scan_lines import scanned
 
 from validate.errors import RecordingError
-from validate.recording.outlines.discs import scanned as filled
 from validate.recording.outlines.outline import Outline, extract_outline
-from validate.register.outlines.distances import normal_distances
+from validate.recording.outlines.polar import scanned as filled
+from validate.register.outlines.outlines import normal_distances
 
 
 @cache

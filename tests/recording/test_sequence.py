@@ -8,7 +8,7 @@ import pytest
 from sequences import images, tracked
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import metaimage, nrrd, nrrd_arrays
+from validate.recording.images import metaimage, nrrd
 from validate.recording.images.metaimage import read_metaimage
 from validate.recording.images.nrrd import read_nrrd
 
@@ -178,7 +178,7 @@ def test_a_list_of_indices_is_times_where_they_rise(
     values: str, unit: str, expected: list[float]
 ) -> None:
     header = {"sizes": [3, 4, 4], "axis 0 index values": values, "axis 0 index unit": unit}
-    assert nrrd_arrays._times(header, ["list", "domain", "domain"]).tolist() == expected
+    assert nrrd._times(header, ["list", "domain", "domain"]).tolist() == expected
 
 
 def test_an_nrrd_that_is_cut_in_its_packed_pixels_is_refused(tmp_path: Path) -> None:
@@ -186,9 +186,9 @@ def test_an_nrrd_that_is_cut_in_its_packed_pixels_is_refused(tmp_path: Path) -> 
     packed = packer.compress(bytes(1000)) + packer.flush()
     path = tmp_path / "x.nrrd"
     path.write_bytes(b"NRRD0004\nencoding: gzip\n\n" + packed)
-    nrrd_arrays._require_end(path, 1000)
+    nrrd._require_end(path, 1000)
     with pytest.raises(RecordingError, match="over 999 bytes"):
-        nrrd_arrays._require_end(path, 999)
+        nrrd._require_end(path, 999)
     path.write_bytes(path.read_bytes()[:-5])
     with pytest.raises(RecordingError, match="truncated: its pixels do not end"):
-        nrrd_arrays._require_end(path, 1000)
+        nrrd._require_end(path, 1000)

@@ -8,7 +8,7 @@ import pytest
 import tifffile
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import stack_arrays
+from validate.recording.images import image_stack
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.readers import recognised
 
@@ -52,9 +52,9 @@ def test_pages_that_are_small_packed_are_counted_before_they_are_decoded(
     pages = np.zeros((40, 300, 300), np.uint8)
     tifffile.imwrite(path, pages, photometric="minisblack", compression="zlib")
     assert path.stat().st_size < 40_000
-    monkeypatch.setattr(stack_arrays, "MOST", 2 * 300 * 300)
+    monkeypatch.setattr(image_stack, "MOST", 2 * 300 * 300)
     with pytest.raises(RecordingError, match=r"40 images of 300 x 300 px.*than 180000"):
-        stack_arrays.arrays(path)
+        image_stack.arrays(path)
 
 
 def test_a_big_tiff_that_is_not_read_is_called_so(tmp_path: Path) -> None:

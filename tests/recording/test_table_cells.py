@@ -5,10 +5,10 @@ import re
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.tables import cells, geometry
 from validate.recording.tables import columns as stepped
-from validate.recording.tables.cells import is_data, is_row, is_unit_row
+from validate.recording.tables import specimen_sizes, table
 from validate.recording.tables.columns import Said
+from validate.recording.tables.table import is_data, is_row, is_unit_row
 
 # private: _cells, _number, _step: called alone, case by case.
 
@@ -50,7 +50,7 @@ def test_a_row_of_numbers(cells: tuple[str, ...], row: bool, data: bool) -> None
 
 def test_a_line_that_is_no_csv_is_reported_with_its_length() -> None:
     with pytest.raises(RecordingError, match="140001 characters"):
-        cells._cells("1" * 140_000 + ",", ",")
+        table._cells("1" * 140_000 + ",", ",")
 
 
 @pytest.mark.parametrize(
@@ -64,9 +64,9 @@ def test_a_number_of_a_header_has_either_sign_but_where_it_may_group(
     if expected is None:
         says = f"header: 'width' is '{re.escape(text)}', not a plain number; write it without"
         with pytest.raises(RecordingError, match=says):
-            geometry._number("width", text, decimal)
+            specimen_sizes._number("width", text, decimal)
     else:
-        assert geometry._number("width", text, decimal) == expected
+        assert specimen_sizes._number("width", text, decimal) == expected
 
 
 @pytest.mark.parametrize(

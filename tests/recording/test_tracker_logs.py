@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.options import length
 from validate.recording.motion_capture.ndi import read_ndi
+from validate.recording.reader import length
 from validate.recording.readers import recognised
 from validate.recording.tables.point_table import read_point_table
 from validate.recording.tables.testing_machine import read_instron

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import video, video_arrays
+from validate.recording.images import video
 from validate.recording.images.video import VIDEO, read_video
 
 # private: _last_box, _times: called alone, case by case.
@@ -99,10 +99,10 @@ def test_frames_that_are_small_packed_are_counted_before_they_are_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = film(tmp_path / "x.mp4")
-    monkeypatch.setattr(video_arrays, "MOST", 3 * 64 * 48)
+    monkeypatch.setattr(video, "MOST", 3 * 64 * 48)
     with pytest.raises(RecordingError, match=r"declares 7 frames of 64 x 48.*9216"):
-        video_arrays.arrays(path)
-    assert len(video_arrays.arrays(path, every=3)["images"]) == 3
+        video.arrays(path)
+    assert len(video.arrays(path, every=3)["images"]) == 3
 
 
 def test_a_matroska_file_that_was_cut_is_refused(tmp_path: Path) -> None:
@@ -151,8 +151,8 @@ def test_frames_beyond_all_bytes_of_a_film_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = film(tmp_path / "x.mp4")
-    monkeypatch.setattr(video_arrays, "_require_few", lambda *_: None)
-    monkeypatch.setattr(video_arrays, "MOST", 3 * 48 * 64)
-    assert len(video_arrays.arrays(path, every=3)["images"]) == 3
+    monkeypatch.setattr(video, "_require_few", lambda *_: None)
+    monkeypatch.setattr(video, "MOST", 3 * 48 * 64)
+    assert len(video.arrays(path, every=3)["images"]) == 3
     with pytest.raises(RecordingError, match="64 x 48 beyond 9216 bytes after 4; read"):
-        video_arrays.arrays(path)
+        video.arrays(path)

@@ -6,12 +6,17 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
-from validate.register.markers import anisotropic
-from validate.register.markers.anisotropic import covariance_of, fit_weighted, weighted_covariance
+from validate.register.markers import transform
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import observe_markers
 from validate.register.markers.measures import target_covariance
-from validate.register.markers.transform import Similarity, fit_rigid
+from validate.register.markers.transform import (
+    Similarity,
+    covariance_of,
+    fit_rigid,
+    fit_weighted,
+    weighted_covariance,
+)
 from validate.scene.geometries.box import box
 
 # private: _MOST: replaced by a small number: a short test.
@@ -95,7 +100,7 @@ def test_points_that_already_fit_are_not_turned() -> None:
 
 
 def test_a_fit_that_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(anisotropic, "_MOST", 1)
+    monkeypatch.setattr(transform, "_MOST", 1)
     points = np.random.default_rng(3).normal(size=(5, 3))
     turn = Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix()
     with pytest.raises(RegistrationError, match="did not converge in 1 steps: check"):

@@ -14,18 +14,29 @@ from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
-from validate.register.draws import Draw, Exact, from_rest, shifted
-from validate.register.markers import rest_displacements as from_rest_module
+from validate.register.markers import displacements as from_rest_module
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.markers import MarkerObservation, Together, observe_markers
-from validate.register.observation import EVERYTHING, Observation, Selection, field_at
-from validate.register.outlines.distances import normals, polar_angles, ray_points
-from validate.register.outlines.outlines import OutlineObservation, observe_outlines
+from validate.register.observation import (
+    EVERYTHING,
+    Draw,
+    Exact,
+    Observation,
+    Selection,
+    field_at,
+    from_rest,
+    shifted,
+)
+from validate.register.outlines.outlines import (
+    OutlineObservation,
+    normals,
+    observe_outlines,
+    polar_angles,
+    ray_points,
+)
 from validate.register.outlines.round_outlines import RoundOutlines
-from validate.register.signals import SignalObservation
-from validate.register.stresses import StressObservation
-from validate.register.tools.dwell import Dwell
-from validate.register.tools.landmarks import Digitised, Match, TouchedLandmarks
+from validate.register.signals import SignalObservation, StressObservation
+from validate.register.tools.landmarks import Digitised, Dwell, Match, TouchedLandmarks
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 

@@ -6,8 +6,7 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.register.markers.transform import Similarity
-from validate.register.tools.dwell import _joined, dwells, sd_of_mean, tip_path
-from validate.register.tools.landmarks import match_landmarks
+from validate.register.tools.landmarks import _joined, dwells, match_landmarks, sd_of_mean, tip_path
 
 # private: _joined: spans of a known gap.
 

@@ -19,8 +19,13 @@ from validate.register.observation import (
     frame_at,
     nearest_samples,
 )
-from validate.register.outlines.distances import angular_points
-from validate.register.outlines.outlines import Corner, OutlineObservation, merged, observe_outlines
+from validate.register.outlines.outlines import (
+    Corner,
+    OutlineObservation,
+    angular_points,
+    merged,
+    observe_outlines,
+)
 from validate.register.registration import Registered
 from validate.register.signals import (
     SignalObservation,

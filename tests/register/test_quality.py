@@ -19,10 +19,10 @@ from validate.register.markers.measures import (
     localisation_error,
     looks_mirrored,
     reflection,
+    relabellings,
     robust_noise,
     target_covariance,
 )
-from validate.register.markers.relabel import relabellings
 
 SD = 0.577e-3  # m per axis: the 1 mm of the hand-tracked markers of paper 000
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,7 +8,7 @@ import pytest
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.register.observation import EVERYTHING, Selection
-from validate.register.stresses import StressObservation
+from validate.register.signals import StressObservation
 from validate.solve.types import Trace
 
 T = np.arange(3.0)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.register import Similarity, fit_rigid, fit_two_step
-from validate.register.markers.two_step import fit_plane
+from validate.register.markers.transform import fit_plane
 
 UP = np.array([0.0, 0.0, 1.0])
 

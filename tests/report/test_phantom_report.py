@@ -7,7 +7,7 @@ import pytest
 from report_samples import CHECK, sections_of
 
 from validate.compare.result import Result
-from validate.register.outlines.distances import normal_distances
+from validate.register.outlines.outlines import normal_distances
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.export.tables import shown as read
 from validate.report.sections.observations import outline_seen

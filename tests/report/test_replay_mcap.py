@@ -31,7 +31,7 @@ from validate.installation import install_command
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import inspect_recording
 from validate.recording.types import Frames
-from validate.register.outlines.distances import normal_distances
+from validate.register.outlines.outlines import normal_distances
 from validate.register.outlines.plane import from_image
 from validate.report.replay import mcap as replay_mcap
 from validate.report.replay import signals as replay_signals

@@ -23,10 +23,9 @@ from test_abaqus import body, cae, inp
 
 from validate.commands.main import cli, run
 from validate.errors import SceneError
-from validate.scene.geometries.tetrahedral_filling import SUFFIXES as SURFACES
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Mesh, cell_volumes
-from validate.scene.mesh_files.mesh_file import MAX_BYTES, read_mesh, write_mesh
+from validate.scene.mesh_files.mesh_file import MAX_BYTES, filled, read_mesh, write_mesh
+from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 

@@ -15,10 +15,9 @@ from validate.commands.main import cli
 from validate.errors import SceneError, UsageError, ValidateError
 from validate.scene.body_facts import facts, odd_size, quality
 from validate.scene.geometries.box import grid
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
-from validate.scene.mesh_files import meshio_arrays, third_party_meshes, vtu_series
-from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files import meshio_arrays, third_party_meshes, vtu
+from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 
 # private: _body: called alone, case by case.
@@ -340,7 +339,7 @@ def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]
 def test_a_series_that_is_none_is_refused(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "a.pvd").write_text(text)
     with pytest.raises(ValidateError, match=says):
-        vtu_series.arrays(tmp_path / "a.pvd")
+        vtu.arrays(tmp_path / "a.pvd")
 
 
 def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -352,13 +351,13 @@ def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.M
         points = np.zeros((sizes[path.name], 3))
         return {"points": points, "u": points + int(path.stem)}
 
-    monkeypatch.setattr(vtu_series, "_fields", fields)
-    found = vtu_series.arrays(tmp_path / "a.pvd")
+    monkeypatch.setattr(vtu, "_fields", fields)
+    found = vtu.arrays(tmp_path / "a.pvd")
     assert found["t"].tolist() == [0.0, 1.0]
     assert found["u"][:, 0, 0].tolist() == [0.0, 1.0]
     sizes["1.vtu"] = 5
     with pytest.raises(SceneError, match="files of different numbers of points"):
-        vtu_series.arrays(tmp_path / "a.pvd")
+        vtu.arrays(tmp_path / "a.pvd")
 
 
 @pytest.mark.parametrize(

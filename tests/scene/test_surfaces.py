@@ -11,11 +11,11 @@ import vtk
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.body_facts import quality
-from validate.scene.geometries import tetrahedral_filling as filled_module
 from validate.scene.geometries.box import grid
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import cell_volumes
+from validate.scene.mesh_files import mesh_file as filled_module
 from validate.scene.mesh_files import surface_arrays
+from validate.scene.mesh_files.mesh_file import filled
 from validate.scene.mesh_files.surface_arrays import _oriented, _surface
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 

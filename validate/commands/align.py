@@ -12,10 +12,13 @@ from validate.commands.display import say
 from validate.commands.recordings import written
 from validate.errors import RecordingError, UsageError
 from validate.places import try_file
-from validate.recording.clocks.alignment import Offset, offset_by_correlation
-from validate.recording.clocks.channels import channel
-from validate.recording.clocks.events import offset_by_event
-from validate.recording.clocks.lag import MIN_CORRELATION, correlation_at
+from validate.recording.clocks.alignment import (
+    MIN_CORRELATION,
+    Offset,
+    correlation_at,
+    offset_by_correlation,
+)
+from validate.recording.clocks.events import channel, offset_by_event
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import (
     ClockDrift,

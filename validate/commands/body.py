@@ -9,10 +9,9 @@ from validate.commands.display import say, table
 from validate.errors import SceneError, UsageError
 from validate.places import try_file
 from validate.scene.body_facts import POOR, SAME, facts, largest_side, odd_size, quality
-from validate.scene.geometries.tetrahedral_filling import SUFFIXES as SURFACES
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Mesh, quadratic
-from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
+from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.meshio_arrays import SURFACE
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.mesh_files.third_party_meshes import (

@@ -16,7 +16,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import TRANSLATION
 from validate.recording.readers import read_recording
 from validate.recording.types import Markers
-from validate.register.tools.dwell import dwells
+from validate.register.tools.landmarks import dwells
 from validate.register.tools.pivot import Pivot, pivot
 
 

@@ -23,9 +23,8 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import TRANSLATION
 from validate.recording.readers import read_recording
 from validate.recording.types import Markers, Recording
-from validate.register.tools.dwell import Dwell, dwells, sd_of_mean
 from validate.register.tools.image_plane import KnownTarget
-from validate.register.tools.landmarks import Digitised, match_landmarks
+from validate.register.tools.landmarks import Digitised, Dwell, dwells, match_landmarks, sd_of_mean
 from validate.units import in_si
 
 # --- Tables that were marked by hand, and known places: landmarks, and wires by two places.

@@ -8,7 +8,7 @@ from pathlib import Path
 from validate.commands.arguments import FAILED, OK, Detail, pairs
 from validate.commands.screen import Passage, rows, sentences, show
 from validate.errors import ValidateError
-from validate.recording.mcap.peek import messages_in
+from validate.recording.mcap.decoders import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
 from validate.recording.readers import named, recognised
 from validate.report.sections.motion_words import motion_lines

@@ -10,23 +10,23 @@ from validate.errors import UsageError
 from validate.files import member, members
 from validate.identify.repeats import averaged, labels_of
 from validate.places import try_file
-from validate.recording.chain import require_chain
 from validate.recording.clocks.alignment import declared_offset, shift
-from validate.recording.formats.unsupported_formats import known_unread
 from validate.recording.images.image import AS_IT_IS
-from validate.recording.mcap.recover import recover
+from validate.recording.mcap.read import recover
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import merge
+from validate.recording.motion_capture.poses import require_chain
 from validate.recording.motion_capture.text_rows import ASSUMED, LEFT_OUT, ZEROS
 from validate.recording.readers import (
     READERS,
+    known_unread,
     named,
     read_recording,
     recognised,
     recognises,
 )
 from validate.recording.scales import odd_scales
-from validate.recording.tables.specimen_export import ALL, every_specimen
+from validate.recording.tables.workbook import ALL, every_specimen
 from validate.recording.types import Recording
 
 _NAMED = 6  # streams or fields that are named one by one

@@ -4,8 +4,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import UsageError
-from validate.recording.formats.options import length
 from validate.recording.motion_capture.poses import ROTATION, TRANSLATION
+from validate.recording.reader import length
 from validate.recording.types import Recording
 
 

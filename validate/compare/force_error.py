@@ -11,7 +11,7 @@ from validate.compare.score import Score
 from validate.compare.shapes.metric import Counted, Metric
 from validate.compare.track import TRACK_METRICS, TrackError, rmse
 from validate.errors import ComparisonError, RecordingError
-from validate.recording.clocks.lag import coarse_lag, met, refined_lag, step_of
+from validate.recording.clocks.alignment import coarse_lag, met, refined_lag, step_of
 from validate.recording.types import Signal
 
 # --- A force that a device holds from tick to tick, against the true one that changes all the

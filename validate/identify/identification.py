@@ -17,10 +17,9 @@ from scipy.special import chdtri
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.least_squares import Fit, Residual, fit
+from validate.identify.least_squares import Fit, Residual, Space, fit
 from validate.identify.profile import RISE, Side, side
 from validate.identify.scaled_curve import linear_fit, linear_side
-from validate.identify.space import Space
 
 FACTOR = 2.0  # between the ends of an interval: wider is not identified
 SHARE = 0.5  # of the range searched, where a factor says nothing

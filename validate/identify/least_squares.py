@@ -1,17 +1,94 @@
-"""Bounded least squares of an expensive residual: scipy's trust region with few calls.
+"""Bounded least squares of an expensive residual in a search box, with whitened residuals.
 
 The Jacobian is taken by differences once and then follows the steps (Broyden 1965); where the
 optimiser stops it is taken anew, and what that promises decides whether the end is one.
+
+Whitening of residuals: r -> C^(-1/2) r, C = sd^2 I + s^2 1 1^T.
+
+What all points of one component share (registration, a clock) is one number of covariance s^2
+between any two of them: many points do not average it out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from validate.arrays import Floats
-from validate.errors import ComparisonError, ValidateError
+from validate.errors import ComparisonError, UsageError, ValidateError
+
+DECADE = 10.0  # bounds further apart than this factor are searched on a logarithmic scale
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter searched from `low` to `high`, in its own unit."""
+
+    name: str
+    low: float
+    high: float
+
+    @property
+    def logarithmic(self) -> bool:
+        return self.low > 0 and self.high / self.low > DECADE
+
+
+@dataclass(frozen=True)
+class Space:
+    """p parameters; coordinates x (p,) from 0 at `low` to 1 at `high`."""
+
+    ranges: tuple[Range, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(r.name for r in self.ranges)
+
+    def value(self, i: int, x: float) -> float:
+        """Parameter i at a coordinate, in its own unit, never beyond its bounds."""
+        r = self.ranges[i]
+        x = min(max(x, 0.0), 1.0)
+        return r.low * (r.high / r.low) ** x if r.logarithmic else r.low + x * (r.high - r.low)
+
+    def values(self, x: Floats) -> tuple[float, ...]:
+        return tuple(self.value(i, float(xi)) for i, xi in enumerate(x))
+
+    def coordinates(self, values: Sequence[float]) -> Floats:
+        """Where values (p,) lie, as `values` has them."""
+        pairs = zip(self.ranges, values, strict=True)
+        return np.array([
+            np.log(v / r.low) / np.log(r.high / r.low) if r.logarithmic
+            else (v - r.low) / (r.high - r.low)
+            for r, v in pairs
+        ])  # fmt: skip
+
+    def slope(self, i: int, x: float) -> float:
+        """d value / d coordinate of parameter i there."""
+        r = self.ranges[i]
+        if r.logarithmic:
+            return self.value(i, x) * float(np.log(r.high / r.low))
+        return r.high - r.low
+
+    def starts(self, count: int, seed: int = 1) -> Floats:
+        """(count, p): the middle, then a seeded Latin hypercube (McKay, Beckman & Conover 1979).
+
+        Raises `UsageError` for no start.
+        """
+        if count < 1:
+            raise UsageError(
+                f"--seeds {count}: expected at least one start; ten or more for a reliable result"
+            )
+        p = len(self.ranges)
+        # Points (n, p), one in each n-th of every axis; those of `scipy.stats.qmc`, whose import
+        # costs more than most fits.
+        n = count - 1
+        draw = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+        within = draw.uniform(size=(n, p))
+        parts = np.tile(np.arange(1, n + 1), (p, 1))
+        for row in parts:
+            draw.shuffle(row)
+        return np.vstack([np.full((1, p), 0.5), np.asarray((parts.T - within) / max(n, 1))])
+
 
 Residual = Callable[[Floats], Floats]  # x (p,) from 0 to 1 -> (m,), independent, of variance one
 At = Callable[[Floats], Floats]  # coordinates that move -> all of them
@@ -184,3 +261,28 @@ def fit(residual: Residual, start: Floats) -> Fit:
     found = r(x)
     why = "" if converged else r.failure or f"still falling after {r.calls} evaluations"
     return Fit(start, x, float(found @ found), len(found), J.T @ J, r.calls, converged, why)
+
+
+def whitened(
+    values: Floats, sd: float, systematic: float, freedom: int | None = None, name: str = "residual"
+) -> Floats:
+    """Of values (k, c): k c numbers, component by component.
+
+    C^(-1/2) is 1/sd across the mean of a component and 1/sqrt(sd^2 + k s^2) along it. `freedom`
+    below k c counts the independent numbers: sd then grows so that they weigh no more than these.
+    A sensor whose noise is not stated (`sd` 0) is taken to differ between points by as much as they
+    share, which widens and never narrows. Raises `ComparisonError` where both are 0.
+    """
+    k, c = values.shape
+    sd = systematic if sd == 0 and k > 1 else sd
+    if freedom is not None and 0 < freedom < k * c:
+        sd = sd * float(np.sqrt(k * c / freedom))
+    along = float(np.sqrt(sd**2 + k * systematic**2))
+    if along == 0:
+        raise ComparisonError(
+            f"{name}: {k} values with a standard deviation of {sd:g} have infinite weight; "
+            "declare the noise of the sensor"
+        )
+    mean = values.mean(axis=0)
+    across = (values - mean) / sd if k > 1 else np.zeros_like(values)
+    return np.asarray((across + mean / along).ravel(order="F"))

@@ -120,12 +120,26 @@ def fit_modulus(
     cylinder = cylinder or cylinder_of(recording)
     log = loading(recording, test)
     d, force = log.d, log.force
-    noise = _first_noise(d, force, cylinder.height * high)
+    # Noise of the log's first part, up to `reach` (m) from its first displacement.
+    beyond = d - d[0] > (cylinder.height * high)
+    count = int(np.argmax(beyond)) if beyond.any() else len(d)
+    noise = load_noise(force[: max(count, MIN_SAMPLES)])
     offset, contact = zero_of(d, force, noise, cylinder.height * low)
     strain = (d - contact) / cylinder.height
-    used = _loading(strain, high)
+    # The first loading: samples before the first beyond the window, else to the largest
+    # strain.
+    beyond = strain > high
+    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
+    used = np.arange(len(strain)) < end
     used &= (strain >= low) & (strain <= high)
-    _check_cover(recording.name, strain, used, window)
+    low, high = window
+    count = int(used.sum())
+    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
+        raise RecordingError(
+            f"{recording.name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} "
+            f"samples in the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose "
+            "another"
+        )
     return _fit(recording.name, strain[used], force[used], cylinder.area, offset, contact, window)
 
 
@@ -244,13 +258,6 @@ def _samples(recording: Recording, topic: str, unit: str) -> Signal:
     return found
 
 
-def _first_noise(d: Floats, force: Floats, reach: float) -> float:
-    """Noise of the log's first part, up to `reach` (m) from its first displacement."""
-    beyond = d - d[0] > reach
-    count = int(np.argmax(beyond)) if beyond.any() else len(d)
-    return load_noise(force[: max(count, MIN_SAMPLES)])
-
-
 def zero_of(d: Floats, force: Floats, noise: float, toe: float) -> tuple[float, float]:
     """Force offset (N) and contact displacement (m).
 
@@ -288,28 +295,6 @@ def _parabola_start(d: Floats, force: Floats, toe: float) -> float:
         return float(force[:count][d[:count] == d[0]].mean())
     x = (d[:count] - d[0]) / np.ptp(d[:count])
     return float(np.polyfit(x, force[:count], 2)[-1])
-
-
-def _loading(strain: Floats, high: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """The first loading: samples before the first beyond the window, else to the largest strain."""
-    beyond = strain > high
-    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
-    return np.arange(len(strain)) < end
-
-
-def _check_cover(
-    name: str,
-    strain: Floats,
-    used: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    window: tuple[float, float],
-) -> None:
-    low, high = window
-    count = int(used.sum())
-    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
-        raise RecordingError(
-            f"{name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} samples in "
-            f"the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose another"
-        )
 
 
 def _fit(

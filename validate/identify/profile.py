@@ -145,7 +145,14 @@ class _Outwards:
             x[self._i], x[self._others] = xi, y
             return x
 
-        y = self._guess(xi)
+        # On the line through the nearest two points, at first on the tangent at the best.
+        near = sorted(self._known, key=lambda known: abs(known[0] - xi))
+        (a, ya) = near[0]
+        if len(near) == 1:
+            y = np.clip(ya + self._slope * (xi - a), 0.0, 1.0)
+        else:
+            b, yb = near[1]
+            y = np.clip(ya + (yb - ya) * (xi - a) / (b - a), 0.0, 1.0)
         if self._others:
             y, self._J = followed(self._r, at, y, self._J)
         found = self._r(at(y))
@@ -154,15 +161,6 @@ class _Outwards:
         if rise < self.lowest[0]:
             self.lowest = rise, at(y)
         return rise
-
-    def _guess(self, xi: float) -> Floats:
-        """On the line through the nearest two points, at first on the tangent at the best."""
-        near = sorted(self._known, key=lambda known: abs(known[0] - xi))
-        (a, ya) = near[0]
-        if len(near) == 1:
-            return np.clip(ya + self._slope * (xi - a), 0.0, 1.0)
-        b, yb = near[1]
-        return np.clip(ya + (yb - ya) * (xi - a) / (b - a), 0.0, 1.0)
 
 
 def _next(at: Floats, rise: Floats, wanted: float, reach: float, room: float) -> float:

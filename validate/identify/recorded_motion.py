@@ -1,23 +1,111 @@
-"""Motion of a recording: amplitude, direction, frequencies, rest intervals, gaps.
+"""Motion of a recording: amplitude, direction, frequencies and decay, rest intervals, gaps.
 
 The motion is that of the marker that moves most, along the direction in which it moves most (the
-first principal axis of its displacements); of outlines that of places at every 10 degrees about the
-centroid, along their normals; of a signal that of its channels. From it and the body's first
-natural frequency follows whether inertia matters: statics answers at once, and is off by
-(f / f_1)^2 of what moves at f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first
+first principal axis of its displacements); of outlines that of places at every 10 degrees about
+the centroid, along their normals; of a signal that of its channels. From it and the body's first
+natural frequency follows whether inertia matters: statics answers at once, and is off by (f /
+f_1)^2 of what moves at f (Clough & Penzien 1993, eq. 3-14): by a tenth at a third of the first
 mode.
+
+Frequency and damping of a free decay, by separable least squares.
+
+y = a + b t + c t^2 + exp(-d t) (p cos w t + s sin w t): the five factors are linear and solved
+for at every w and d (variable projection, Golub & Pereyra 1973), so that only two are searched,
+from the highest peak of the spectrum. A slow creep is the parabola's, not the ringing's.
+
+The standard deviations are those of the fit, widened by what its residuals remember from sample
+to sample: n (1 - r) / (1 + r) of n samples are independent, r their correlation at one sample.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.ringing import Ringing, ringing, spectrum
 from validate.recording.types import Contours, Markers, Recording, Signal
-from validate.register.outlines.distances import EVERY_TEN, along_normals, outline_places
+from validate.register.outlines.outlines import EVERY_TEN, along_normals, outline_places
+
+_PERIODS = 3.0  # fewer tell no damping from creep
+_LINEAR = 5
+_RING_PADDED = 8  # times as long for the spectrum's peak
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """Frequency Hz of the damped oscillation and its ratio of critical damping, with standard
+    deviations; `periods` were seen."""
+
+    frequency: float
+    frequency_sd: float
+    damping: float
+    damping_sd: float
+    periods: float
+
+
+def ringing(t: Floats, y: Floats) -> Ringing:
+    """Of y (nt,) at times t (nt,) s; gaps are left out by the caller.
+
+    Raises `ComparisonError` for fewer than three periods, too few samples, and what does not ring.
+    """
+    if len(t) < 4 * _LINEAR:
+        raise ComparisonError(f"{len(t)} samples of ringing; at least {4 * _LINEAR} are needed")
+    t = t - t[0]
+    f0 = _peak(t, y)
+    if f0 * t[-1] < _PERIODS:
+        raise ComparisonError(
+            f"{f0 * t[-1]:.1f} periods of ringing in {t[-1]:.2f} s: {_PERIODS:g} are needed; "
+            "record longer"
+        )
+    w0 = 2 * np.pi * f0
+    start = [w0, 0.05 * w0]
+    found = least_squares(_left, start, x_scale=start, args=(t, y), ftol=1e-12, xtol=1e-12)
+    w, d = (float(x) for x in found.x)
+    if not (found.success and 0.5 * w0 < w < 2 * w0):
+        raise ComparisonError(f"no ringing near {f0:.2f} Hz was found: {found.message}")
+    sd_w, sd_d = _spread(found.fun, np.asarray(found.jac))
+    whole = np.hypot(w, d)
+    return Ringing(
+        w / (2 * np.pi), sd_w / (2 * np.pi), d / whole, sd_d / whole, w * t[-1] / (2 * np.pi)
+    )
+
+
+def spectrum(t: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Frequencies (nf,) Hz and amplitudes (nf,) in y's unit of y (nt,) less its parabola, under
+    Hann's window, on the mean step of t."""
+    z = y - np.polyval(np.polyfit(t, y, 2), t)
+    window = np.hanning(len(z))
+    n = _RING_PADDED * len(z)
+    step = float(np.diff(t).mean())
+    amplitude = 2 * np.abs(np.fft.rfft(window * z, n)) / window.sum()
+    return np.asarray(np.fft.rfftfreq(n, step)), np.asarray(amplitude, dtype=np.float64)
+
+
+def _peak(t: Floats, y: Floats) -> float:
+    f, amplitude = spectrum(t, y)
+    return float(f[amplitude.argmax()])
+
+
+def _left(p: Floats, t: Floats, y: Floats) -> Floats:
+    """What the best linear factors leave of y."""
+    fade = np.exp(-p[1] * t)
+    basis = np.stack(
+        [np.ones_like(t), t, t**2, fade * np.cos(p[0] * t), fade * np.sin(p[0] * t)], axis=1
+    )
+    factors = np.linalg.lstsq(basis, y, rcond=None)[0]
+    return np.asarray(basis @ factors - y)
+
+
+def _spread(left: Floats, slope: Floats) -> tuple[float, float]:
+    """Standard deviations of w and d (1/s each)."""
+    squares = float(left @ left)
+    r = float(np.clip(left[1:] @ left[:-1] / squares, 0.0, 1.0)) if squares else 0.0
+    freedom = max(len(left) * (1 - r) / (1 + r) - _LINEAR - 2, 1.0)
+    w, d = np.sqrt(squares / freedom * np.diag(np.linalg.pinv(slope.T @ slope))).tolist()
+    return w, d
+
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
 _SHARE = 0.02  # of the whole motion: less above that frequency is no reason for dynamics
@@ -150,32 +238,43 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     x = moved[name]
     seen = np.isfinite(x).all(axis=1)
     t_all, t, x = t, t[seen], x[seen]
-    direction = _direction(x)
+    # The unit vector (d,) along which x (nt, d) varies most, its largest part positive.
+    _, _, V = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
+    along = V[0]
+    direction = np.asarray(along * np.sign(along[np.abs(along).argmax()]))
     y = (x - x[0]) @ direction
     steps = np.diff(t)
     usual = float(np.median(np.diff(t_all)))
-    frequency, resolution = _dominant(t, y)
+    # Frequency of the spectrum's largest peak and its resolution, Hz; zeros where none is.
+    if len(t) < _FEWEST:
+        frequency, resolution = 0.0, 0.0
+    else:
+        f, amplitude = spectrum(*_even(t, y))
+        frequency, resolution = float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
     coarse = noise > 0 and frequency * usual * _SMOOTH > 1
     found, rings = noise if coarse else max(noise, _noise(y)), _ringing(t, y)
     starts = _starts(t, y, found)
+    # Until when it stays within a hundredth of the motion about its start, or within noise.
+    first = int((np.abs(y - y[0]) > max(6 * found, _STILL * np.ptp(y))).argmax())
+    held_until = float(t[first - 1]) if first > 1 else None
+    # From when it stays within a hundredth of the motion of where it ends, for a tenth of the
+    # time at least.
+    late = t[-1] - 0.1 * (t[-1] - t[0])
+    tail = y[t >= late]
+    near = np.abs(y - np.median(tail)) <= max(4 * found, _STILL * np.ptp(y))
+    away = np.flatnonzero(~near)
+    start = t[0] if not len(away) else t[min(away[-1] + 1, len(t) - 1)]
     return RecordedMotion(
         name, direction, t, y, found, frequency, resolution,
-        _released(t, y, starts, rings) if rings else starts, _still(t, y, found),
-        _rests(t, y, found), float(steps.max()), int((steps > _GAP * usual).sum()),
-        float(1 - seen.mean()), rings,
+        _released(t, y, starts, rings) if rings else starts, held_until,
+        float(start) if start <= late else None, float(steps.max()),
+        int((steps > _GAP * usual).sum()), float(1 - seen.mean()), rings,
     )  # fmt: skip
 
 
 def _extent(x: Floats) -> float:
     seen = x[np.isfinite(x).all(axis=1)]
     return float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) > 1 else 0.0
-
-
-def _direction(x: Floats) -> Floats:
-    """The unit vector (d,) along which x (nt, d) varies most, its largest part positive."""
-    _, _, V = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)
-    along = V[0]
-    return np.asarray(along * np.sign(along[np.abs(along).argmax()]))
 
 
 def _even(t: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -189,14 +288,6 @@ def _noise(y: Floats) -> float:
     if len(y) < _FEWEST:
         return 0.0
     return float(1.4826 * np.median(np.abs(np.diff(y, n=4))) / np.sqrt(70))
-
-
-def _dominant(t: Floats, y: Floats) -> tuple[float, float]:
-    """Frequency of the spectrum's largest peak and its resolution, Hz; zeros where none is."""
-    if len(t) < _FEWEST:
-        return 0.0, 0.0
-    f, amplitude = spectrum(*_even(t, y))
-    return float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
 
 
 def _starts(t: Floats, y: Floats, noise: float) -> float:
@@ -234,23 +325,6 @@ def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
     at = np.arctan2(w * s - d * p, w * p + d * s) / w
     at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
     return float(max(starts + at, t[0]))
-
-
-def _still(t: Floats, y: Floats, noise: float) -> float | None:
-    """Until when it stays within a hundredth of the motion about its start, or within noise."""
-    away = np.abs(y - y[0]) > max(6 * noise, _STILL * np.ptp(y))
-    first = int(away.argmax())
-    return float(t[first - 1]) if first > 1 else None
-
-
-def _rests(t: Floats, y: Floats, noise: float) -> float | None:
-    """From when it stays within a hundredth of the motion of where it ends, for a tenth of the
-    time at least."""
-    tail = y[t >= t[-1] - 0.1 * (t[-1] - t[0])]
-    near = np.abs(y - np.median(tail)) <= max(4 * noise, _STILL * np.ptp(y))
-    away = np.flatnonzero(~near)
-    start = t[0] if not len(away) else t[min(away[-1] + 1, len(t) - 1)]
-    return float(start) if start <= t[-1] - 0.1 * (t[-1] - t[0]) else None
 
 
 def _ringing(t: Floats, y: Floats) -> Ringing | None:

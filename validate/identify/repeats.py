@@ -14,11 +14,10 @@ import numpy as np
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RecordingError, UsageError
 from validate.identify.budget import Votes, by_specimen
-from validate.identify.modulus import MIN_SAMPLES, Log, TestKind, load_noise, loading, zero_of
-from validate.recording.clocks.clock_check import clock_of
+from validate.identify.modulus import MIN_SAMPLES, TestKind, load_noise, loading, zero_of
+from validate.recording.merge import REPEATS, SHARE
 from validate.recording.motion_capture.text_rows import ASSUMED
-from validate.recording.scatter import REPEATS, SHARE
-from validate.recording.types import Record, Recording, Signal, Source
+from validate.recording.types import Record, Recording, Signal, Source, clock_of
 
 _TOE = 0.01  # of the way: where contact is told apart, see `zero_of`
 _ALIKE = 0.01  # sizes and speeds of repeats differ by less, relative
@@ -72,17 +71,32 @@ def averaged(logs: Sequence[Recording], labels: Sequence[str], name: str) -> Rec
     if len(logs) < 2:
         raise RecordingError(f"{len(logs)} logs; a mean needs at least 2")
     test, sizes = _alike(logs)
-    names = _names(logs)
+    names = tuple(log.name for log in logs)
+    alone = len(set(names)) == len(names)
+    names = names if alone else tuple(f"{i + 1}-{name}" for i, name in enumerate(names))
     paths = [_loaded(log, test) for log in logs]
-    d = _common(paths)
+    start, end = max(p.d[0] for p in paths), min(p.d[-1] for p in paths)
+    count = min(int(((p.d >= start) & (p.d <= end)).sum()) for p in paths)
+    if not end > start or count < MIN_SAMPLES:
+        raise RecordingError(
+            f"the logs share the displacements {1e3 * start:.4g} to {1e3 * end:.4g} mm with "
+            f"{count} samples, at least {MIN_SAMPLES} are needed"
+        )
+    d = np.linspace(start, end, count)
     forces = np.array([np.interp(d, p.d, p.force) for p in paths])
     votes = [by_specimen(column, labels) for column in forces.T.tolist()]
     mean, sd = np.array([v.mean for v in votes]), np.array([v.sd_mean or 0.0 for v in votes])
     t = np.mean([np.interp(d, p.d, p.t) for p in paths], axis=0)
     sign = 1.0 if test == "compression" else -1.0
+    # Of the mean: each log counts one over its specimen's logs, over the specimens.
+    often = Counter(labels)
+    each = [
+        load_noise(log.signals["force"].y[:, 0]) / (often[label] * len(often))
+        for log, label in zip(logs, labels, strict=True)
+    ]
     signals = {
         "displacement": Signal(t, sign * d[:, None], "m", 0.0, "machine"),
-        "force": Signal(t, sign * mean[:, None], "N", _noise(logs, labels), "machine"),
+        "force": Signal(t, sign * mean[:, None], "N", float(np.linalg.norm(each)), "machine"),
         "force/sd": Signal(t, sd[:, None], "N", 0.0, "machine"),
     }
     signals |= {
@@ -117,53 +131,22 @@ def _alike(logs: Sequence[Recording]) -> tuple[TestKind, Record]:
     return cast("TestKind", test), {**found, "test": test}
 
 
-def _names(logs: Sequence[Recording]) -> tuple[str, ...]:
-    names = tuple(log.name for log in logs)
-    alone = len(set(names)) == len(names)
-    return names if alone else tuple(f"{i + 1}-{name}" for i, name in enumerate(names))
-
-
 def _loaded(recording: Recording, test: TestKind) -> Loading:
     log = loading(recording, test)
     way = float(np.ptp(log.d))
     near = log.force[: max(MIN_SAMPLES, int(np.argmax(log.d - log.d[0] > _TOE * way)))]
     offset, contact = zero_of(log.d, log.force, load_noise(near), _TOE * way)
     last = int(np.argmax(log.d)) + 1
-    kept = _rising(log, contact, last)
+    # Indices of the first loading whose displacement exceeds every one before.
+    before = np.maximum.accumulate(np.append(-np.inf, log.d[: last - 1]))
+    kept: Ints = np.flatnonzero((log.d[:last] > before) & (log.d[:last] >= contact))
+
     words = f"contact at {1e3 * contact + 0.0:.4g} mm, {offset:.4g} N taken off"
     if last < len(log.d):
         words += f", {len(log.d) - last} rows after the largest displacement not in the mean"
     return Loading(
         log.t[kept] - log.t[kept][0], log.d[kept] - contact, log.force[kept] - offset, words
     )
-
-
-def _rising(log: Log, contact: float, last: int) -> Ints:
-    """Indices of the first loading whose displacement exceeds every one before."""
-    before = np.maximum.accumulate(np.append(-np.inf, log.d[: last - 1]))
-    kept: Ints = np.flatnonzero((log.d[:last] > before) & (log.d[:last] >= contact))
-    return kept
-
-
-def _common(paths: Sequence[Loading]) -> Floats:
-    start, end = max(p.d[0] for p in paths), min(p.d[-1] for p in paths)
-    count = min(int(((p.d >= start) & (p.d <= end)).sum()) for p in paths)
-    if not end > start or count < MIN_SAMPLES:
-        raise RecordingError(
-            f"the logs share the displacements {1e3 * start:.4g} to {1e3 * end:.4g} mm with "
-            f"{count} samples, at least {MIN_SAMPLES} are needed"
-        )
-    return np.linspace(start, end, count)
-
-
-def _noise(logs: Sequence[Recording], labels: Sequence[str]) -> float:
-    """Of the mean: each log counts one over its specimen's logs, over the specimens."""
-    count = Counter(labels)
-    each = [
-        load_noise(log.signals["force"].y[:, 0]) / (count[label] * len(count))
-        for log, label in zip(logs, labels, strict=True)
-    ]
-    return float(np.linalg.norm(each))
 
 
 def _told(

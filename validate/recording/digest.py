@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.recording.types import Contours, Frames, Markers, Recording, Signal
+from validate.recording.types import Contours, Frames, Markers, Recording
 
 Json = dict[str, Any]
 
@@ -24,7 +24,10 @@ def digest(recording: Recording) -> Json:
     return {
         "name": recording.name,
         "t0_ns": recording.t0_ns,
-        "signals": {k: _signal(s) for k, s in recording.signals.items()},
+        "signals": {
+            k: {"unit": s.unit, "sd": s.sd, "frame": s.frame, "t": _array(s.t), "y": _array(s.y)}
+            for k, s in recording.signals.items()
+        },
         "markers": {k: _markers(m) for k, m in recording.markers.items()},
         "contours": {k: _contours(c) for k, c in recording.contours.items()},
         "frames": {k: _frames(f) for k, f in recording.frames.items()},
@@ -46,10 +49,6 @@ def _lines(value: Mapping[str, Any], depth: int) -> list[str]:
         text[-1] += "," if i + 1 < len(value) else ""
         lines += text
     return [*lines, " " * depth + "}"]
-
-
-def _signal(s: Signal) -> Json:
-    return {"unit": s.unit, "sd": s.sd, "frame": s.frame, "t": _array(s.t), "y": _array(s.y)}
 
 
 def _markers(m: Markers) -> Json:

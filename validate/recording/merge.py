@@ -1,10 +1,11 @@
-"""Merge of recordings of one test onto the clock of the first.
+"""Merge of recordings of one test onto the clock of the first, and scatter of repeated tests.
 
 The streams of a further file share one clock, so one offset moves all of them. Whether that clock
-also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 - t_1),
-over the distance of the halves' middles.
+also runs fast or slow is told by the offsets of its halves: drift = (tau_2 - tau_1) / (t_2 -
+t_1), over the distance of the halves' middles.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +15,29 @@ import numpy as np
 from validate.errors import RecordingError
 from validate.recording.clocks.alignment import Offset, moved, offset_near, shift
 from validate.recording.types import Record, Recording, Signal, Source, by_kind
+
+REPEATS = "repeats"  # a record: logs, specimens, share
+SHARE = "share"  # its key: sd of the mean over the mean, one relative standard uncertainty
+
+
+def repeats_share(recording: Recording) -> float:
+    """Return the relative standard uncertainty of a mean of repeats; 0 for a recording of one log.
+
+    Raises `RecordingError` for a record whose share is not a number of at least 0.
+    """
+    said = recording.metadata.get(REPEATS, {}).get(SHARE)
+    if said is None:
+        return 0.0
+    try:
+        share = float(said)
+    except ValueError:
+        share = math.nan
+    if not (math.isfinite(share) and share >= 0):
+        raise RecordingError(
+            f"{recording.name}: record '{REPEATS}': {SHARE} '{said}' is not a number"
+        )
+    return share
+
 
 # --- Streams of several recordings in one.
 

@@ -7,40 +7,36 @@ so is a file that stops short, as if its writer was ended; only other damage is 
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.chain import chain_faults
 from validate.recording.clocks.alignment import RECORD as CLOCK_OFFSET
-from validate.recording.clocks.clock_check import GAP_FACTOR, clock_of
 from validate.recording.mcap.channel_state import AllSeen, ChannelSeen
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.metadata import CALIBRATION, by_name
 from validate.recording.mcap.read import MCAP, read_recording
-from validate.recording.mcap.records import Channel, Schema
+from validate.recording.mcap.records import Channel, Verified, messages_of, opened
 from validate.recording.mcap.schemas import (
+    CALIBRATION,
     CONTOUR,
     IMAGE,
     MARKERS,
     MIRROR,
     MIRROR_OF,
     SIGNAL,
-    Sample,
+    by_name,
 )
 from validate.recording.mcap.streams import our_channels
-from validate.recording.mcap.verified_file import Verified, messages_of, opened
-from validate.recording.motion_capture.poses import ROTATION
+from validate.recording.motion_capture.poses import ROTATION, chain_faults
 from validate.recording.motion_capture.text_rows import ASSUMED, cut_lines
-from validate.recording.reader import Options, Reader, require_known, source_of
+from validate.recording.reader import Options, require_known, source_of
 from validate.recording.readers import named, no_mcap, recognised
 from validate.recording.scales import odd_stream
-from validate.recording.types import Clock, Frames, Recording, Signal, Source
+from validate.recording.types import GAP_FACTOR, Clock, Frames, Recording, Signal, Source, clock_of
 
 # What rosbag2 always writes is no defect: this record for every split, channels without messages.
 _ROS2, _OFTEN = "ros2", "rosbag2"
@@ -109,7 +105,22 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
     except UsageError as asks:
         if options or reader.holds is None:
             raise
-        return _not_said(reader, path, reader.holds(path), str(asks))
+        # The contents of a file that cannot be read before the user says more of it.
+        held = reader.holds(path)
+        return Inspection(
+            source=source_of(path, "not checked"),
+            profile="",
+            library="",
+            compressions=(),
+            chunks=0,
+            messages=0,
+            attachments=0,
+            metadata=(),
+            topics=tuple(_unread_topic(name, what) for name, what in held.items()),
+            defects=(),
+            facts=(f"still needed: {asks!s}",),
+            read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
+        )
     topics = [_stream_topic(name, recording) for name in recording.streams]
     never = [_unread_topic(name, why) for name, why in recording.unread.items()]
     facts = [f"{k}: {v}" for r in recording.metadata.values() for k, v in r.items() if v]
@@ -127,18 +138,6 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
         ),
         read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
         facts=tuple(facts),
-    )  # fmt: skip
-
-
-def _not_said(reader: Reader, path: Path, held: Mapping[str, str], asks: str) -> Inspection:
-    """The contents of a file that cannot be read before the user says more of it."""
-    return Inspection(
-        source=source_of(path, "not checked"),
-        profile="", library="", compressions=(), chunks=0, messages=0, attachments=0, metadata=(),
-        topics=tuple(_unread_topic(name, what) for name, what in held.items()),
-        defects=(),
-        facts=(f"still needed: {asks}",),
-        read_as=f"{reader.name} ({reader.doc}), because {reader.sign}",
     )  # fmt: skip
 
 
@@ -169,11 +168,45 @@ def inspect_recording(path: Path | str) -> Inspection:
     path = Path(path)
     seen = AllSeen()
     with opened(path) as stream:
-        verified = _verified(stream, path, seen)
-        _look_again(stream, verified, seen)
-    defects = [*_cut(verified), *_file_defects(verified), *([seen.limit] if seen.limit else [])]
+        try:
+            verified = verify(stream, path, seen, cut=True)
+        except RecordingError as error:
+            raise no_mcap(path, error) from None
+        # Channels without messages, and images whose calibration came after them.
+        late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
+        seen.channels.update(
+            {n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()}
+        )
+        for message in messages_of(stream, verified, late.keys()):
+            seen.take(message.channel_id, [message.data])
+    found: list[str] = []
+    if (cut := verified.cut) is not None:
+        what = "the file, behind its data," if cut.ended else "the data section"
+        found.append(
+            f"no end of {what}: complete up to byte {cut.at} of {verified.source.bytes}, "
+            f"{verified.messages} messages; the writer was stopped; save them with `validate "
+            f"import {verified.source.path} --recover -o X.mcap`"
+        )
+    if verified.claimed_messages not in (None, verified.messages):
+        found.append(
+            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
+        )
+    if verified.misindexed:
+        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
+    if verified.unknown_records:
+        found.append(f"{verified.unknown_records} records of unknown kind")
+    often = Counter(c.topic for c in verified.channels.values())
+    found += [f"{topic!r} is on {n} channels" for topic, n in often.items() if n > 1]
+    for number, channel in verified.channels.items():
+        schema = verified.schemas.get(channel.schema_id)
+        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
+            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
+    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
+    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
+    if seen.limit:
+        found.append(seen.limit)
     topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
-    return _inspection(verified, topics, [*defects, *_chained(path, verified)])
+    return _inspection(verified, topics, [*found, *_chained(path, verified)])
 
 
 def _chained(path: Path, verified: Verified) -> list[str]:
@@ -184,26 +217,6 @@ def _chained(path: Path, verified: Verified) -> list[str]:
         return list(chain_faults(read_recording(path)))
     except RecordingError:
         return []  # told where it was inspected
-
-
-def _cut(verified: Verified) -> list[str]:
-    cut, source = verified.cut, verified.source
-    if cut is None:
-        return []
-    what = "the file, behind its data," if cut.ended else "the data section"
-    return [
-        f"no end of {what}: complete up to byte {cut.at} of {source.bytes}, {verified.messages} "
-        f"messages; the writer was stopped; save them with `validate import {source.path} "
-        f"--recover -o X.mcap`"
-    ]
-
-
-def _look_again(stream: BinaryIO, verified: Verified, seen: AllSeen) -> None:
-    """Channels without messages, and images whose calibration came after them."""
-    late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
-    seen.channels.update({n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()})
-    for message in messages_of(stream, verified, late.keys()):
-        seen.take(message.channel_id, [message.data])
 
 
 def _inspection(
@@ -220,25 +233,19 @@ def _inspection(
         metadata=tuple(record.name for record in verified.metadata),
         topics=tuple(topic for topic, _ in topics),
         defects=(*defects, *(line for _, found in topics for line in found)),
-        clock_offsets=tuple(_offset_lines(verified)),
-        facts=(*_assumed(verified), *_attached(verified)),
+        clock_offsets=tuple(  # nothing is moved without being shown
+            f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
+            for record in verified.metadata
+            if record.name.startswith(CLOCK_OFFSET)
+        ),
+        facts=(
+            *_assumed(verified),
+            *(
+                f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
+                for a in verified.attachments
+            ),
+        ),
     )
-
-
-def _verified(stream: BinaryIO, path: Path, seen: AllSeen) -> Verified:
-    try:
-        return verify(stream, path, seen, cut=True)
-    except RecordingError as error:
-        raise no_mcap(path, error) from None
-
-
-def _offset_lines(verified: Verified) -> list[str]:
-    """What `alignment.shift` wrote: nothing is moved without being shown."""
-    return [
-        f"{record.name}: {', '.join(f'{key} {value}' for key, value in record.values.items())}"
-        for record in verified.metadata
-        if record.name.startswith(CLOCK_OFFSET)
-    ]
 
 
 def _assumed(verified: Verified) -> list[str]:
@@ -251,13 +258,6 @@ def _assumed(verified: Verified) -> list[str]:
     ]
 
 
-def _attached(verified: Verified) -> list[str]:
-    return [
-        f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
-        for a in verified.attachments
-    ]
-
-
 def _topic(
     verified: Verified, number: int, channel: Channel, seen: ChannelSeen | None
 ) -> tuple[Topic, list[str]]:
@@ -267,31 +267,25 @@ def _topic(
     times = publish if stamps is None else stamps
     clock = clock_of(channel.topic, stamps, publish, log) if len(publish) else None
     first = seen.first if seen else None
+    name = schema.name if schema else ""
+    kind = "foreign" if seen is None else _KINDS.get(name, "foreign")
+    if name == MIRROR and MIRROR_OF in channel.metadata:
+        kind = "mirror"
     topic = Topic(
         name=channel.topic,
-        kind=_kind(channel, schema.name if schema else "", seen),
-        schema=schema.name if schema else "",
+        kind=kind,
+        schema=name,
         schema_encoding=schema.encoding if schema else "",
         message_encoding=channel.encoding,
         count=len(publish),
         first_ns=int(times.min()) if len(times) else None,
         last_ns=int(times.max()) if len(times) else None,
-        unit=_unit(schema, first) if schema and first else "",
+        unit={SIGNAL: first.unit, IMAGE: "grey level"}.get(name, "m") if schema and first else "",
         frame=first.frame if first else "",
         clock=clock,
     )
     silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
     return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
-
-
-def _unit(schema: Schema, first: Sample) -> str:
-    return {SIGNAL: first.unit, IMAGE: "grey level"}.get(schema.name, "m")
-
-
-def _kind(channel: Channel, schema: str, seen: ChannelSeen | None) -> str:
-    if schema == MIRROR and MIRROR_OF in channel.metadata:
-        return "mirror"
-    return "foreign" if seen is None else _KINDS.get(schema, "foreign")
 
 
 def _content(
@@ -311,27 +305,6 @@ def _content(
         return stamps, [str(error)]
     odd = odd_stream(stream)
     return stamps, [f"{seen.channel.topic!r}: {odd}"] if odd else []
-
-
-def _file_defects(verified: Verified) -> list[str]:
-    found: list[str] = []
-    if verified.claimed_messages not in (None, verified.messages):
-        found.append(
-            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
-        )
-    if verified.misindexed:
-        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
-    if verified.unknown_records:
-        found.append(f"{verified.unknown_records} records of unknown kind")
-    topics = Counter(c.topic for c in verified.channels.values())
-    found += [f"{topic!r} is on {n} channels" for topic, n in topics.items() if n > 1]
-    for number, channel in verified.channels.items():
-        schema = verified.schemas.get(channel.schema_id)
-        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
-            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
-    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
-    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
-    return found
 
 
 def _clock_defects(topic: str, clock: Clock | None, log_ns: Ints) -> list[str]:

@@ -45,8 +45,24 @@ def odd_stream(stream: object) -> str:
         height, width = stream.images[0].shape
         return odd_pixel(stream.m_per_px, (height, width))
     if isinstance(stream, Markers):
-        return _odd_spread(stream.x)
-    return _odd_outlines(stream) if isinstance(stream, Contours) else ""
+        # Of markers x (nt, k, d) m.
+        size = _spread(stream.x)
+        low, high = _SPREADS
+        if low <= size <= high or size == 0:
+            return ""
+        return (
+            f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
+            f"{_factor(size, _SPREADS)}"
+        )
+    if isinstance(stream, Contours):
+        size = _extent(stream)
+        low, high = _OUTLINES
+        if low <= size <= high:
+            return ""
+        return (
+            f"outlines of {size:.3g} m are outside {low:g} to {high:g} m{_factor(size, _OUTLINES)}"
+        )
+    return ""
 
 
 def another_unit(stream: object, size: float) -> str:
@@ -95,18 +111,6 @@ def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
         yield topic, odd_stream(stream)
 
 
-def _odd_spread(x: Floats) -> str:
-    """Of markers x (nt, k, d) m."""
-    size = _spread(x)
-    low, high = _SPREADS
-    if low <= size <= high or size == 0:
-        return ""
-    return (
-        f"marker distances of {size:.3g} m are outside {low:g} to {high:g} m"
-        f"{_factor(size, _SPREADS)}"
-    )
-
-
 def _spread(x: Floats) -> float:
     """m between markers x (nt, k, d) m at the first instant at which two are seen; 0: never."""
     seen = np.asarray(np.isfinite(x).all(axis=2))
@@ -122,14 +126,6 @@ def _moved(x: Floats) -> float:
 
 def _extent(contours: Contours) -> float:
     return max(float(np.ptp(outline, axis=0).max()) for outline in contours.outlines)
-
-
-def _odd_outlines(contours: Contours) -> str:
-    size = _extent(contours)
-    low, high = _OUTLINES
-    if low <= size <= high:
-        return ""
-    return f"outlines of {size:.3g} m are outside {low:g} to {high:g} m{_factor(size, _OUTLINES)}"
 
 
 def _within(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> bool:

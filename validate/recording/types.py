@@ -1,7 +1,10 @@
-"""Types of a recording: markers, signals, outlines, images. All are frozen and checked once.
+"""Types of a recording: markers, signals, outlines, images, clocks. All are frozen and checked.
 
 Times are float seconds from the recording's first message; the int64 nanoseconds of that moment
 are kept in `Recording.t0_ns`. Positions are metres, one named frame per stream.
+
+Time of a measurement: the stamp in its message, else its publish time, never its log time, which
+holds the recorder's delays.
 """
 
 from collections import Counter
@@ -20,7 +23,7 @@ from validate.installation import install_command
 
 if TYPE_CHECKING:
     from xarray import DataArray, DataTree
-
+from validate.arrays import Ints
 
 # --- Streams of a recording as labelled arrays of xarray.
 
@@ -170,7 +173,15 @@ class Contours:
     def __post_init__(self) -> None:
         _set(self, "t", _times(self.t, "contours"))
         if self.each is not None:
-            _set(self, "each", _told_apart(self.each, len(self.t)))
+            each = self.each
+            each = checked(
+                each, "contours' sd [m] and confidence", (len(self.t), 2), error=RecordingError
+            )
+            if (each < 0).any() or (each[:, 1] > 1).any():
+                raise RecordingError(
+                    "contours: an sd below 0, or a confidence that is not within 0..1"
+                )
+            _set(self, "each", each)
         if len(self.outlines) != len(self.t):
             raise RecordingError(f"contours: {len(self.outlines)} outlines, {len(self.t)} times")
         outlines = tuple(
@@ -195,13 +206,6 @@ class Contours:
         t = np.repeat(self.t, [len(outline) for outline in self.outlines])
         points = np.concatenate(self.outlines)
         return labelled("points", points, ("point", "axis"), t, attributes, axis=("x", "y"))
-
-
-def _told_apart(each: Floats, count: int) -> Floats:
-    each = checked(each, "contours' sd [m] and confidence", (count, 2), error=RecordingError)
-    if (each < 0).any() or (each[:, 1] > 1).any():
-        raise RecordingError("contours: an sd below 0, or a confidence that is not within 0..1")
-    return each
 
 
 def _image(image: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
@@ -399,3 +403,49 @@ def _present(streams: Mapping[str, T], topic: str, missing: str) -> T:
             f"{missing} '{topic}'; it has {sorted(streams)}; see `validate inspect`"
         )
     return streams[topic]
+
+
+GAP_FACTOR = 3.0  # a step longer than this many median steps is a gap
+
+
+def clock_of(topic: str, stamps_ns: Ints | None, publish_ns: Ints, log_ns: Ints) -> Clock:
+    """Return the clock of one stream from int64 ns (n,) each, in the order of the file.
+
+    `stamps_ns` None: the messages have no stamp and publish time counts. The median step is over
+    steps forward, so repeated stamps do not hide gaps; `longest_gap` is 0 where there is no gap.
+    Raises `RecordingError` without messages or when the counts differ.
+    """
+    times = publish_ns if stamps_ns is None else stamps_ns
+    counts = (len(times), len(publish_ns), len(log_ns))
+    if counts[0] == 0 or len(set(counts)) != 1:
+        raise RecordingError(f"{topic!r}: {counts} stamps, publish and log times, expected equal")
+    steps = np.diff(times)
+    duplicates, backward = int((steps == 0).sum()), int((steps < 0).sum())
+    # The steps that are gaps; reorders `forward`, as a copy costs 8 bytes a sample.
+    forward = steps[steps > 0]
+    if not len(forward):
+        gaps = forward
+    else:
+        gaps = forward[forward > GAP_FACTOR * np.median(forward, overwrite_input=True)]
+    duration = _seconds(int(times.max()) - int(times.min()))
+    return Clock(
+        topic=topic,
+        count=len(times),
+        duration=duration,
+        rate_hz=(len(times) - 1) / duration if duration > 0 else None,
+        gaps=len(gaps),
+        longest_gap=_seconds(int(gaps.max(initial=0))),
+        duplicates=duplicates,
+        backward=backward,
+        stamp_minus_publish=None if stamps_ns is None else _largest(stamps_ns, publish_ns),
+        publish_minus_log=_largest(publish_ns, log_ns),
+    )
+
+
+def _seconds(ns: int) -> float:
+    return ns / 1e9
+
+
+def _largest(a: Ints, b: Ints) -> float:
+    apart = a - b
+    return _seconds(int(np.abs(apart, out=apart).max()))

@@ -103,3 +103,9 @@ class Registered:
     def stage(self, t: float) -> float:
         """Return the first input at the step nearest to t s, in its own unit."""
         return float(self.inputs[nearest_sample(self.t, t, "the drive"), 0])
+
+
+# --- A recording that is followed over time: one driving signal, and its markers as recorded.
+
+
+# -------------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.parameters import known, quantity
 from validate.plugins import Registry, settings_faults
@@ -113,7 +112,15 @@ class PoseShift:
         R = Rotation.from_rotvec(turn[:3]).as_matrix()
         centre, by, delay = seen.rest.mean(axis=0), np.array([x, y, z]), turn[3]
         flat = seen.x.reshape(len(seen.t), -1)
-        late = np.stack([_late(seen.t, column, delay) for column in flat.T], axis=1)
+        # y (nt,) at t + delay s, NaN = not seen: where one of two samples is not, nor is what
+        # lies between.
+        late = np.stack(
+            [
+                column if delay == 0 else np.interp(seen.t + delay, seen.t, column)
+                for column in flat.T
+            ],
+            axis=1,
+        )
         moved = (late.reshape(seen.x.shape) - centre) @ R.T + centre + by
         return replace(seen, x=moved)
 
@@ -124,9 +131,3 @@ SENSORS: Registry[type[Sensing] | type[PoseShift]] = Registry(
     lambda sensing: sensing.__name__,
     lambda part: settings_faults(part, "of"),
 )
-
-
-def _late(t: Floats, y: Floats, delay: float) -> Floats:
-    """y (nt,) at t + delay s, NaN = not seen: where one of two samples is not, nor is what lies
-    between."""
-    return y if delay == 0 else np.interp(t + delay, t, y)

@@ -3,19 +3,9 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "mesh": (
-        "Mesh",
-        "quadratic",
-    ),
-    "geometries.tetrahedral_filling": ("filled",),
-    "mesh_files.third_party_meshes": (
-        "ForeignBody",
-        "read_foreign",
-    ),
-    "mesh_files.mesh_file": (
-        "read_mesh",
-        "write_mesh",
-    ),
+    "mesh": ("Mesh", "quadratic"),
+    "mesh_files.mesh_file": ("filled", "read_mesh", "write_mesh"),
+    "mesh_files.third_party_meshes": ("ForeignBody", "read_foreign"),
     "scene": (
         "Cavity",
         "Drive",
@@ -30,44 +20,17 @@ _HOMES = {
         "Support",
         "Weight",
     ),
-    "material": (
-        "Material",
-        "Region",
-        "Prony",
-    ),
+    "material": ("Material", "Region", "Prony"),
+    "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "laws": ("Coefficients",),
-    "rubber": (
-        "mooney_rivlin",
-        "ogden",
-        "yeoh",
-    ),
-    "meshless": (
-        "MaterialPoint",
-        "RigidBody",
-    ),
+    "meshless": ("MaterialPoint", "RigidBody"),
     "geometries.box": ("grid",),
-    "contact": (
-        "RigidContact",
-        "RigidCylinder",
-        "RigidPlane",
-        "RigidPunch",
-        "RigidSphere",
-    ),
+    "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
     "geometries.cylinder": ("quarter_cylinder",),
-    "geometries.inclusion": (
-        "Block",
-        "Capsule",
-        "block_with_inclusion",
-    ),
+    "geometries.inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "geometries.refinement": ("refined",),
     "prescribed_motion": ("Prescribed",),
-    "places": (
-        "InBox",
-        "Labelled",
-        "Nearest",
-        "OnPlane",
-        "Site",
-    ),
+    "places": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
 }
 
 __all__ = names(_HOMES)

@@ -175,7 +175,16 @@ def require_clear(contacts: tuple[RigidContact, ...], mesh: Mesh) -> None:
                     f"contact '{part.name}': {vector} in a scene of {mesh.dimension} dimensions"
                 )
         nodes = nodes_of(mesh, part.facets)
-        _require_outside(part, mesh.nodes[nodes], float(np.ptp(mesh.nodes, axis=0).max()))
+        x = mesh.nodes[nodes]
+        gaps = part.shape.gap(x)
+        inside = gaps < -INSIDE * float(np.ptp(mesh.nodes, axis=0).max())
+        if inside.any():
+            deepest = int(np.argmin(gaps))
+            at = ", ".join(f"{1e3 * c:.3g}" for c in x[deepest])
+            raise SceneError(
+                f"contact '{part.name}' starts inside the body: {int(inside.sum())} of {len(x)} "
+                f"nodes, {-1e3 * gaps[deepest]:.3g} mm at ({at}) mm; move it out by this distance"
+            )
         shared = [claimed[n] for n in nodes.tolist() if n in claimed]
         if shared:
             raise SceneError(
@@ -183,18 +192,6 @@ def require_clear(contacts: tuple[RigidContact, ...], mesh: Mesh) -> None:
                 "can touch one rigid body: choose facets without common nodes"
             )
         claimed |= dict.fromkeys(nodes.tolist(), part.name)
-
-
-def _require_outside(part: RigidContact, x: Floats, size: float) -> None:
-    gaps = part.shape.gap(x)
-    inside = gaps < -INSIDE * size
-    if inside.any():
-        deepest = int(np.argmin(gaps))
-        at = ", ".join(f"{1e3 * c:.3g}" for c in x[deepest])
-        raise SceneError(
-            f"contact '{part.name}' starts inside the body: {int(inside.sum())} of {len(x)} "
-            f"nodes, {-1e3 * gaps[deepest]:.3g} mm at ({at}) mm; move it out by this distance"
-        )
 
 
 def _unit(vector: tuple[float, ...]) -> Floats:
@@ -257,7 +254,15 @@ class Indenter:
         along = np.array(contact.direction)
         x = mesh.nodes[nodes_of(mesh, contact.facets)]
         tip = np.array(self.tip) if self.tip else _middle_of(x, middle)
-        depth, aside = self._way(x - tip, along)
+        # How far (n,) m offsets (n, 3) m lie along the way, and how far beside it: of a cylinder
+        # across its axis.
+        offset = x - tip
+        depth = offset @ along
+        across = offset - np.outer(depth, along)
+        if self.shape == "cylinder":
+            axis = self._axis(along)
+            across = across - np.outer(across @ axis, axis)
+        aside = np.linalg.norm(across, axis=1)
         flat = self.shape in ("plate", "punch")
         under = aside < self.radius if self.shape != "plate" else np.ones(len(x), bool)
         if not under.any():
@@ -270,16 +275,6 @@ class Indenter:
         start = tip + along * (float((depth[under] - reach).min()) - max(self.gap, 0.0))
         friction = _STICKS if self.bonded else contact.friction
         return replace(contact, shape=self._shape(start, along), friction=friction)
-
-    def _way(self, offset: Floats, along: Floats) -> tuple[Floats, Floats]:
-        """How far (n,) m offsets (n, 3) m lie along the way, and how far beside it: of a cylinder
-        across its axis."""
-        depth = offset @ along
-        across = offset - np.outer(depth, along)
-        if self.shape == "cylinder":
-            axis = self._axis(along)
-            across = across - np.outer(across @ axis, axis)
-        return depth, np.linalg.norm(across, axis=1)
 
     def _axis(self, along: Floats) -> Floats:
         axis = np.array(axis_of(self.axis))

@@ -186,7 +186,18 @@ def lost_stability(law: str, c: Coefficients, mu: float) -> Lost | None:
     for mode, (first, second) in _MODES.items():
         strains = np.multiply.outer([first, second, -first - second], logs)
         inside = ((strains >= low - 1e-12) & (strains <= high + 1e-12)).all(axis=0)
-        stiffness = _least_stiffness(law, c, mu, first * logs, second * logs)
+        # Least eigenvalue Pa of the energy's second derivatives by the logarithms a, b (n,).
+        a = first * logs
+        b = second * logs
+        if law == "ogden":
+            terms = [m / alpha * _power_sum(a, b, alpha)[2] for m, alpha in ogden_terms(c, mu)]
+            stiffness = np.asarray(np.linalg.eigvalsh(np.sum(terms, axis=0))[:, 0])
+        else:
+            (s1, g1, D1), (_, _, D2) = (_power_sum(a, b, alpha) for alpha in (2.0, -2.0))
+            C10, x = mu / 2 - c.C01, (s1 - 3)[:, None, None]
+            slope, curve = C10 + 2 * c.C20 * x + 3 * c.C30 * x**2, 2 * c.C20 + 6 * c.C30 * x
+            H = slope * D1 + curve * g1[:, :, None] * g1[:, None, :] + c.C01 * D2
+            stiffness = np.asarray(np.linalg.eigvalsh(H)[:, 0])
         bad = np.flatnonzero(inside & ~(stiffness > 0))
         if len(bad):
             worst = bad[np.argmin(np.abs(logs[bad]))]
@@ -205,7 +216,13 @@ def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
             "other coefficients, or give with `stretches` the range in which it is used"
         )
     if c.volumetric == "coupled":
-        _require_stiff_volume(law, c, mu, kappa)
+        factor = coupled_lambda(c, mu, kappa)
+        if factor < 0 and c.known_to("neo_hooke") != c:
+            raise SceneError(
+                f"law '{law}' with {_words(law, c, mu)} loses positive energy in volume: the "
+                f"coupled form needs lambda - 4 C01 - 8 C20 >= 0, it is {factor:.4g} Pa; use "
+                "volumetric 'split' or a Poisson ratio nearer to .5"
+            )
 
 
 def coupled_lambda(c: Coefficients, mu: float, kappa: float) -> float:
@@ -213,33 +230,11 @@ def coupled_lambda(c: Coefficients, mu: float, kappa: float) -> float:
     return kappa - 2 * mu / 3 - 4 * c.C01 - 8 * c.C20
 
 
-def _require_stiff_volume(law: str, c: Coefficients, mu: float, kappa: float) -> None:
-    factor = coupled_lambda(c, mu, kappa)
-    if factor < 0 and c.known_to("neo_hooke") != c:
-        raise SceneError(
-            f"law '{law}' with {_words(law, c, mu)} loses positive energy in volume: the "
-            f"coupled form needs lambda - 4 C01 - 8 C20 >= 0, it is {factor:.4g} Pa; use "
-            "volumetric 'split' or a Poisson ratio nearer to .5"
-        )
-
-
 def _words(law: str, c: Coefficients, mu: float) -> str:
     if law == "ogden":
         return "mu, alpha = " + ", ".join(f"{m:.4g} Pa, {a:g}" for m, a in ogden_terms(c, mu))
     terms = {"C10": mu / 2 - c.C01, "C01": c.C01, "C20": c.C20, "C30": c.C30}
     return ", ".join(f"{k} = {v:.4g} Pa" for k, v in terms.items() if v or k == "C10")
-
-
-def _least_stiffness(law: str, c: Coefficients, mu: float, a: Floats, b: Floats) -> Floats:
-    """Least eigenvalue Pa of the energy's second derivatives by the logarithms a, b (n,)."""
-    if law == "ogden":
-        terms = [m / alpha * _power_sum(a, b, alpha)[2] for m, alpha in ogden_terms(c, mu)]
-        return np.asarray(np.linalg.eigvalsh(np.sum(terms, axis=0))[:, 0])
-    (s1, g1, D1), (_, _, D2) = (_power_sum(a, b, alpha) for alpha in (2.0, -2.0))
-    C10, x = mu / 2 - c.C01, (s1 - 3)[:, None, None]
-    slope, curve = C10 + 2 * c.C20 * x + 3 * c.C30 * x**2, 2 * c.C20 + 6 * c.C30 * x
-    H = slope * D1 + curve * g1[:, :, None] * g1[:, None, :] + c.C01 * D2
-    return np.asarray(np.linalg.eigvalsh(H)[:, 0])
 
 
 def _power_sum(a: Floats, b: Floats, alpha: float) -> tuple[Floats, Floats, Floats]:

@@ -163,7 +163,15 @@ def require_positive_cells(
     mesh: Mesh, advice: str = "refine the mesh or move the inclusion"
 ) -> None:
     """Raise `SceneError` naming the worst cell when any volume is not clearly positive."""
-    volumes = _least_volumes(mesh)
+    # Signed volume (e,) of every cell as its worst corner has it: bricks may fold over there.
+    if not mesh.bricks:
+        volumes = cell_volumes(mesh)
+    else:
+        corners = CORNERS[mesh.dimension]
+        at_corners = brick_rule(corners, np.zeros(len(corners)))
+        volumes = np.asarray(
+            np.linalg.det(at_corners.jacobians(mesh.nodes[mesh.corners])).min(axis=1)
+        )
     bad = volumes <= 1e-9 * np.abs(volumes).mean()
     if bad.any():
         worst = int(np.argmin(volumes))
@@ -173,15 +181,6 @@ def require_positive_cells(
             f"{int(bad.sum())} of {len(volumes)} elements inverted or flat, worst element {worst} "
             f"with {1e9 * volumes[worst]:.4g} mm3 at ({at}) mm; {advice}"
         )
-
-
-def _least_volumes(mesh: Mesh) -> Floats:
-    """Signed volume (e,) of every cell as its worst corner has it: bricks may fold over there."""
-    if not mesh.bricks:
-        return cell_volumes(mesh)
-    corners = CORNERS[mesh.dimension]
-    at_corners = brick_rule(corners, np.zeros(len(corners)))
-    return np.asarray(np.linalg.det(at_corners.jacobians(mesh.nodes[mesh.corners])).min(axis=1))
 
 
 def require_nodes(shape: tuple[int, ...]) -> None:
@@ -232,7 +231,17 @@ def quadratic(mesh: Mesh) -> Mesh:
     if mesh.kind == "quad4":
         raise SceneError("elements of kind quad4 have no quadratic form; use simplices")
     if mesh.bricks:
-        return _quadratic_bricks(mesh)
+        # Every new node once: it is known by the corners of the edge, face or cell it is in.
+        n, keys = len(mesh.nodes), _middle_keys(mesh.cells, 3)
+        known, first, number = np.unique(
+            keys.reshape(-1, 8), axis=0, return_index=True, return_inverse=True
+        )
+        shares = brick_values(LATTICE[3][8:])
+        nodes = np.einsum("ma,eai->emi", shares, mesh.nodes[mesh.cells]).reshape(-1, 3)[first]
+        cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
+        at = {tuple(key): n + i for i, key in enumerate(known.tolist())}
+        facets = {name: _with_all_middles(f, at) for name, f in mesh.facets.items()}
+        return Mesh(np.vstack([mesh.nodes, nodes]), cells, "hex27", facets)
     d, n = mesh.dimension, len(mesh.nodes)
     ends = np.sort(mesh.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
     edges, number = np.unique(ends, axis=0, return_inverse=True)
@@ -249,20 +258,6 @@ def _with_middles(facets: Ints, key: Ints, n: int) -> Ints:
     ends = np.sort(facets[:, list(local)], axis=2)
     middles = n + np.searchsorted(key, ends[..., 0] * n + ends[..., 1])
     return np.hstack([facets, middles])
-
-
-def _quadratic_bricks(mesh: Mesh) -> Mesh:
-    """Every new node once: it is known by the corners of the edge, face or cell it is in."""
-    n, keys = len(mesh.nodes), _middle_keys(mesh.cells, 3)
-    known, first, number = np.unique(
-        keys.reshape(-1, 8), axis=0, return_index=True, return_inverse=True
-    )
-    shares = brick_values(LATTICE[3][8:])
-    nodes = np.einsum("ma,eai->emi", shares, mesh.nodes[mesh.cells]).reshape(-1, 3)[first]
-    cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
-    at = {tuple(key): n + i for i, key in enumerate(known.tolist())}
-    facets = {name: _with_all_middles(f, at) for name, f in mesh.facets.items()}
-    return Mesh(np.vstack([mesh.nodes, nodes]), cells, "hex27", facets)
 
 
 def _middle_keys(corners: Ints, d: int) -> Ints:

@@ -129,7 +129,11 @@ class Labelled(Site):
 
     def away(self, mesh: Mesh, entities: Ints) -> Floats:
         nodes = mesh.facet_nodes(self.label)
-        kind = _kind(mesh, entities)
+        kind: EntityKind = "edges"
+        if entities.shape[1] == 1:
+            kind = "points"
+        elif entities.shape[1] == mesh.surface.shape[1]:
+            kind = "faces"
         known = {tuple(e) for e in np.sort(_parts(mesh.facets[self.label], mesh, kind), 1).tolist()}
         inside = np.array([tuple(e) in known for e in np.sort(entities, axis=1).tolist()])
         distance, _ = cKDTree(mesh.nodes[nodes]).query(_middles(mesh, entities))
@@ -194,7 +198,10 @@ class Chosen:
 
     def entities(self, mesh: Mesh) -> Ints:
         """(k, m) node numbers; raises `SceneError` with the nearest one where there is none."""
-        known = _known(mesh, self.of)
+        if self.of == "points":
+            known = np.arange(len(mesh.nodes))[:, None]
+        else:
+            known = _parts(mesh.surface, mesh, self.of)
         away = self.where.away(mesh, known)
         inside = away <= _SLACK * _size(mesh)
         if not inside.any():
@@ -230,12 +237,6 @@ def nodes_of(mesh: Mesh, place: Place) -> Ints:
     return mesh.facet_nodes(place) if isinstance(place, str) else np.unique(place.entities(mesh))
 
 
-def _known(mesh: Mesh, kind: EntityKind) -> Ints:
-    if kind == "points":
-        return np.arange(len(mesh.nodes))[:, None]
-    return _parts(mesh.surface, mesh, kind)
-
-
 def _parts(facets: Ints, mesh: Mesh, kind: EntityKind) -> Ints:
     """The facets themselves, their edges, each once, or their nodes."""
     if kind == "points":
@@ -249,12 +250,6 @@ def _parts(facets: Ints, mesh: Mesh, kind: EntityKind) -> Ints:
         return np.asarray(ends[first])
     middles = facets[:, _MIDDLES if corners == 4 else slice(3, None)].reshape(-1, 1)
     return np.hstack([ends, middles])[first]
-
-
-def _kind(mesh: Mesh, entities: Ints) -> EntityKind:
-    if entities.shape[1] == 1:
-        return "points"
-    return "faces" if entities.shape[1] == mesh.surface.shape[1] else "edges"
 
 
 def _middles(mesh: Mesh, entities: Ints) -> Floats:
@@ -358,9 +353,19 @@ def _site(text: str, mesh: Mesh) -> Site:
         _require_at(text, low, high, mesh)
         return InBox(low, high)
     if text[:1] in tuple(_AXES) and text[1:] in ("min", "max"):
-        return _side(mesh, _AXES.index(text[0]), text[1:])
+        axis = _AXES.index(text[0])
+        x = mesh.nodes[:, axis]
+        at = np.zeros(3)
+        at[axis] = x.min() if text[1:] == "min" else x.max()
+        slack = _FLAT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+        across = _tuple(np.eye(3)[axis])
+        return OnPlane(_tuple(at), across, slack) & Facing(across)
     if text[:2] in ("x=", "y=", "z="):
-        return _plane(_AXES.index(text[0]), text[2:])
+        axis = _AXES.index(text[0])
+        where, _, within = text[2:].partition("~")
+        at = np.zeros(3)
+        at[axis] = _metres(where)
+        return OnPlane(_tuple(at), _tuple(np.eye(3)[axis]), _metres(within) if within else 0.0)
     known = set(mesh.facets)
     named = f"; {nearest_names(text, known)}" if known else "; the body has no facet sets"
     raise SceneError(f"place '{text[:40]}': none of {GRAMMAR}{named}")
@@ -382,22 +387,6 @@ def _require_at(text: str, low: tuple[float, ...], high: tuple[float, ...], mesh
 def _plane_of(site: Site) -> Site:
     """A side without the way its faces look, which edges do not have."""
     return site.first if isinstance(site, Both) else site
-
-
-def _side(mesh: Mesh, axis: int, end: str) -> Site:
-    x = mesh.nodes[:, axis]
-    at = np.zeros(3)
-    at[axis] = x.min() if end == "min" else x.max()
-    slack = _FLAT * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    across = _tuple(np.eye(3)[axis])
-    return OnPlane(_tuple(at), across, slack) & Facing(across)  # no sides of a thin layer of cells
-
-
-def _plane(axis: int, text: str) -> Site:
-    where, _, within = text.partition("~")
-    at = np.zeros(3)
-    at[axis] = _metres(where)
-    return OnPlane(_tuple(at), _tuple(np.eye(3)[axis]), _metres(within) if within else 0.0)
 
 
 def _metres(text: str) -> float:

@@ -376,7 +376,23 @@ class Scene:
         ):
             raise SceneError("mean dilatation, foundations and membranes are for 3-D meshes")
         self._check_cells()
-        self._check_incompressible()
+        # nu = 0.5 needs cells with a pressure of their own, and a measure of the true volume.
+        for material in self.materials:
+            if not material.incompressible:
+                continue
+            if self.dilatation != "mixed":
+                raise SceneError(
+                    f"Poisson ratio nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} "
+                    "dilatation: expected nu < 0.5; use mixed cells (hexahedra or order 2, "
+                    "dilatation 'mixed') or nu <= 0.4999"
+                )
+            if material.law == "svk" or material.coefficients.volumetric == "coupled":
+                raise SceneError(
+                    f"Poisson ratio nu = 0.5 with law '{material.law}' "
+                    f"({material.coefficients.volumetric}) has no incompressible form; use "
+                    "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
+                    "'split'"
+                )
         if self.dilatation == "nodal_mean" and self.regions:
             raise SceneError("nodal mean dilatation supports one material; remove the regions")
         for region in self.regions:
@@ -464,25 +480,6 @@ class Scene:
             raise SceneError(f"plane {self.plane} of {self.thickness:g} m: for 2-D meshes only")
         if self.cavities and self.thickness != 1:
             raise SceneError(f"thickness {self.thickness:g} m: cavities in 2-D are per metre")
-
-    def _check_incompressible(self) -> None:
-        """nu = 0.5 needs cells with a pressure of their own, and a measure of the true volume."""
-        for material in self.materials:
-            if not material.incompressible:
-                continue
-            if self.dilatation != "mixed":
-                raise SceneError(
-                    f"Poisson ratio nu = 0.5 in {self.mesh.kind} cells of {self.dilatation} "
-                    "dilatation: expected nu < 0.5; use mixed cells (hexahedra or order 2, "
-                    "dilatation 'mixed') or nu <= 0.4999"
-                )
-            if material.law == "svk" or material.coefficients.volumetric == "coupled":
-                raise SceneError(
-                    f"Poisson ratio nu = 0.5 with law '{material.law}' "
-                    f"({material.coefficients.volumetric}) has no incompressible form; use "
-                    "linear, or neo_hooke, mooney_rivlin, yeoh or ogden with volumetric "
-                    "'split'"
-                )
 
     @property
     def inputs(self) -> tuple[str, ...]:

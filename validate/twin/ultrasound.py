@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity
-from validate.recording.outlines.raster import coverage
+from validate.recording.images.image import coverage
 
 
 @dataclass(frozen=True)

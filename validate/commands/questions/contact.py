@@ -11,8 +11,8 @@ from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Recording
 from validate.scene.contact import ROUND, Indenter
+from validate.scene.geometries.box import divided
 from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
-from validate.scene.geometries.similar_grids import divided
 from validate.scene.geometries.specification import Geometry
 from validate.scene.places import axis_of
 from validate.units import in_si, split

@@ -20,7 +20,7 @@ from validate.pipeline.bodies.mesh import grid_unknowns
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.scene.contact import Indenter, RigidContact
-from validate.scene.geometries.similar_grids import divided
+from validate.scene.geometries.box import divided
 from validate.scene.geometries.specification import Box, Cylinder, Geometry, MeshFile
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh

@@ -24,8 +24,13 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.estimate.reduced.reduced_kf import ReducedKf
-from validate.identify.recorded_motion import FRACTION, RecordedMotion, motion_of, recorded_motion
-from validate.identify.ringing import spectrum
+from validate.identify.recorded_motion import (
+    FRACTION,
+    RecordedMotion,
+    motion_of,
+    recorded_motion,
+    spectrum,
+)
 from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.dynamics_registration import (
     FIRST,

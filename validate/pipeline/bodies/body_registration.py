@@ -27,8 +27,8 @@ from validate.pipeline.bodies.markers import (
 )
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
+from validate.register.markers.displacements import noise, rested, since_rest
 from validate.register.markers.markers import MarkerObservation, Together
-from validate.register.markers.rest_displacements import noise, rested, since_rest
 from validate.register.observation import Observation, Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation

@@ -14,7 +14,7 @@ from validate.parameters import known
 from validate.pipeline.bodies.markers import BodyAt, leading, markers_topic, registered
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.plates.machine_compliance import taken_off
-from validate.recording.scatter import repeats_share
+from validate.recording.merge import repeats_share
 from validate.recording.types import Recording, Signal
 from validate.register.clocks import clock_sd, interpolated
 from validate.register.signals import SignalObservation

@@ -33,8 +33,8 @@ from validate.pipeline.bodies.markers import (
 )
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Markers, Recording, Signal
+from validate.register.markers.displacements import since_rest
 from validate.register.markers.markers import MarkerObservation
-from validate.register.markers.rest_displacements import since_rest
 from validate.register.observation import EVERYTHING, Observation, Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation

@@ -12,14 +12,13 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.readers import recognised
 from validate.recording.types import Contours, Markers, Recording
 from validate.register.clocks import clock_sd
+from validate.register.markers.displacements import noise, rested
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.identity_frame import as_declared
 from validate.register.markers.markers import MarkerObservation, observe_markers, vector
 from validate.register.markers.measures import FEWEST
-from validate.register.markers.rest_displacements import noise, rested
+from validate.register.markers.quality import as_declared
 from validate.register.observation import nearest_sample
-from validate.register.outlines.distances import enclosed
-from validate.register.outlines.outlines import OutlineObservation, observe_outlines
+from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
 from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.mesh import Mesh
 from validate.scene.places import pose_of

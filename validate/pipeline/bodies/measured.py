@@ -52,7 +52,7 @@ from validate.pipeline.run.cost import (
     newton_seconds,
 )
 from validate.recording.types import Recording
-from validate.scene.geometries.similar_grids import fitting, member
+from validate.scene.geometries.box import fitting, member
 from validate.scene.geometries.specification import Geometry, MeshFile
 from validate.scene.material import LawName
 from validate.scene.scene import Drive, Scene

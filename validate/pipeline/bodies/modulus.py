@@ -15,8 +15,7 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.errors import ComparisonError, SceneError, UsageError
-from validate.identify.budget import NOISE, IdentifiedValue
-from validate.identify.residual_pattern import pattern
+from validate.identify.budget import NOISE, IdentifiedValue, pattern
 from validate.identify.scaled_curve import PROPORTIONAL, ScaledFit, fit_proportional
 from validate.pipeline.bodies.body_registration import LOW
 from validate.pipeline.bodies.drive import drive_kind, mover
@@ -38,7 +37,7 @@ from validate.pipeline.experiment.experiment import Experiment, Identified, Inpu
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.case_solution import run_on
-from validate.recording.scatter import repeats_share
+from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation

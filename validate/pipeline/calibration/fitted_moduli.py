@@ -15,8 +15,7 @@ from scipy.special import chdtri
 from validate.arrays import Floats, rms
 from validate.compare.convergence import convergence
 from validate.errors import ComparisonError, SceneError
-from validate.identify.budget import IdentifiedValue
-from validate.identify.residual_pattern import MATERIAL, Pattern
+from validate.identify.budget import MATERIAL, IdentifiedValue, Pattern
 from validate.pipeline.experiment.experiment import Input, MeshLadder
 from validate.report.views.numbers import with_unit
 

@@ -11,8 +11,7 @@ from validate.arrays import Floats
 from validate.compare.residual import Residual, residuals
 from validate.errors import ComparisonError
 from validate.identify.identification import Identification
-from validate.identify.space import Range, Space
-from validate.identify.whiten import whitened
+from validate.identify.least_squares import Range, Space, whitened
 from validate.parameters import with_values
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment

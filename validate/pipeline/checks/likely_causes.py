@@ -18,8 +18,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.result import MethodResult
 from validate.errors import ValidateError
-from validate.identify.recorded_motion import RecordedMotion, recorded_motion
-from validate.identify.ringing import Ringing
+from validate.identify.recorded_motion import RecordedMotion, Ringing, recorded_motion
 from validate.pipeline.bodies.first_modes import first_frequencies
 from validate.pipeline.run.method_run import Followed
 from validate.register.observation import History

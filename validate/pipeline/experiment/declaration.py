@@ -92,14 +92,14 @@ _LEAVES = (str, bool, int, float, type(None))
 #: Modules whose dataclasses a declaration is made of, by the names of the classes.
 _MODULES = (
     "compare.effects", "compare.overall_verdict", "compare.published", "compare.verdict",
-    "estimate.filters", "register.markers.fitting", "register.sensing",
+    "estimate.filters", "register.markers.quality", "register.sensing",
     "pipeline.calibration.calibration", "pipeline.experiment.tree", "pipeline.plates.choices",
     "pipeline.experiment.experiment", "pipeline.plates.inclusion", "pipeline.plates.inclusion_body",
     "pipeline.bodies.choices", "pipeline.experiment.method", "pipeline.experiment.tree",
     "pipeline.experiment.variation", "scene.contact", "scene.geometries.specification",
     "scene.geometries.hollow_block", "scene.geometries.indented_bodies", "scene.laws",
-    "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.sheet",
-    "scene.tool", "scene.prescribed_motion", "solve.schemes",
+    "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.box",
+    "scene.contact", "scene.prescribed_motion", "solve.schemes",
 )  # fmt: skip
 _RUNS_PROGRAMS = ("ExternalSimulator", "ExternalLetGo")  # settings with a command to run
 

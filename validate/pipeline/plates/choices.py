@@ -11,7 +11,7 @@ from validate.parameters import Ranges, quantity
 from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT, PLATES
 from validate.pipeline.experiment.tree import Meshes
 from validate.pipeline.plates.outline import PressedOutline
-from validate.recording.tables.geometry import loaded_area
+from validate.recording.tables.specimen_sizes import loaded_area
 from validate.recording.types import Recording
 from validate.scene.scene import Support
 

@@ -46,7 +46,7 @@ from validate.pipeline.plates.scene import (
     pressed_size,
 )
 from validate.pipeline.run.cost import INPUTS, NODAL_MEAN, affordable, linear_seconds
-from validate.recording.scatter import repeats_share
+from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.scene.geometries.specification import Cylinder, MeshFile

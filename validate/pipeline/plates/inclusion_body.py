@@ -15,11 +15,11 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.plates.inclusion_sweep import SWEEP, stack_of, swept
 from validate.recording.types import Contours, Recording
 from validate.register.observation import nearest_sample
-from validate.register.outlines.inclusion import outlined_capsule
+from validate.register.outlines.round_outlines import outlined_capsule
 from validate.register.outlines.sweep import Stack
 from validate.register.signals import driving, holds_at, instant
+from validate.scene.geometries.box import member
 from validate.scene.geometries.inclusion import Block, Capsule, InclusionShape, block_with_inclusion
-from validate.scene.geometries.similar_grids import member
 from validate.scene.mesh import Mesh, quadratic
 
 WITHIN = 0.1e-3  # m: the stage stood at a load

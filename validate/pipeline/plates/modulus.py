@@ -18,9 +18,8 @@ from validate.arrays import Floats, rms
 from validate.errors import UsageError
 from validate.fem.system import build as build_system
 from validate.fem.system import responses
-from validate.identify.budget import NOISE, IdentifiedValue
+from validate.identify.budget import NOISE, IdentifiedValue, pattern
 from validate.identify.modulus import MIN_SAMPLES, ModulusFit, fit_modulus, loading
-from validate.identify.residual_pattern import pattern
 from validate.identify.scaled_curve import ScaledFit, UnitCurve, fit_modulus_of, fit_scaled
 from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT
 from validate.pipeline.calibration.fitted_moduli import (
@@ -47,7 +46,7 @@ from validate.pipeline.plates.scene import (
     kind_of_test,
     pressed_size,
 )
-from validate.recording.scatter import repeats_share
+from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import Cylinder
 from validate.scene.scene import Scene

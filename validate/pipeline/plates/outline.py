@@ -18,8 +18,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Selection, nearest_samples
-from validate.register.outlines.distances import enclosed
-from validate.register.outlines.outlines import OutlineObservation, observe_outlines
+from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
 from validate.register.outlines.plane import cavity_sampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation

@@ -1,19 +1,93 @@
-"""Events in signals (onset, step), and the offset between two streams of one event.
+"""Channels of a recording by name, events in them (onset, step), and the offset of two clocks.
 
 An onset is where a signal leaves its rest and begins to climb or fall; a step is where it crosses
 the middle between two levels.
+
+`force` is a signal of one column, `force.1` the second column of several, `markers.tip.z` a
+marker's coordinate, `images.brightness` the mean grey level of each image (a flash) and
+`images.change` the rms difference of each image from the one before (a motion). A leading `-`
+turns the sign.
 """
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from validate.arrays import Floats
-from validate.errors import RecordingError
-from validate.recording.clocks.alignment import MIN_COVERAGE, Offset, matched
-from validate.recording.clocks.lag import noise_of
-from validate.recording.types import Signal
+from validate.errors import RecordingError, UsageError
+from validate.recording.clocks.alignment import MIN_COVERAGE, Offset, matched, noise_of
+from validate.recording.types import Frames, Markers, Recording, Signal
+
+_AXES = "xyz"
+_OF_IMAGES = ("brightness", "change")
+
+
+def channel(recording: Recording, name: str) -> Signal:
+    """Return the channel as a signal (nt, 1), samples where nothing was seen left out.
+
+    Raises `UsageError` with the channels that there are.
+    """
+    plain = name.removeprefix("-")
+    topics = [t for t in recording.streams if plain == t or plain.startswith(f"{t}.")]
+    if not topics:
+        raise _unknown(recording, name)
+    topic = max(topics, key=len)
+    stream, rest = recording.streams[topic], plain[len(topic) + 1 :]
+    found = _found(stream, rest)
+    if found is None:
+        raise _unknown(recording, name)
+    seen = np.isfinite(found.y[:, 0])
+    sign = -1.0 if name.startswith("-") else 1.0
+    return replace(found, t=found.t[seen], y=sign * found.y[seen])
+
+
+def _found(stream: object, rest: str) -> Signal | None:
+    match stream:
+        case Signal() if not rest and stream.y.shape[1] == 1:
+            return stream
+        case Signal() if rest.isdecimal() and int(rest) < stream.y.shape[1]:
+            return replace(stream, y=stream.y[:, [int(rest)]])
+        case Markers():
+            marker, _, axis = rest.rpartition(".")
+            axes = _AXES[: stream.x.shape[2]]
+            if marker not in stream.names or len(axis) != 1 or axis not in axes:
+                return None
+            x = stream.x[:, stream.names.index(marker), axes.index(axis)]
+            # Missing ones leave before a signal of finite numbers is made.
+            seen = np.isfinite(x)
+            return Signal(stream.t[seen], x[seen, None], "m", stream.sd, stream.frame)
+        case Frames() if rest in _OF_IMAGES:
+            if rest == "brightness":
+                return _grey(stream.t, [image.mean() for image in stream.images])
+            pairs = zip(stream.images[:-1], stream.images[1:], strict=True)
+            away = [np.sqrt(((b.astype(float) - a) ** 2).mean()) for a, b in pairs]
+            return _grey((stream.t[1:] + stream.t[:-1]) / 2, away) if away else None
+    return None
+
+
+def _grey(t: Floats, values: list[float]) -> Signal:
+    return Signal(t, np.array(values)[:, None], "grey level", 0.0, "image")
+
+
+def _unknown(recording: Recording, name: str) -> UsageError:
+    listed = ", ".join(n for topic in recording.streams for n in _names(recording, topic))
+    return UsageError(f"{recording.name}: no channel '{name}'; there are {listed}")
+
+
+def _names(recording: Recording, topic: str) -> list[str]:
+    match recording.streams[topic]:
+        case Signal() as s if s.y.shape[1] == 1:
+            return [topic]
+        case Signal() as s:
+            return [f"{topic}.{i}" for i in range(s.y.shape[1])]
+        case Markers() as m:
+            return [f"{topic}.{m.names[0]}.x", f"... ({len(m.names)} markers)"]
+        case Frames():
+            return [f"{topic}.{what}" for what in _OF_IMAGES]
+    return []
+
 
 Kind = Literal["onset", "step"]
 Window = tuple[float, float]
@@ -44,11 +118,6 @@ def event_time(signal: Signal, kind: Kind, window: Window | None = None) -> tupl
 
     Raises `RecordingError` for a flat signal, several steps, and an event at the edge.
     """
-    t, y = _windowed(signal, window)
-    return _onset(t, y, signal.unit) if kind == "onset" else _step(t, y, signal.unit)
-
-
-def _windowed(signal: Signal, window: Window | None) -> tuple[Floats, Floats]:
     if signal.y.shape[1] != 1:
         raise RecordingError(f"an event needs 1 column, the signal has {signal.y.shape[1]}")
     low, high = window or (signal.t[0], signal.t[-1])
@@ -57,7 +126,8 @@ def _windowed(signal: Signal, window: Window | None) -> tuple[Floats, Floats]:
         raise RecordingError(
             f"{int(inside.sum())} samples between {low:g} and {high:g} s; {_MIN_SAMPLES} are needed"
         )
-    return signal.t[inside], signal.y[inside, 0]
+    t, y = signal.t[inside], signal.y[inside, 0]
+    return _onset(t, y, signal.unit) if kind == "onset" else _step(t, y, signal.unit)
 
 
 def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
@@ -77,22 +147,14 @@ def _step(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
     i = int(crossings[0])
     flank = np.flatnonzero((level > 0.2) & (level < 0.8))
     if len(flank) < 3 or np.ptp(flank) + 1 != len(flank):
-        return _between(t, level, i)
-    return _on_line(t[flank], level[flank] - 0.5, noise / abs(high - low))
-
-
-def _between(t: Floats, level: Floats, i: int) -> tuple[float, float]:
-    """Where a line from sample i to the next crosses; the step may be anywhere between them."""
-    gap = float(t[i + 1] - t[i])
-    part = (0.5 - level[i]) / (level[i + 1] - level[i])
-    return float(t[i] + part * gap), gap / float(np.sqrt(12))
-
-
-def _on_line(t: Floats, y: Floats, noise: float) -> tuple[float, float]:
-    """Zero of the line through y(t), sd from the larger of the noise and what a cubic leaves.
-
-    A flank is bent alike on both sides of its middle, which a line's own residuals would count.
-    """
+        # Where a line from sample i to the next crosses; the step may be anywhere between them.
+        gap = float(t[i + 1] - t[i])
+        part = (0.5 - level[i]) / (level[i + 1] - level[i])
+        return float(t[i] + part * gap), gap / float(np.sqrt(12))
+    # Zero of the line through y(t), sd from the larger of the noise and what a cubic leaves.
+    t = t[flank]
+    y = level[flank] - 0.5
+    noise = noise / abs(high - low)
     x = t - t.mean()
     slope, height = np.polyfit(x, y, 1)
     if len(t) >= _MIN_SAMPLES:
@@ -117,11 +179,10 @@ def _onset(t: Floats, y: Floats, unit: str) -> tuple[float, float]:
             f"the event is at the edge: {first} samples before it, {len(y) - first} after; give a "
             "window with more rest before it"
         )
-    return _corner(t[:stop], y[:stop], float(t[first]))
-
-
-def _corner(t: Floats, y: Floats, start: float) -> tuple[float, float]:
-    """The corner with the least squares left, its sd from the slopes of all three unknowns."""
+    # The corner with the least squares left, its sd from the slopes of all three unknowns.
+    t = t[:stop]
+    y = y[:stop]
+    start = float(t[first])
     low, high = float(t[2]), min(float(t[-3]), start + 0.5 * float(t[-1] - start))
     tries = np.linspace(low, high, 4 * len(t))
     best = float(tries[np.argmin([_bent(t, y, x)[0] for x in tries])])

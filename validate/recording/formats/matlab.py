@@ -16,21 +16,26 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, elements
-from validate.recording.formats.options import (
+from validate.recording.formats.matlab_arrays import COMPRESSED, MAGIC, MAGIC_73, elements
+from validate.recording.formats.streams import begun, recorded
+from validate.recording.formats.subprocess_decoder import decoded
+from validate.recording.reader import (
     M_PER_PX,
     RATE,
     SD,
     UNIT,
+    MapOption,
+    Options,
+    Reader,
     above_zero,
     frame,
+    head,
     length,
+    require_known,
+    source_of,
     spread,
 )
-from validate.recording.formats.streams import begun, recorded
-from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.reader import MapOption, Options, Reader, head, require_known, source_of
-from validate.recording.tables.displacement_field import FieldColumns, field_columns
+from validate.recording.tables.point_layout import FieldColumns, field_columns
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Frames, Markers, Recording, Signal, Stream
 from validate.units import in_si, si_of
@@ -54,9 +59,35 @@ def no_stream(path: str, found: Arrays) -> str:
     if values.dtype.kind not in "fiu":
         return ""
     if values.ndim == 2 and values.shape[1] in (2, 3) and len(values) > 1:
-        return _indices(path, found)
+        # Whole numbers, each row an edge or a triangle by the rows of its corners in another
+        # array.
+        values = found[path]
+        if not np.isfinite(values).all() or (values != np.rint(values)).any():
+            return ""
+        low, high, kinds = int(values.min()), int(values.max()), len(np.unique(values))
+        what = (
+            f"a list of {('edges', 'triangles')[values.shape[1] - 2]} by the rows of another array"
+        )
+        told = f"{what} (whole numbers {low} to {high}), not points"
+        if values.dtype.kind in "iu":
+            return f"{told}; if they are coordinates, save them as double"
+        others = (a for n, a in found.items() if n != path and a.ndim == 2 and a.dtype.kind == "f")
+        listed = low >= 0 and high <= max(map(len, others), default=0)
+        name, twice = _leaf(path), (np.diff(np.sort(values, axis=1), axis=1) == 0).any()
+        if _LISTS.fullmatch(name) or (_LETTERS.fullmatch(name) and listed):
+            return told
+        all_occur = low in (0, 1) and kinds == high - low + 1
+        shared = values.size >= 2 * kinds and not twice
+        return told if shared and (all_occur or listed) else ""
     deep = values.dtype == np.uint8 and values.ndim == 3 and min(values.shape) > 1
-    return _volume(path, found) if deep else ""
+    if deep:
+        # By its name, or by a spacing in three directions beside it.
+        three = [n for n, a in found.items() if a.size == 3 and _SPACING.fullmatch(_leaf(n))]
+        if not three and not _VOLUME.fullmatch(_leaf(path)):
+            return ""
+        by = f"{three[0]} has three numbers" if three else "its name says so"
+        return f"a volume ({by}), not images over time; images are read as uint8 (h, w, nt)"
+    return ""
 
 
 def field_at(path: str, found: Arrays) -> FieldColumns | None:
@@ -71,39 +102,6 @@ def field_at(path: str, found: Arrays) -> FieldColumns | None:
 
 def _leaf(path: str) -> str:
     return path.rpartition(".")[2]
-
-
-def _indices(path: str, found: Arrays) -> str:
-    """Whole numbers, each row an edge or a triangle by the rows of its corners in another array.
-
-    Doubles are such a list where they are called so, or where numbers occur twice on average, but
-    not in one row, and either all from 0 or 1 on do or another array has that many rows.
-    """
-    values = found[path]
-    if not np.isfinite(values).all() or (values != np.rint(values)).any():
-        return ""
-    low, high, kinds = int(values.min()), int(values.max()), len(np.unique(values))
-    what = f"a list of {('edges', 'triangles')[values.shape[1] - 2]} by the rows of another array"
-    told = f"{what} (whole numbers {low} to {high}), not points"
-    if values.dtype.kind in "iu":
-        return f"{told}; if they are coordinates, save them as double"
-    others = (a for n, a in found.items() if n != path and a.ndim == 2 and a.dtype.kind == "f")
-    listed = low >= 0 and high <= max(map(len, others), default=0)
-    name, twice = _leaf(path), (np.diff(np.sort(values, axis=1), axis=1) == 0).any()
-    if _LISTS.fullmatch(name) or (_LETTERS.fullmatch(name) and listed):
-        return told
-    all_occur = low in (0, 1) and kinds == high - low + 1
-    shared = values.size >= 2 * kinds and not twice
-    return told if shared and (all_occur or listed) else ""
-
-
-def _volume(path: str, found: Arrays) -> str:
-    """By its name, or by a spacing in three directions beside it."""
-    three = [n for n, a in found.items() if a.size == 3 and _SPACING.fullmatch(_leaf(n))]
-    if not three and not _VOLUME.fullmatch(_leaf(path)):
-        return ""
-    by = f"{three[0]} has three numbers" if three else "its name says so"
-    return f"a volume ({by}), not images over time; images are read as uint8 (h, w, nt)"
 
 
 # --- Arrays of a file that states neither meaning nor unit, as the streams that a user names.
@@ -186,12 +184,39 @@ def named_stream(key: str, said: NamedArray, found: Arrays, options: Options) ->
     values = found[said.path].astype(np.float64)
     values = values.ravel() if values.size == max(values.shape, default=1) else values
     t = times_of(options, found)
-    order = _order(key, values.shape, None if t is None else len(t), options)
+    # Which axis is which: t times, c channels, p points, x coordinates; r, which they have
+    # with a residual, is told as x.
+    shape = values.shape
+    nt = None if t is None else len(t)
+    told = options.get(f"{AXES}{key}", "")
+    if told:
+        order = told.replace("r", "x")
+        plain = tuple(
+            3 if (c, n) == ("r", _RESIDUAL) else 0 if c == "r" else n
+            for c, n in zip(told, shape, strict=False)
+        )
+        if order not in _KNOWN or len(told) != len(shape) or not _fits(order, plain, nt):
+            raise UsageError(f"--map {AXES}{key}={told}: {_misfit(key, shape, nt)}")
+    else:
+        fitting = [order for order in _ORDERS.get(len(shape), ()) if _fits(order, shape, nt)]
+        if len(fitting) != 1:
+            raise UsageError(f"{key}: {_misfit(key, shape, nt)}")
+        order = fitting[0]
     factor, unit = si_of(said.unit)
     scaled = said.sign * factor * values
     frame = options.get("frame", "matlab")
     if "x" in order:
-        return _markers(key, scaled, order, unit, t, options, frame)
+        if unit != "m":
+            raise UsageError(f"{key}: coordinates in '{unit}'; expected a length, as :mm")
+        whole = np.transpose(scaled, [order.index(c) for c in "tpx" if c in order])
+        whole = whole[..., :3].reshape(
+            whole.shape[0] if "t" in order else 1,
+            -1 if "p" in order else 1,
+            min(whole.shape[-1], 3),
+        )
+        names = tuple(str(i + 1) for i in range(whole.shape[1]))
+        times = _times(key, len(whole), t, options) if "t" in order else np.zeros(1)
+        return Markers(times, names, whole, spread(options), frame)
     y = scaled.reshape(len(scaled), -1) if order[0] == "t" else scaled.T
     times, kept = _times(key, len(y), t, options), ~np.isnan(y).any(axis=1)
     return (
@@ -217,25 +242,6 @@ def note_on(
     return "; ".join(notes)
 
 
-def _order(key: str, shape: tuple[int, ...], nt: int | None, options: Options) -> str:
-    """Which axis is which: t times, c channels, p points, x coordinates; r, which they
-    have with a residual, is told as x."""
-    told = options.get(f"{AXES}{key}", "")
-    if told:
-        order = told.replace("r", "x")
-        plain = tuple(
-            3 if (c, n) == ("r", _RESIDUAL) else 0 if c == "r" else n
-            for c, n in zip(told, shape, strict=False)
-        )
-        if order not in _KNOWN or len(told) != len(shape) or not _fits(order, plain, nt):
-            raise UsageError(f"--map {AXES}{key}={told}: {_misfit(key, shape, nt)}")
-        return order
-    fitting = [order for order in _ORDERS.get(len(shape), ()) if _fits(order, shape, nt)]
-    if len(fitting) != 1:
-        raise UsageError(f"{key}: {_misfit(key, shape, nt)}")
-    return fitting[0]
-
-
 def _fits(order: str, shape: tuple[int, ...], nt: int | None) -> bool:
     size = dict(zip(order, shape, strict=True))
     return size.get("x", 3) in (2, 3) and (nt is None or size.get("t", nt) == nt)
@@ -248,20 +254,6 @@ def _misfit(key: str, shape: tuple[int, ...], nt: int | None) -> str:
         f"or --map {AXES}{key}=tpx (t times, p points, x coordinates, r those and a residual, "
         "c channels; one letter an axis)"
     )
-
-
-def _markers(
-    key: str, x: Floats, order: str, unit: str, t: Floats | None, options: Options, frame: str
-) -> Markers:
-    if unit != "m":
-        raise UsageError(f"{key}: coordinates in '{unit}'; expected a length, as :mm")
-    whole = np.transpose(x, [order.index(c) for c in "tpx" if c in order])
-    whole = whole[..., :3].reshape(
-        whole.shape[0] if "t" in order else 1, -1 if "p" in order else 1, min(whole.shape[-1], 3)
-    )
-    names = tuple(str(i + 1) for i in range(whole.shape[1]))
-    times = _times(key, len(whole), t, options) if "t" in order else np.zeros(1)
-    return Markers(times, names, whole, spread(options), frame)
 
 
 def _times(key: str, count: int, t: Floats | None, options: Options) -> Floats:
@@ -278,7 +270,6 @@ def _times(key: str, count: int, t: Floats | None, options: Options) -> Floats:
 
 Variable = NDArray[Any]
 
-_MAGIC_73 = b"MATLAB 7.3"
 _GENERAL = (
     UNIT,
     SD,
@@ -307,14 +298,38 @@ def read_matlab(path: Path, options: Options) -> Recording:
     """
     require_known([key for key, text in options.items() if not text], _GENERAL)
     integrity = _integrity(path)
-    found = _arrays(path)
+    found = decoded("validate.recording.formats.matlab_arrays", path)
     general = {option.name for option in _GENERAL}
     asked = {k: v for k, v in options.items() if k not in general and not k.startswith(AXES)}
     for key in options:
         if key.startswith(AXES) and key.removeprefix(AXES) not in asked:
             raise UsageError(f"--map {key}=...: no stream of that name; {sorted(asked) or 'none'}")
     if asked:
-        streams, used, notes = _named(path, asked, found, options)
+        # The streams that the user names, the paths of their arrays, and what is to be told.
+        if "unit" in options:
+            raise UsageError(
+                "--map unit=...: give the unit with each named array, as --map tip=x.tip:mm"
+            )
+        streams: dict[str, Stream] = {}
+        notes: dict[str, str] = {}
+        said = {key: named_array(key, text, found) for key, text in asked.items()}
+        for key, array in said.items():
+            try:
+                if array.unit == "px":
+                    _require_stream(array.path, found)
+                    streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
+                    continue
+                made = streams[key] = named_stream(key, array, found, options)
+                if isinstance(made, Markers):
+                    _require_stream(array.path, found)
+                if "time" not in options and (field := field_at(array.path, found)):
+                    raise RecordingError(field.refusal(f"an array {found[array.path].shape}"))
+                if note := note_on(key, array, found, made, options):
+                    notes[key] = f"{asked[key]}: {note}"
+            except RecordingError as error:
+                raise RecordingError(f"{path.name}: {array.path}: {error}") from None
+        time = {options["time"].split(":")[0]} if "time" in options else set()
+        used = {array.path for array in said.values()} | time
     else:
         (streams, used), notes = _unnamed(path, found, options), {}
     unread = {
@@ -322,38 +337,8 @@ def read_matlab(path: Path, options: Options) -> Recording:
         for name, said in listing(found).items()
         if name not in used
     }
-    told = {"kind": _version(path), **options, **notes}
+    told = {"kind": head(path, len(MAGIC_73)).decode("ascii", "replace"), **options, **notes}
     return recorded(path.stem, source_of(path, integrity), begun(streams), told, unread)
-
-
-def _named(
-    path: Path, asked: Options, found: Arrays, options: Options
-) -> tuple[dict[str, Stream], set[str], dict[str, str]]:
-    """The streams that the user names, the paths of their arrays, and what is to be told."""
-    if "unit" in options:
-        raise UsageError(
-            "--map unit=...: give the unit with each named array, as --map tip=x.tip:mm"
-        )
-    streams: dict[str, Stream] = {}
-    notes: dict[str, str] = {}
-    said = {key: named_array(key, text, found) for key, text in asked.items()}
-    for key, array in said.items():
-        try:
-            if array.unit == "px":
-                _require_stream(array.path, found)
-                streams[key] = _frames(f"{path.name}: {array.path}", found[array.path], options)
-                continue
-            made = streams[key] = named_stream(key, array, found, options)
-            if isinstance(made, Markers):
-                _require_stream(array.path, found)
-            if "time" not in options and (field := field_at(array.path, found)):
-                raise RecordingError(field.refusal(f"an array {found[array.path].shape}"))
-            if note := note_on(key, array, found, made, options):
-                notes[key] = f"{asked[key]}: {note}"
-        except RecordingError as error:
-            raise RecordingError(f"{path.name}: {array.path}: {error}") from None
-    time = {options["time"].split(":")[0]} if "time" in options else set()
-    return streams, {array.path for array in said.values()} | time, notes
 
 
 def _unnamed(path: Path, found: Arrays, options: Options) -> tuple[dict[str, Stream], set[str]]:
@@ -390,21 +375,7 @@ def _require_stream(name: str, found: Arrays) -> None:
 def held_in(path: Path) -> dict[str, str]:
     """Every array of a MATLAB file with its shape and type, and what is none by its word."""
     _integrity(path)
-    return listing(_arrays(path))
-
-
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    new = head(path, len(_MAGIC_73)) == _MAGIC_73
-    return decoded(
-        "validate.recording.formats.matlab73_arrays"
-        if new
-        else "validate.recording.formats.matlab_arrays",
-        path,
-    )
-
-
-def _version(path: Path) -> str:
-    return head(path, len(_MAGIC_73)).decode("ascii", "replace")
+    return listing(decoded("validate.recording.formats.matlab_arrays", path))
 
 
 def _integrity(path: Path) -> str:
@@ -413,7 +384,7 @@ def _integrity(path: Path) -> str:
         raise RecordingError(
             f"{path}: no such file" if not path.exists() else f"{path}: not a file"
         )
-    if head(path, len(_MAGIC_73)) == _MAGIC_73:
+    if head(path, len(MAGIC_73)) == MAGIC_73:
         return "HDF5 of MATLAB 7.3 keeps no checksum of its numbers: integrity not provable"
     try:
         kinds = [kind for kind, _, _ in elements(path)]
@@ -431,18 +402,14 @@ def _stream(path: Path, name: str, values: Variable, options: Options) -> Marker
         if values.dtype == np.uint8 and len(shape) in (2, 3):
             return _frames(f"{path.name}: {name}", values, options)
         if values.dtype.kind in "fiu" and len(shape) == 2 and shape[0] > 1 and shape[1] in (2, 3):
-            return _points(f"{path.name}: {name}", values, options)
+            _said(f"{path.name}: {name}", "unit", "mm", options, "unit of length")
+            unit = length(options, "unit", "mm")
+            names = tuple(str(i + 1) for i in range(len(values)))
+            x = unit * values[None].astype(np.float64)
+            return Markers(np.zeros(1), names, x, spread(options), options.get("frame", "matlab"))
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {name}: {error}") from None
     return None
-
-
-def _points(what: str, values: Variable, options: Options) -> Markers:
-    _said(what, "unit", "mm", options, "unit of length")
-    unit = length(options, "unit", "mm")
-    names = tuple(str(i + 1) for i in range(len(values)))
-    x = unit * values[None].astype(np.float64)
-    return Markers(np.zeros(1), names, x, spread(options), options.get("frame", "matlab"))
 
 
 def _frames(what: str, values: Variable, options: Options) -> Frames:
@@ -468,7 +435,7 @@ def _said(what: str, key: str, example: str, options: Options, lacks: str) -> No
 MATLAB = Reader(
     "matlab",
     "MATLAB 5 or 7.3",
-    lambda p: head(p, len(MAGIC)) == MAGIC or head(p, len(_MAGIC_73)) == _MAGIC_73,
+    lambda p: head(p, len(MAGIC)) == MAGIC or head(p, len(MAGIC_73)) == MAGIC_73,
     read_matlab,
     "it begins with 'MATLAB 5.0' or 'MATLAB 7.3'",
     holds=held_in,

@@ -1,4 +1,8 @@
-"""Arrays of a MATLAB 5 file. The only file that imports scipy.io."""
+"""Arrays of MATLAB 5 and 7.3 files. The only reader that imports scipy.io and h5py.
+
+HDF5 (7.3) counts axes the other way round: an array of h rows and w columns stands there as (w, h).
+Links to other files, and data that lie in them, are not followed.
+"""
 
 import struct
 import warnings
@@ -12,14 +16,21 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.files import open_file
+from validate.recording.reader import head
 
-LIBRARIES = ("scipy.io",)
+LIBRARIES = ("scipy.io", "h5py")
 MAGIC = b"MATLAB 5.0 MAT-file"
+MAGIC_73 = b"MATLAB 7.3"
+_HDF5 = b"\x89HDF"  # without the header that MATLAB writes before it
 HEADER = 128  # bytes
 _ORDERS = {b"IM": "<", b"MI": ">"}  # of bytes, by the header's last two
 MATRIX, COMPRESSED = 14, 15  # types of what may stand behind the header
 _CHUNK = 2**20  # bytes unpacked at once
 MOST = 2**29  # bytes of one variable, unpacked
+MOST_NUMBERS = 2**28  # numbers of all arrays
+_DEPTH = 16  # structs in structs
+_INTEGERS = tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
+_NUMBERS = ("double", "single", "logical", *_INTEGERS)
 
 
 def elements(path: Path) -> list[tuple[int, int, int]]:
@@ -52,9 +63,18 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     `data.load` is the field `load` of the struct `data`. What is no array of numbers stands as its
     own word for what it is: an array () of text.
     """
+    if head(path, len(MAGIC_73)).startswith((MAGIC_73, _HDF5)):
+        return _hdf5_arrays(path)
     from scipy.io import loadmat
 
-    _require_sums(path)
+    # Every packed variable unpacks to the size that it states itself, and to its checksum.
+    parts = elements(path)
+    with open_file(path) as file:
+        order = _ORDERS[file.read(HEADER)[-2:]]
+        for kind, at, count in parts:
+            file.seek(at)
+            if kind == COMPRESSED and not _unpacks(file.read(count), order):
+                raise RecordingError(f"the variable at byte {at} fails its checksum; damaged")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the second reading loses what is imaginary
         # As stored (whole doubles in one byte each), and of the class that they had.
@@ -93,17 +113,6 @@ def _word(value: Any, dtype: np.dtype[Any]) -> str:
     )
 
 
-def _require_sums(path: Path) -> None:
-    """Every packed variable unpacks to the size that it states itself, and to its checksum."""
-    parts = elements(path)
-    with open_file(path) as file:
-        order = _ORDERS[file.read(HEADER)[-2:]]
-        for kind, at, count in parts:
-            file.seek(at)
-            if kind == COMPRESSED and not _unpacks(file.read(count), order):
-                raise RecordingError(f"the variable at byte {at} fails its checksum; damaged")
-
-
 def _unpacks(packed: bytes, order: str) -> bool:
     """Whether the packed bytes end where their own size and checksum (Adler-32) hold.
 
@@ -119,7 +128,16 @@ def _unpacks(packed: bytes, order: str) -> bool:
         if not some and len(unpack.unconsumed_tail) == len(packed):
             return False  # nothing more comes
         if not size:
-            stated = _stated(some, order)
+            # Bytes that a variable states, its tag of 8 among them.
+            if len(some) < 8:
+                stated = 8
+            else:
+                count = 8 + int(struct.unpack(f"{order}II", some)[1])
+                if count > MOST:
+                    raise RecordingError(
+                        f"a variable of {count} bytes unpacked, the limit is {MOST}"
+                    )
+                stated = count
         size += len(some)
         if size > stated + 8:  # with what fills its last eight
             return False
@@ -127,11 +145,66 @@ def _unpacks(packed: bytes, order: str) -> bool:
     return not unpack.unused_data
 
 
-def _stated(tag: bytes, order: str) -> int:
-    """Bytes that a variable states, its tag of 8 among them."""
-    if len(tag) < 8:
-        return 8
-    count = 8 + int(struct.unpack(f"{order}II", tag)[1])
-    if count > MOST:
-        raise RecordingError(f"a variable of {count} bytes unpacked, the limit is {MOST}")
-    return count
+# --- MATLAB 7.3: HDF5.
+
+
+def _hdf5_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Arrays of an HDF5 file by their path, axes as MATLAB shows them.
+
+    What is no array of numbers is its own word: an array () of text. Raises `RecordingError` for
+    more numbers than `MOST_NUMBERS`.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        found = dict(_held(h5py, file, "", _DEPTH))
+        count = sum(v.size for v in found.values() if not isinstance(v, str))
+        if count > MOST_NUMBERS:
+            raise RecordingError(f"{count} numbers, the limit is {MOST_NUMBERS}; split it")
+        return {n: np.array(v) if isinstance(v, str) else _values(v) for n, v in found.items()}
+
+
+def _held(h5py: Any, group: Any, before: str, depth: int) -> Iterator[tuple[str, Any]]:
+    """Datasets of numbers and words for what is none, by path."""
+    for name in group:
+        if name.startswith("#"):  # where MATLAB keeps what cells and objects refer to
+            continue
+        path = f"{before}{name}"
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            yield path, "a link, not followed"
+            continue
+        item = group[name]
+        kind = _kind(item)
+        if isinstance(item, h5py.Group) and kind == "struct" and depth:
+            yield from _held(h5py, item, f"{path}.", depth - 1)
+        else:
+            yield path, _dataset(h5py, item, kind)
+
+
+def _kind(item: Any) -> str:
+    if "MATLAB_sparse" in item.attrs:
+        return "sparse"
+    said = item.attrs.get("MATLAB_class", b"struct" if hasattr(item, "keys") else b"")
+    return said.decode("ascii", "replace") if isinstance(said, bytes) else str(said)
+
+
+def _dataset(h5py: Any, item: Any, kind: str) -> Any:
+    """The dataset where it holds numbers, else a word for what it is."""
+    if not isinstance(item, h5py.Dataset):
+        return kind
+    if item.dtype.kind == "O" and kind in ("", "struct", *_NUMBERS):
+        return "struct array"  # a reference for each element
+    if kind and kind not in _NUMBERS:
+        return kind
+    if item.attrs.get("MATLAB_empty", 0):
+        return f"empty {kind}"
+    if item.is_virtual or item.external:
+        return "data in another file, not followed"
+    if item.dtype.names:
+        return f"{item.shape[::-1]} complex"  # real, imag
+    return item if item.dtype.kind in "fiub" else str(item.dtype)
+
+
+def _values(dataset: Any) -> NDArray[Any]:
+    values = np.asarray(dataset[()]).T
+    return values.astype(bool) if _kind(dataset) == "logical" else values

@@ -9,10 +9,19 @@ import numpy as np
 
 from validate.errors import RecordingError
 from validate.files import json_value
-from validate.recording.formats.options import SD, UNIT, frame, length, spread
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import TextRow, TextRows, text_rows
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    length,
+    source_of,
+    spread,
+)
 from validate.recording.tables.encoding import whole_file
 from validate.recording.types import Markers, Recording
 
@@ -46,26 +55,17 @@ def read_fcsv(path: Path, options: Options) -> Recording:
     stated = [r.cells for r in held.rows if r.cell(0).startswith("#")]
     header = dict(c[0].lstrip("# ").partition(" = ")[::2] for c in stated)
     system = header.get("CoordinateSystem", header.get("coordinateSystem", "0"))
-    names = _columns(stated)
+    named = "# columns = "
+    columns = ((c[0].removeprefix(named), *c[1:]) for c in stated if c[0].startswith(named))
+    names = next(columns, _COLUMNS)
     rows = [r for r in held.rows if any(r.cells) and not r.cell(0).startswith("#")]
-    _require_whole(held, rows)
-    points = [_point(held, row, names) for row in rows]
-    return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
-
-
-def _columns(stated: Sequence[Sequence[str]]) -> Sequence[str]:
-    for cells in stated:
-        if cells[0].startswith("# columns = "):
-            return (cells[0].removeprefix("# columns = "), *cells[1:])
-    return _COLUMNS
-
-
-def _require_whole(held: TextRows, rows: Sequence[TextRow]) -> None:
     cells = [len(r.cells) for r in rows]
     if held.open_end and cells and cells[-1] < max(cells):
         raise RecordingError(
             f"{held.name}: line {rows[-1].line} has {cells[-1]} cells, others {max(cells)}; cut"
         )
+    points = [_point(held, row, names) for row in rows]
+    return _landmarks(path, points, _SYSTEMS.get(system, system), "landmarks (FCSV)", options)
 
 
 def _point(held: TextRows, row: TextRow, names: Sequence[str]) -> _Point:
@@ -90,7 +90,16 @@ def _three(what: str, values: Any) -> Sequence[float]:
 
 def read_markups(path: Path, options: Options) -> Recording:
     """Control points of all lists of the file as landmarks (1, k, 3) m; as `read_fcsv`."""
-    lists = _lists(path)
+    data = whole_file(path)
+    try:
+        if len(data) > _LARGEST:
+            raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
+        found = json_value(data)["markups"]
+        if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
+            raise ValueError("its 'markups' is not a list of lists")
+    except (ValueError, TypeError, KeyError) as error:
+        raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
+    lists = found
     systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
     units = {unit for m in lists for unit in _units(m)}
     if len(systems) > 1 or len(units) > 1:
@@ -109,19 +118,6 @@ def _units(markups: Mapping[str, Any]) -> list[str]:
     """The unit of a list, which may state one for each axis."""
     stated = markups.get("coordinateUnits", "mm")
     return [str(unit) for unit in stated] if isinstance(stated, list) and stated else [str(stated)]
-
-
-def _lists(path: Path) -> list[Mapping[str, Any]]:
-    data = whole_file(path)
-    try:
-        if len(data) > _LARGEST:
-            raise ValueError(f"{len(data)} bytes, the limit is {_LARGEST}")
-        found = json_value(data)["markups"]
-        if not (isinstance(found, list) and found and all(isinstance(m, dict) for m in found)):
-            raise ValueError("its 'markups' is not a list of lists")
-    except (ValueError, TypeError, KeyError) as error:
-        raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
-    return found
 
 
 def _control(path: Path, point: Any) -> _Point:

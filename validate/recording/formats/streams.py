@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.types import Record, Recording, Source, Stream, by_kind
+from validate.recording.types import Record, Recording, Source, Stream, by_kind, clock_of
 
 _LONGEST = 9e9  # s
 

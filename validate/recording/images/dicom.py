@@ -9,11 +9,21 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.files import member, members
-from validate.recording.formats.options import M_PER_PX, RATE, WHITE, above_zero, frame, length
 from validate.recording.formats.streams import recorded
 from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import shallow
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    WHITE,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    source_of,
+)
 from validate.recording.types import Frames, Recording, Source, Stream
 
 # --- Which files are DICOM: known by what stands at byte 128.
@@ -79,7 +89,16 @@ def read_dicom(path: Path, options: Options) -> Recording:
     found = decoded("validate.recording.images.dicom_arrays", path, None, _SECONDS, "dicom")
     images, levels = shallow(list(found["images"]), options)
     height, width = images[0].shape
-    t = _times(path, found, options)
+    count = len(found["images"])
+    if "rate" in options:
+        t = np.arange(count) / above_zero(options, "rate")
+    else:
+        if len(found["t"]) != count:
+            raise UsageError(
+                f"{path.name}: {count} images without times; give --map rate=HZ (a volume is not "
+                "read)"
+            )
+        t = np.asarray(np.rint(1e9 * found["t"]) / 1e9)
     frame = options.get("frame", "image")
     regions, scale = _regions(path, found, options)
     streams: dict[str, Stream] = {}
@@ -98,17 +117,6 @@ def read_dicom(path: Path, options: Options) -> Recording:
     return recorded(name, source, streams, told)
 
 
-def _times(path: Path, found: Mapping[str, Any], options: Options) -> Floats:
-    count = len(found["images"])
-    if "rate" in options:
-        return np.arange(count) / above_zero(options, "rate")
-    if len(found["t"]) != count:
-        raise UsageError(
-            f"{path.name}: {count} images without times; give --map rate=HZ (a volume is not read)"
-        )
-    return np.asarray(np.rint(1e9 * found["t"]) / 1e9)
-
-
 def _timed(found: Mapping[str, Any], options: Options) -> str:
     return f"{options['rate']} Hz (entered)" if "rate" in options else str(found["timed"])
 
@@ -125,7 +133,13 @@ def _regions(
     planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
               and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
     if not planes:
-        x, y = _spacing(path, found["spacing"])
+        spacing = found["spacing"]
+        if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
+            raise UsageError(
+                f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
+                f"m_per_px=0.1mm"
+            )
+        x, y = 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
         return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm per pixel (PixelSpacing)"
     boxes = [
         (_box(path, r, width, height), (float(r[4]), float(r[5])))
@@ -133,15 +147,6 @@ def _regions(
     ]
     sides = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in boxes)
     return boxes, f"{sides} mm per pixel (SequenceOfUltrasoundRegions)"
-
-
-def _spacing(path: Path, spacing: Floats) -> tuple[float, float]:
-    if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
-        raise UsageError(
-            f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
-            f"m_per_px=0.1mm"
-        )
-    return 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
 
 
 def _box(path: Path, region: Floats, width: int, height: int) -> _Box:

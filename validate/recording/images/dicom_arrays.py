@@ -51,7 +51,25 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """
     sets = _series(path) if path.is_dir() else [_read(path)]
     if len(sets) == 1:
-        _require_no_volume(sets[0])
+        # Refuse images of one file that lie behind each other: by the vector that counts them
+        # (PS3.3 C.7.6.6.1), their dimensions or places (C.7.6.16, C.7.6.17), or a distance
+        # without times.
+        ds = sets[0]
+        count = int(ds.get("NumberOfFrames") or 1)
+        frames = ds.get("PerFrameFunctionalGroupsSequence", ())
+        places = {str(p.get("ImagePositionPatient")) for f in frames
+                  for p in f.get("PlanePositionSequence", ())}  # fmt: skip
+        distance = float(ds.get("SpacingBetweenSlices") or 0)
+        why = {
+            "spaced by distance": ds.get("FrameIncrementPointer") in _BY_PLACE,
+            "organised in 3D": ds.get("DimensionOrganizationType") == "3D",
+            f"of {len(places)} places": len(places) > 1,
+            f"{distance:g} mm between slices, without times": distance > 0
+            and not len(_times(ds, count)[0]),
+        }
+        found = next((text for text, holds in why.items() if holds), "")
+        if count > 1 and found:
+            raise RecordingError(f"{count} slices of a volume ({found}), not images over time")
     images = _images(sets)
     t, timed = _moments(sets) if len(sets) > 1 else _times(sets[0], len(images))
     ds = sets[0]
@@ -95,26 +113,6 @@ def _series(folder: Path) -> list[pydicom.Dataset]:
     if None in numbers or len(set(numbers)) < len(sets):
         raise RecordingError(f"{len(set(numbers))} instance numbers of {len(sets)} files")
     return sorted(sets, key=lambda ds: int(ds.InstanceNumber))
-
-
-def _require_no_volume(ds: pydicom.Dataset) -> None:
-    """Refuse images of one file that lie behind each other: by the vector that counts them (PS3.3
-    C.7.6.6.1), their dimensions or places (C.7.6.16, C.7.6.17), or a distance without times."""
-    count = int(ds.get("NumberOfFrames") or 1)
-    frames = ds.get("PerFrameFunctionalGroupsSequence", ())
-    places = {str(p.get("ImagePositionPatient")) for f in frames
-              for p in f.get("PlanePositionSequence", ())}  # fmt: skip
-    distance = float(ds.get("SpacingBetweenSlices") or 0)
-    why = {
-        "spaced by distance": ds.get("FrameIncrementPointer") in _BY_PLACE,
-        "organised in 3D": ds.get("DimensionOrganizationType") == "3D",
-        f"of {len(places)} places": len(places) > 1,
-        f"{distance:g} mm between slices, without times": distance > 0
-        and not len(_times(ds, count)[0]),
-    }
-    found = next((text for text, holds in why.items() if holds), "")
-    if count > 1 and found:
-        raise RecordingError(f"{count} slices of a volume ({found}), not images over time")
 
 
 def _moments(sets: list[pydicom.Dataset]) -> tuple[NDArray[np.float64], str]:
@@ -222,7 +220,13 @@ def _unpacked_by(name: str) -> str:
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
     if ds.PhotometricInterpretation == "PALETTE COLOR":
-        image = _eight_bits(ds, apply_color_lut(image, ds))
+        # Colours of a 16-bit table hold 8 bits: in their upper byte, or in the lower one where a
+        # program wrote them so, or in the other byte order.
+        image = apply_color_lut(image, ds)
+        if image.dtype == np.uint16:
+            plain = ds.get("RedPaletteColorLookupTableData")  # else it is stored in segments
+            table = image if plain is None else np.frombuffer(plain, "<u2")
+            image = (image >> (8 if int(table.max(initial=0)) > 255 else 0)).astype(np.uint8)
     if image.dtype not in (np.uint8, np.uint16, np.int16):
         raise RecordingError(f"pixels of {image.dtype}; those of 8 and 16 bits are read")
     if image.ndim == 3:
@@ -230,16 +234,6 @@ def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
     if ds.PhotometricInterpretation == "MONOCHROME1":
         return np.asarray(2 ** int(ds.BitsStored) - 1 - image, dtype=image.dtype)
     return image
-
-
-def _eight_bits(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:
-    """Colours of a 16-bit table hold 8 bits: in their upper byte, or in the lower one where a
-    program wrote them so, or in the other byte order."""
-    if image.dtype != np.uint16:
-        return image
-    plain = ds.get("RedPaletteColorLookupTableData")  # else it is stored in segments
-    table = image if plain is None else np.frombuffer(plain, "<u2")
-    return (image >> (8 if int(table.max(initial=0)) > 255 else 0)).astype(np.uint8)
 
 
 def _times(ds: pydicom.Dataset, count: int) -> tuple[NDArray[np.float64], str]:

@@ -1,9 +1,9 @@
-"""PNG images, 8-bit grey, encoded and decoded with bounds; image filters. Only OpenCV user.
+"""PNG images, 8-bit grey, encoded and decoded with bounds; filters; area fraction of an outline.
 
-A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk, length
-of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard error;
-only the chunks that make the picture are handed on. OpenCV is loaded by its first use:
-16 MB that a recording without images is inspected without.
+A PNG is checked before OpenCV sees it: signature, size declared in IHDR, CRC of every chunk,
+length of the unpacked pixels. OpenCV returns half an image for a cut file and prints to standard
+error; only the chunks that make the picture are handed on. OpenCV is loaded by its first use: 16
+MB that a recording without images is inspected without.
 """
 
 import struct
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import above_zero
-from validate.recording.reader import Options
+from validate.recording.reader import Options, above_zero
 
 Pixels = NDArray[np.uint8]
 
@@ -57,13 +56,47 @@ def decode_png(data: bytes) -> Pixels:
     """
     import cv2
 
-    header, packed = _checked(data)
-    _require_unpacked(packed, header.height * (1 + header.width * header.channels))
-    plain = np.frombuffer(_bare(data, packed), dtype=np.uint8)
-    image = cv2.imdecode(plain, cv2.IMREAD_UNCHANGED)
-    if image is None or image.shape[:2] != (header.height, header.width):
+    # Header and packed pixels of a PNG whose chunks are whole.
+    if not data.startswith(_SIGNATURE):
+        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
+    header, parts, ended = None, list[bytes](), False
+    for kind, content in _chunks(data):
+        if header is None:
+            header = _header(kind, content)
+        elif kind == b"IDAT":
+            parts.append(content)
+        ended = kind == b"IEND"
+    if header is None or not ended:
+        raise RecordingError(f"damaged PNG: {len(data)} bytes without an end")
+    packed = b"".join(parts)
+    size = header.height * (1 + header.width * header.channels)
+    unpacker = zlib.decompressobj()
+    try:
+        got = len(unpacker.decompress(packed, size + 1))
+    except zlib.error as error:
+        raise RecordingError(f"damaged PNG: its pixels cannot be unpacked ({error})") from None
+    if got != size or not unpacker.eof:
+        raise RecordingError(f"damaged PNG: {got} bytes of pixels, its header needs {size}")
+    # The same picture without text, profiles and other chunks.
+    start = len(_SIGNATURE) + 25
+    plain = np.frombuffer(
+        data[:start] + _chunk(b"IDAT", packed) + _chunk(b"IEND", b""), dtype=np.uint8
+    )
+    decoded = cv2.imdecode(plain, cv2.IMREAD_UNCHANGED)
+    if decoded is None or decoded.shape[:2] != (header.height, header.width):
         raise RecordingError("damaged PNG: its pixels cannot be decoded")
-    grey: Pixels = _grey(np.asarray(image, dtype=np.uint8))
+    image = np.asarray(decoded, dtype=np.uint8)
+    if image.ndim == 2:
+        grey: Pixels = image
+    else:
+        coloured = int((image[..., 1:3] != image[..., :1]).any(axis=-1).sum())
+        clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
+        if coloured or clear:
+            raise RecordingError(
+                f"{coloured} coloured and {clear} transparent pixels; remove the overlay and save "
+                f"it as grey"
+            )
+        grey = np.ascontiguousarray(image[..., 0])
     grey.setflags(write=False)
     return grey
 
@@ -76,22 +109,6 @@ def png_size(data: bytes) -> tuple[int, int]:
     kind, content = next(_chunks(data), (b"", b""))
     header = _header(kind, content)
     return header.width, header.height
-
-
-def _checked(data: bytes) -> tuple[_Header, bytes]:
-    """Header and packed pixels of a PNG whose chunks are whole."""
-    if not data.startswith(_SIGNATURE):
-        raise RecordingError("not a PNG (wrong first bytes); only PNG images are read")
-    header, packed, ended = None, [], False
-    for kind, content in _chunks(data):
-        if header is None:
-            header = _header(kind, content)
-        elif kind == b"IDAT":
-            packed.append(content)
-        ended = kind == b"IEND"
-    if header is None or not ended:
-        raise RecordingError(f"damaged PNG: {len(data)} bytes without an end")
-    return header, b"".join(packed)
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -128,38 +145,9 @@ def _require_size(width: int, height: int) -> None:
         raise RecordingError(f"image of {width} x {height} px, allowed 1..{MAX_SIDE} per side")
 
 
-def _require_unpacked(packed: bytes, size: int) -> None:
-    unpacker = zlib.decompressobj()
-    try:
-        got = len(unpacker.decompress(packed, size + 1))
-    except zlib.error as error:
-        raise RecordingError(f"damaged PNG: its pixels cannot be unpacked ({error})") from None
-    if got != size or not unpacker.eof:
-        raise RecordingError(f"damaged PNG: {got} bytes of pixels, its header needs {size}")
-
-
-def _bare(data: bytes, packed: bytes) -> bytes:
-    """The same picture without text, profiles and other chunks."""
-    start = len(_SIGNATURE) + 25
-    return data[:start] + _chunk(b"IDAT", packed) + _chunk(b"IEND", b"")
-
-
 def _chunk(kind: bytes, content: bytes) -> bytes:
     crc = zlib.crc32(kind + content).to_bytes(4, "big")
     return len(content).to_bytes(4, "big") + kind + content + crc
-
-
-def _grey(image: Pixels) -> Pixels:
-    if image.ndim == 2:
-        return image
-    coloured = int((image[..., 1:3] != image[..., :1]).any(axis=-1).sum())
-    clear = int((image[..., 3] != 255).sum()) if image.shape[2] == 4 else 0
-    if coloured or clear:
-        raise RecordingError(
-            f"{coloured} coloured and {clear} transparent pixels; remove the overlay and save it "
-            f"as grey"
-        )
-    return np.ascontiguousarray(image[..., 0])
 
 
 def blurred(image: Floats, sd: tuple[float, float]) -> Floats:
@@ -263,7 +251,10 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
                                  f"is {MAX_SIDE} per side")  # fmt: skip
     if all(image.dtype == np.uint8 for image in deep):
         return tuple(np.ascontiguousarray(image) for image in deep), AS_IT_IS
-    low, top = _range(deep)
+    # The least and the largest level; a NaN is black.
+    known = [np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=-np.inf) for image in deep]
+    low = float(min(image.min() for image in known))
+    top = float(max(image.max() for image in known))
     if low < 0 or not np.isfinite(top):
         raise RecordingError(f"levels from {low:g} to {top:g}; save them from 0 on")
     white = above_zero(options, "white") if "white" in options else top or 1.0
@@ -273,12 +264,30 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
     return tuple(_scaled(image, white) for image in deep), told
 
 
-def _range(deep: Sequence[NDArray[Any]]) -> tuple[float, float]:
-    """The least and the largest level; a NaN is black."""
-    known = [np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=-np.inf) for image in deep]
-    return float(min(image.min() for image in known)), float(max(image.max() for image in known))
-
-
 def _scaled(image: NDArray[Any], white: float) -> Pixels:
     levels = np.clip(np.nan_to_num(image) * (255 / white), 0, 255)
     return np.asarray(np.rint(levels), dtype=np.uint8)
+
+
+def coverage(outline: Floats, shape: tuple[int, int], lines: int = 4) -> Floats:
+    """Covered share 0..1 (h, w) of each pixel by a closed outline (k, 2), x and y in pixels.
+
+    Pixel centres lie on whole numbers. Even-odd rule; exact along x, `lines` scan lines a pixel
+    along y.
+    """
+    height, width = shape
+    covered = np.zeros(shape)
+    start, end = outline, np.roll(outline, -1, axis=0)
+    pixels = np.arange(width) - 0.5
+    low = max(int(np.floor(outline[:, 1].min() + 0.5)), 0)
+    high = min(int(np.ceil(outline[:, 1].max() + 0.5)), height)
+    for row in range(low, high):
+        for offset in (np.arange(lines) + 0.5) / lines - 0.5:
+            # Sorted x (2 m,) where the edges start -> end cross the line at y.
+            y = row + offset
+            cut = (start[:, 1] > y) != (end[:, 1] > y)
+            a, b = start[cut], end[cut]
+            crossings = np.sort(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
+            for left, right in crossings.reshape(-1, 2):
+                covered[row] += np.clip(right - pixels, 0, 1) - np.clip(left - pixels, 0, 1)
+    return covered / lines

@@ -36,25 +36,7 @@ def read_metaimage(path: Path, options: Options) -> Recording:
     grey or colour of 8 or 16 bits, and a .mhd whose pixels do not lie beside it; `UsageError` as
     `recorded`.
     """
-    fields, after = _header(path)
-    images = _images(path, fields, after)
-    kind = "MetaImage sequence"
-    way = fields.get("UltrasoundImageOrientation", "")
-    spacing = _spacing(path, fields)
-    held = Sequence(by_frame(fields.items()), images, spacing, kind, way, deep=_deep(fields))
-    return recorded(path, held, options)
-
-
-def _deep(fields: Mapping[str, str]) -> str:
-    """Three axes of space, which MetaImage has where no kind says another."""
-    of_space = set(fields.get("Kinds", "").split()) <= {"domain", "space"}
-    if not of_space or fields.get("NDims") != "3":
-        return ""
-    return f"spacing {fields.get('ElementSpacing', 'not stated')}"
-
-
-def _header(path: Path) -> tuple[dict[str, str], int]:
-    """Texts by key, and where the header ends; the name of the pixels' file is its last line."""
+    # Texts by key, and where the header ends; the name of the pixels' file is its last line.
     if not path.is_file():
         raise RecordingError(
             f"{path}: no such file" if not path.exists() else f"{path}: not a file"
@@ -68,38 +50,33 @@ def _header(path: Path) -> tuple[dict[str, str], int]:
         )
     lines = text[: last.end()].decode("utf-8", "replace").splitlines()
     pairs = (line.partition("=") for line in lines)
-    return {key.strip(): value.strip() for key, sign, value in pairs if sign}, last.end()
+    fields, after = {key.strip(): value.strip() for key, sign, value in pairs if sign}, last.end()
+    images = _images(path, fields, after)
+    kind = "MetaImage sequence"
+    way = fields.get("UltrasoundImageOrientation", "")
+    # Sides of a pixel as the file states them; 1 1 where it does not.
+    sides = fields.get("ElementSpacing", "1 1").split()
+    try:
+        x, y = float(sides[0]), float(sides[1])
+    except (ValueError, IndexError):
+        x = y = 0.0
+    if not (0 < x < np.inf and 0 < y < np.inf):
+        raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(sides)[:60]}' is not a size")
+    held = Sequence(by_frame(fields.items()), images, (x, y), kind, way, deep=_deep(fields))
+    return recorded(path, held, options)
+
+
+def _deep(fields: Mapping[str, str]) -> str:
+    """Three axes of space, which MetaImage has where no kind says another."""
+    of_space = set(fields.get("Kinds", "").split()) <= {"domain", "space"}
+    if not of_space or fields.get("NDims") != "3":
+        return ""
+    return f"spacing {fields.get('ElementSpacing', 'not stated')}"
 
 
 def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any], ...]:
     """Images n x (h, w); none where the sequence has transforms alone."""
-    width, height, count = _sizes(path, fields)
-    if not width * height * count:
-        return ()
-    depth = _depth(path, fields)
-    channels = int(fields.get("ElementNumberOfChannels", "1"))
-    size = width * height * count * channels * depth.itemsize
-    if size > MAX_PIXELS:
-        raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
-    data = _unpacked(path, fields, _packed(path, fields, after, size), size)
-    pixels = np.frombuffer(data, dtype=depth).reshape(count, height, width, channels)
-    return tuple(pixels[..., 0] if channels == 1 else luma(pixels))
-
-
-def _depth(path: Path, fields: dict[str, str]) -> np.dtype[Any]:
-    """The type of a level, in the file's order of bytes."""
-    kind, channels = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
-    if kind not in _DEPTHS or channels not in _CHANNELS:
-        raise RecordingError(
-            f"{path.name}: pixels {kind or 'of no type'} x {channels}; save as grey or "
-            "colour of 8 or 16 bits"
-        )
-    said = (fields.get(key, "False").lower() for key in _BIG)
-    return np.dtype(_DEPTHS[kind]).newbyteorder(">" if "true" in said else "<")
-
-
-def _sizes(path: Path, fields: dict[str, str]) -> tuple[int, int, int]:
-    """Width, height and count; of four numbers the third is the depth of each image: 1."""
+    # Width, height and count; of four numbers the third is the depth of each image: 1.
     sizes = _whole(path, fields, "DimSize")
     if len(sizes) not in (2, 3, 4) or min(sizes) < 0:
         raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2, 3 or 4 numbers")
@@ -107,7 +84,41 @@ def _sizes(path: Path, fields: dict[str, str]) -> tuple[int, int, int]:
         raise RecordingError(
             f"{path.name}: DimSize {sizes}: volumes {sizes[2]} px deep; images (depth 1) are read"
         )
-    return sizes[0], sizes[1], sizes[-1] if len(sizes) > 2 else 1
+    width, height, count = sizes[0], sizes[1], sizes[-1] if len(sizes) > 2 else 1
+    if not width * height * count:
+        return ()
+    # The type of a level, in the file's order of bytes.
+    kind, layers = fields.get("ElementType", ""), fields.get("ElementNumberOfChannels", "1")
+    if kind not in _DEPTHS or layers not in _CHANNELS:
+        raise RecordingError(
+            f"{path.name}: pixels {kind or 'of no type'} x {layers}; save as grey or "
+            "colour of 8 or 16 bits"
+        )
+    said = (fields.get(key, "False").lower() for key in _BIG)
+    depth = np.dtype(_DEPTHS[kind]).newbyteorder(">" if "true" in said else "<")
+    channels = int(layers)
+    size = width * height * count * channels * depth.itemsize
+    if size > MAX_PIXELS:
+        raise RecordingError(f"{path.name}: {size} bytes of pixels, limit {MAX_PIXELS}; split it")
+    packed = _packed(path, fields, after, size)
+    data, whole = packed[:size], len(packed) >= size
+    if fields.get("CompressedData", "False").lower() == "true":
+        unpacker = zlib.decompressobj()
+        try:
+            data = unpacker.decompress(packed, size + 1)
+        except zlib.error as error:
+            raise RecordingError(
+                f"{path.name}: damaged: its pixels cannot be unpacked ({error})"
+            ) from None
+        whole = len(data) == size and unpacker.eof
+    if not whole:
+        raise RecordingError(
+            f"{path.name}: {len(data)} bytes of pixels, its header needs {size}: truncated or "
+            f"damaged"
+        )
+
+    pixels = np.frombuffer(data, dtype=depth).reshape(count, height, width, channels)
+    return tuple(pixels[..., 0] if channels == 1 else luma(pixels))
 
 
 def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
@@ -125,37 +136,6 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
             return stream.read(2 * size + 4096)
     except (OSError, RecordingError) as error:
         raise RecordingError(f"{path.name}: its pixels cannot be read ({error})") from error
-
-
-def _unpacked(path: Path, fields: dict[str, str], packed: bytes, size: int) -> bytes:
-    data, whole = packed[:size], len(packed) >= size
-    if fields.get("CompressedData", "False").lower() == "true":
-        unpacker = zlib.decompressobj()
-        try:
-            data = unpacker.decompress(packed, size + 1)
-        except zlib.error as error:
-            raise RecordingError(
-                f"{path.name}: damaged: its pixels cannot be unpacked ({error})"
-            ) from None
-        whole = len(data) == size and unpacker.eof
-    if not whole:
-        raise RecordingError(
-            f"{path.name}: {len(data)} bytes of pixels, its header needs {size}: truncated or "
-            f"damaged"
-        )
-    return data
-
-
-def _spacing(path: Path, fields: dict[str, str]) -> tuple[float, float]:
-    """Sides of a pixel as the file states them; 1 1 where it does not."""
-    text = fields.get("ElementSpacing", "1 1").split()
-    try:
-        x, y = float(text[0]), float(text[1])
-    except (ValueError, IndexError):
-        x = y = 0.0
-    if not (0 < x < np.inf and 0 < y < np.inf):
-        raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(text)[:60]}' is not a size")
-    return x, y
 
 
 def _whole(path: Path, fields: dict[str, str], key: str) -> list[int]:

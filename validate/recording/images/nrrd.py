@@ -1,5 +1,9 @@
-"""Reader of NRRD with the frames of the PLUS toolkit, like a MetaImage sequence."""
+"""Reader of NRRD with the frames of the PLUS toolkit, like a MetaImage sequence. The only file that
+imports pynrrd.
+"""
 
+import zlib
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +11,119 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.errors import RecordingError
+from validate.files import inside, open_file, read_bytes
 from validate.recording.formats.subprocess_decoder import decoded
+from validate.recording.images.image import luma
 from validate.recording.images.sequence import MAX_PIXELS, OPTIONS, Sequence, by_frame, recorded
 from validate.recording.reader import Options, Reader, head
 from validate.recording.types import Recording
+from validate.units import in_si
+
+LIBRARIES = ("nrrd",)
+_LIST = "list"  # the kind of the axis that lists images
+_SPACE = ("domain", "space")
+_COLOUR = ("rgb-color", "rgba-color", "3-color", "4-color", "vector", "3-vector", "4-vector")
+_GZIP = 31  # of zlib: with its header and its checksum
+_CHUNK = 2**20  # bytes
+_WIDEST = 8  # bytes of a number
+
+
+def arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Pixels (w, h, n), the texts of all keys, the sides (2,) of a pixel as stated, `times` (n,) s
+    of the images, none where they are not stated, and what makes all axes those of space, `deep`.
+    """
+    import nrrd
+
+    with open_file(path) as lines:  # a name with a line break is taken for the header itself
+        header = nrrd.read_header(lines)
+    named = header.get("data file", header.get("datafile"))
+    if named is not None:
+        open_file(inside(path.parent, str(named))).close()
+    count = prod(map(int, header["sizes"]))
+    if count > MAX_PIXELS:
+        raise RecordingError(f"{count} pixels, limit {MAX_PIXELS}; split it")
+    if header["encoding"] in ("gz", "gzip") and named is None:
+        _require_end(path, _WIDEST * count)
+    pixels, header = nrrd.read(str(path))
+    own = {key: text for key, text in header.items() if isinstance(text, str)}
+    kinds = [str(kind).lower() for kind in header.get("kinds", ())]
+    return {
+        "pixels": _images_last(pixels, kinds),
+        "keys": np.array(list(own), dtype=str),
+        "texts": np.array(list(own.values()), dtype=str),
+        "spacing": _spacing(header, kinds),
+        "times": _times(header, kinds),
+        "deep": np.array(_deep(header, kinds)),
+    }
+
+
+def _images_last(pixels: NDArray[Any], kinds: list[str]) -> NDArray[Any]:
+    """Colour as grey, and the axis that lists the images, as 3D Slicer has it first, at the end."""
+    for i, kind in enumerate(kinds):
+        if kind in _COLOUR and pixels.shape[i] in (3, 4):
+            pixels = luma(np.moveaxis(pixels, i, -1))
+            kinds = kinds[:i] + kinds[i + 1 :]
+            break
+    return np.moveaxis(pixels, kinds.index(_LIST), -1) if _LIST in kinds else pixels
+
+
+def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
+    """Seconds of the images, as 3D Slicer lists them where they are times; none of what is not."""
+    at = kinds.index(_LIST) if _LIST in kinds else 0
+    values = str(header.get(f"axis {at} index values", "")).split()
+    units = [*header.get("units", ()), *[""] * len(header["sizes"])]
+    factor = in_si(1.0, str(header.get(f"axis {at} index unit") or units[at]) or "none", "s")
+    try:
+        t = np.array([float(v) for v in values])
+    except ValueError:
+        return np.empty(0)
+    return t * factor if factor is not None and (np.diff(t) > 0).all() else np.empty(0)
+
+
+def _deep(header: dict[str, Any], kinds: list[str]) -> str:
+    """Three axes of space, by their kinds, else by their directions or spacings; empty where one of
+    three is another, or there are more."""
+    axes = [i for i in range(len(header["sizes"])) if not kinds or kinds[i] not in _COLOUR]
+    if len(axes) != 3:
+        return ""
+    if kinds:
+        return "its three axes are of space" * all(kinds[i] in _SPACE for i in axes)
+    units = [str(unit) for unit in header.get("units", ())]
+    sides = np.array(header.get("spacings", ()), dtype=np.float64)
+    if np.isfinite(sides).sum() == 3 and not any(in_si(1.0, u, "s") for u in units if u):
+        return f"spacings {' '.join(f'{side:g}' for side in sides)}"
+    given = header.get("space directions")
+    rows = [] if given is None else [row for row in given if row is not None]
+    return "three space directions" * (len(rows) == 3 and bool(np.isfinite(rows).all()))
+
+
+def _spacing(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
+    """From the spacings, or the lengths of the axes' directions, of the first two axes in space;
+    1 1 where none is stated."""
+    space = [i for i, kind in enumerate(kinds) if kind in _SPACE]
+    i, j = space[:2] if len(space) > 1 else (0, 1)
+    if "spacings" in header:
+        return np.asarray(header["spacings"], dtype=np.float64)[[i, j]]
+    directions = header.get("space directions")
+    if directions is None:
+        return np.ones(2)
+    return np.array([np.linalg.norm(directions[k]) for k in (i, j)], dtype=np.float64)
+
+
+def _require_end(path: Path, most: int) -> None:
+    """The library takes a stream without its end, which holds the checksum, and unpacks all of one
+    that holds more than the sizes say: more than `most` bytes are refused before it does."""
+    packed = read_bytes(path).partition(b"\n\n")[2]
+    unpacker = zlib.decompressobj(_GZIP)
+    found = 0
+    while packed and not unpacker.eof:
+        found += len(unpacker.decompress(packed, _CHUNK))
+        if found > most:
+            raise RecordingError(f"over {most} bytes unpacked, more than its sizes hold")
+        packed = unpacker.unconsumed_tail
+    if not unpacker.eof:
+        raise RecordingError("truncated: its pixels do not end with their checksum")
+
 
 _MAGIC = b"NRRD000"
 
@@ -27,7 +140,7 @@ def read_nrrd(path: Path, options: Options) -> Recording:
         )
     if not _recognises(path):
         raise RecordingError(f"{path.name}: not an NRRD file, or truncated in its first bytes")
-    found = decoded("validate.recording.images.nrrd_arrays", path)
+    found = decoded("validate.recording.images.nrrd", path)
     keys, texts = found["keys"].tolist(), found["texts"].tolist()
     x, y = found["spacing"].tolist()
     fields = by_frame(zip(keys, texts, strict=True))

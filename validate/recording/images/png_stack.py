@@ -1,22 +1,67 @@
-"""Reader of a folder of PNG images."""
+"""Reader of a folder of PNG images, in the order of the numbers in their names."""
 
+import re
 import struct
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.files import read_bytes
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.formats.options import LENS_FILE, M_PER_PX, RATE, TOPIC, above_zero, asked
+from validate.files import ANY_SIZE, member, members, open_file, read_bytes
 from validate.recording.images.image import Pixels, decode_png
 from validate.recording.images.lens import straightened
-from validate.recording.images.numbered_files import OTHERS, numbered, pictures
-from validate.recording.reader import Options, Reader, head
+from validate.recording.reader import (
+    LENS_FILE,
+    M_PER_PX,
+    RATE,
+    TOPIC,
+    Options,
+    Reader,
+    above_zero,
+    asked,
+    head,
+)
 from validate.recording.scales import odd_pixel
-from validate.recording.types import Frames, Recording, Source
+from validate.recording.types import Frames, Recording, Source, clock_of
 from validate.units import in_si, split
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
+OTHERS = tuple(s for s in SUFFIXES if s != ".png")
+
+
+def pictures(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
+    """Files of these endings; hidden ones, as macOS leaves on foreign disks, are none."""
+    return [f for f in members(folder) if f.suffix.lower() in kinds]
+
+
+def number_key(stem: str) -> tuple[int, ...]:
+    """Numbers in a name, by which files are in order."""
+    return tuple(int(n) for n in re.findall(r"\d+", stem)[:8])
+
+
+def numbered(folder: Path, kinds: tuple[str, ...] = (".png",)) -> list[Path]:
+    """Its files of these kinds in the order of the numbers in their names.
+
+    Raises `RecordingError` for a folder without any, for numbers that are alike, and for a pipe, a
+    device or a link out of the folder.
+    """
+    files = pictures(folder, kinds)
+    if not files:
+        raise RecordingError(f"{folder}: no {' or '.join(f'*{kind}' for kind in kinds)} files")
+    keys = {f: number_key(f.stem) for f in files}
+    files.sort(key=lambda f: (keys[f], f.name))
+    for a, b in pairwise(files):
+        if keys[a] == keys[b]:
+            raise RecordingError(
+                f"{folder.name}: '{a.name}' and '{b.name}' have the same number; "
+                "number the files in order of time"
+            )
+    for file in files:
+        open_file(member(file), ANY_SIZE).close()
+    return files
+
 
 MAX_STACK = 400 * 2**20  # bytes of all images of one stack
 MAX_FILE = 64 * 2**20  # bytes of one PNG
@@ -54,9 +99,25 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
         raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder of PNG images")
-    side, rate = _pixel(options["m_per_px"]), above_zero(options, "rate")
-    images, lens = straightened(_images(folder), options)
-    _require_meant(options["m_per_px"], side, images[0])
+    # Side of a pixel, m.
+    text = options["m_per_px"]
+    number, unit = split(text) or (0.0, "")
+    side = in_si(number, unit or "m", "m")
+    if side is None or side <= 0:
+        raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
+    rate = above_zero(options, "rate")
+    pixels: list[Pixels] = []
+    for file in numbered(folder):
+        pixels.append(_read(file))
+        if sum(image.size for image in pixels) > MAX_STACK:
+            raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
+    images, lens = straightened(tuple(pixels), options)
+    # A bare number beyond reason is asked back; one with its unit is meant.
+    text = options["m_per_px"]
+    height, width = images[0].shape
+    bare = (split(text) or (0.0, ""))[1] == ""
+    if bare and (odd := odd_pixel((side, side), (height, width))):
+        raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
     t = np.arange(len(images)) / rate
     ns = np.rint(1e9 * t).astype(np.int64)
     topic, name = options.get("topic", "images"), folder.resolve().name
@@ -102,32 +163,6 @@ def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
     if len(set(sizes)) == 1:
         return {topic: np.arange(len(images))}
     return {f"{topic}_{s}": np.flatnonzero(np.array(sizes) == s) for s in dict.fromkeys(sizes)}
-
-
-def _pixel(text: str) -> float:
-    """Side of a pixel, m."""
-    number, unit = split(text) or (0.0, "")
-    side = in_si(number, unit or "m", "m")
-    if side is None or side <= 0:
-        raise UsageError(f"m_per_px={text}: expected a length above 0, as 1e-4 (m) or 0.1mm")
-    return side
-
-
-def _require_meant(text: str, side: float, image: Pixels) -> None:
-    """A bare number beyond reason is asked back; one with its unit is meant."""
-    height, width = image.shape
-    bare = (split(text) or (0.0, ""))[1] == ""
-    if bare and (odd := odd_pixel((side, side), (height, width))):
-        raise UsageError(f"m_per_px={text}: {odd} With its unit it is taken")
-
-
-def _images(folder: Path) -> tuple[Pixels, ...]:
-    images: list[Pixels] = []
-    for file in numbered(folder):
-        images.append(_read(file))
-        if sum(image.size for image in images) > MAX_STACK:
-            raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
-    return tuple(images)
 
 
 def _read(file: Path) -> Pixels:

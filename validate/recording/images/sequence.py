@@ -15,12 +15,20 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.options import M_PER_PX, RATE, WHITE, above_zero, length
 from validate.recording.formats.streams import begun
 from validate.recording.formats.streams import recorded as of_streams
 from validate.recording.images.image import shallow
 from validate.recording.motion_capture.poses import pose_signals
-from validate.recording.reader import MapOption, Options, source_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    WHITE,
+    MapOption,
+    Options,
+    above_zero,
+    length,
+    source_of,
+)
 from validate.recording.types import Frames, Recording, Signal, Stream
 
 IMAGES = "images"
@@ -66,7 +74,13 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     one of them is needed, `RecordingError` for a field that is none, and a file in which nothing
     was seen.
     """
-    _require_no_volume(path, held)
+    # Refuse slices of a volume; images with fields of their own, or times, are a film.
+    count = len(held.images)
+    if held.deep and count > 1 and not held.fields and held.times is None:
+        raise RecordingError(
+            f"{path.name}: {count} slices of a volume ({held.deep}), not images over time; save "
+            f"an image sequence with an axis of kind list, or as TIFF or MP4"
+        )
     t = _times(path, held, options)
     streams: dict[str, Stream] = {}
     never = []
@@ -99,16 +113,6 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     return of_streams(path.name.partition(".")[0], source, streams, told, unread)
 
 
-def _require_no_volume(path: Path, held: Sequence) -> None:
-    """Refuse slices of a volume; images with fields of their own, or times, are a film."""
-    count = len(held.images)
-    if held.deep and count > 1 and not held.fields and held.times is None:
-        raise RecordingError(
-            f"{path.name}: {count} slices of a volume ({held.deep}), not images over time; save "
-            f"an image sequence with an axis of kind list, or as TIFF or MP4"
-        )
-
-
 def _times(path: Path, held: Sequence, options: Options) -> Floats:
     """Seconds (n,) of every frame from the first."""
     count = max(len(held.images), max(held.fields, default=-1) + 1)
@@ -120,7 +124,11 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
     if count == 1 and not stamped:
         return np.zeros(1)
     if not stamped or "rate" in options:
-        return np.asarray(np.rint(1e9 * np.arange(count) / _rate(path, options)) / 1e9)
+        if "rate" not in options:
+            raise UsageError(
+                f"{path.name}: its frames have no times; give --map rate=HZ (a volume is not read)"
+            )
+        return np.asarray(np.rint(1e9 * np.arange(count) / above_zero(options, "rate")) / 1e9)
     if len(stamped) < count:
         first = next(i for i in range(count) if i not in set(stamped))
         raise RecordingError(
@@ -129,14 +137,6 @@ def _times(path: Path, held: Sequence, options: Options) -> Floats:
         )
     t = np.array([_numbers(path, held.fields[i]["Timestamp"], 1, i)[0] for i in range(count)])
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
-
-
-def _rate(path: Path, options: Options) -> float:
-    if "rate" not in options:
-        raise UsageError(
-            f"{path.name}: its frames have no times; give --map rate=HZ (a volume is not read)"
-        )
-    return above_zero(options, "rate")
 
 
 def _numbers(path: Path, text: str, count: int, frame: int) -> Floats:
@@ -180,7 +180,17 @@ def _images(
     if not good:
         return {}, "none"
     images, levels = shallow([held.images[i] for i in good], options)
-    pixel = _pixel(path, held, options)
+    # Sides of a pixel, m.
+    if "m_per_px" in options:
+        side = length(options, "m_per_px", "0.1mm")
+        pixel = side, side
+    else:
+        if held.spacing == (1.0, 1.0):
+            raise UsageError(
+                f"{path.name}: has a spacing of 1 1, which means pixels, not mm; give --map "
+                f"m_per_px=0.1mm, or --map images=no for the transforms only"
+            )
+        pixel = _MM * held.spacing[0], _MM * held.spacing[1]
     return {IMAGES: Frames(t[good], images, pixel, np.eye(4), "image")}, levels
 
 
@@ -205,16 +215,3 @@ def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
     sides = " and ".join((["columns"] if across < 0 else []) + (["rows"] if along < 0 else []))
     told = f"{sides} reversed: the file stores them as {way}, but its transforms need MF"
     return replace(held, images=turned), {IMAGES: told}
-
-
-def _pixel(path: Path, held: Sequence, options: Options) -> tuple[float, float]:
-    """Sides of a pixel, m."""
-    if "m_per_px" in options:
-        side = length(options, "m_per_px", "0.1mm")
-        return side, side
-    if held.spacing == (1.0, 1.0):
-        raise UsageError(
-            f"{path.name}: has a spacing of 1 1, which means pixels, not mm; give --map "
-            f"m_per_px=0.1mm, or --map images=no for the transforms only"
-        )
-    return _MM * held.spacing[0], _MM * held.spacing[1]

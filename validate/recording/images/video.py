@@ -1,32 +1,117 @@
 """Reader of videos (MP4, MOV, AVI, Matroska): grey images on the container's time stamps.
 
-A container states no size of a pixel; a camera that is not calibrated (`lens`) has none that holds
-over the whole image. Its end is checked by its own account of lengths.
+A container states no size of a pixel; a camera that is not calibrated (`lens`) has none that
+holds over the whole image. Its end is checked by its own account of lengths.
 """
 
+import os
 import struct
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.files import ANY_SIZE, open_file
-from validate.recording.formats.options import (
+from validate.recording.formats.streams import recorded
+from validate.recording.formats.subprocess_decoder import decoded
+from validate.recording.images.lens import straightened
+from validate.recording.reader import (
     LENS_FILE,
     M_PER_PX,
     RATE,
     TOPIC,
+    MapOption,
+    Options,
+    Reader,
     above_zero,
     asked,
     frame,
+    head,
     length,
+    source_of,
 )
-from validate.recording.formats.streams import recorded
-from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.images.lens import straightened
-from validate.recording.reader import MapOption, Options, Reader, head, source_of
 from validate.recording.types import Frames, Recording
+
+LIBRARIES = ("cv2",)
+MOST = 400 * 2**20  # bytes of all frames together
+
+
+def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
+    """`images` (nt, h, w) uint8 of every so many frames, `t` (nt,) s as the container stamps them,
+    `rate` Hz as it declares it, `declared` and `decoded` counts of frames, whether any is `colour`.
+
+    Raises `RecordingError` for a file without frames, for frames beyond `MOST` bytes, and for
+    pixels that are not square.
+    """
+    import cv2
+
+    declared = (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+    video = _opened(path)
+    wide = video.get(cv2.CAP_PROP_SAR_NUM)
+    high = video.get(cv2.CAP_PROP_SAR_DEN)
+    if wide > 0 and high > 0 and wide != high:
+        raise RecordingError(
+            f"its pixels are {wide:g}:{high:g}, not square; convert them first, as with `ffmpeg "
+            f"-i IN -vf scale=iw*sar:ih,setsar=1 OUT.mp4`"
+        )
+    count, width, height = (video.get(key) for key in declared)
+    _require_few(count, width, height, every)
+    images, t, made, colour = [], [], 0, False
+    while video.isOpened():
+        done, frame = video.read()
+        if not done:
+            break
+        stamp = video.get(cv2.CAP_PROP_POS_MSEC)  # of the frame just read
+        if made % int(every) == 0:
+            shade = np.ptp(frame[::8, ::8].astype(np.int16), axis=2) if frame.ndim == 3 else [0]
+            colour = colour or float(np.max(shade)) > _GREY
+            images.append(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) if frame.ndim == 3 else frame)
+            t.append(1e-3 * stamp)
+        made += 1
+        if sum(image.size for image in images[:1]) * len(images) > MOST:
+            raise RecordingError(
+                f"frames of {images[0].shape[1]} x {images[0].shape[0]} beyond {MOST} bytes after "
+                f"{made}; read fewer with --map every=10, or shorten the video"
+            )
+    if not images:
+        raise RecordingError("no frame can be decoded: truncated, damaged, or not a video")
+    return {
+        "images": np.stack(images),
+        "t": np.array(t),
+        "rate": np.array(video.get(cv2.CAP_PROP_FPS)),
+        "declared": np.array(video.get(cv2.CAP_PROP_FRAME_COUNT)),
+        "decoded": np.array(made),
+        "colour": np.array(colour),
+    }
+
+
+def _opened(path: Path) -> Any:
+    """The video, by a name of ours: FFmpeg takes one with % for a row of pictures. One thread: each
+    takes address space, and a machine has many cores."""
+    import cv2
+
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "protocol_whitelist;file"
+    with TemporaryDirectory(prefix="validate-") as folder:
+        link = Path(folder) / "video"
+        link.symlink_to(path.resolve())
+        return cv2.VideoCapture(str(link), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+
+
+def _require_few(count: float, width: float, height: float, every: float) -> None:
+    """What is declared, before anything is decoded: packed, it may be small."""
+    if width * height * (count // every) > MOST:
+        raise RecordingError(
+            f"it declares {count:.0f} frames of {width:.0f} x {height:.0f}, beyond {MOST} bytes; "
+            "take fewer: --map every=10, or cut it"
+        )
+
+
+_GREY = 24  # levels between channels that a codec makes of grey
+
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # an MP4 or MOV begins with one
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"  # Matroska and WebM (RFC 9559)
@@ -45,11 +130,27 @@ def read_video(path: Path, options: Options) -> Recording:
     `RecordingError` for a file that is cut, damaged, or shorter than it declares, or whose pixels
     are not square.
     """
-    _require_whole(path)
+    # Raises `RecordingError` for a file that ends before its own account of lengths.
+    if not path.is_file():
+        raise RecordingError(f"{path.name}: not a file")
+    size, first = path.stat().st_size, head(path, 12)
+    if _matroska(path):
+        at = _segment_end(path, size)
+    else:
+        at = (
+            (8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8)
+            if first.startswith(b"RIFF")
+            else _last_box(path, size)
+        )
+    if at > size:
+        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
     if "m_per_px" not in options:
         raise UsageError(f"{path.name}: a video has no scale; give it, as --m-per-px 0.1mm")
-    side, every = length(options, "m_per_px", "0.1mm"), _every(options)
-    found = decoded("validate.recording.images.video_arrays", path, {"every": every}, _SECONDS)
+    every = above_zero({"every": "1", **options}, "every")
+    if every != int(every):
+        raise UsageError(f"--map every={options['every']}: expected a whole number")
+    side, every = length(options, "m_per_px", "0.1mm"), int(every)
+    found = decoded("validate.recording.images.video", path, {"every": every}, _SECONDS)
     declared, count = int(found["declared"]), int(found["decoded"])
     if count < declared and not _matroska(path):  # which declares a duration, no count
         raise RecordingError(
@@ -71,13 +172,6 @@ def read_video(path: Path, options: Options) -> Recording:
     return recorded(path.stem, source, streams, said)
 
 
-def _every(options: Options) -> int:
-    every = above_zero({"every": "1", **options}, "every")
-    if every != int(every):
-        raise UsageError(f"--map every={options['every']}: expected a whole number")
-    return int(every)
-
-
 def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> tuple[Floats, str]:
     """Times from the first frame, s, and where they are from."""
     if "rate" in options:
@@ -92,23 +186,6 @@ def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> 
     if len(steps) and np.ptp(steps) > _EVEN:
         words = f"from the container, uneven: steps of {steps.min():.3g} to {steps.max():.3g} ms"
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9), words
-
-
-def _require_whole(path: Path) -> None:
-    """Raises `RecordingError` for a file that ends before its own account of lengths."""
-    if not path.is_file():
-        raise RecordingError(f"{path.name}: not a file")
-    size, first = path.stat().st_size, head(path, 12)
-    if _matroska(path):
-        at = _segment_end(path, size)
-    else:
-        at = _riff_end(first) if first.startswith(b"RIFF") else _last_box(path, size)
-    if at > size:
-        raise RecordingError(f"{path.name}: {size} bytes, its parts need {at}: truncated")
-
-
-def _riff_end(first: bytes) -> int:
-    return 8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8
 
 
 def _matroska(path: Path) -> bool:

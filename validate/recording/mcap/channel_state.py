@@ -21,7 +21,6 @@ from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.images.image import png_size
 from validate.recording.mcap import streams
-from validate.recording.mcap.metadata import pose_of, scale_of
 from validate.recording.mcap.records import Channel, Schema
 from validate.recording.mcap.schemas import (
     CONTOUR,
@@ -32,6 +31,8 @@ from validate.recording.mcap.schemas import (
     Json,
     Sample,
     decode,
+    pose_of,
+    scale_of,
 )
 from validate.recording.mcap.streams import (
     Collected,
@@ -84,23 +85,19 @@ def batch(schema: str, messages: Sequence[bytes]) -> Alike | None:
     if columns is None:
         return None
     try:
-        return columns(*_parsed(messages))
+        # The messages as objects, and how many colons their bytes have.
+        mark = f'"{_MARK}"'.encode()
+        whole = (b"," + mark + b",").join(messages)
+        _require(max(map(len, messages)) <= MAX_MESSAGE)
+        _require(whole.count(mark) == len(messages) - 1)
+        _require(b"\\" not in whole)
+        values = orjson.loads(b"[" + whole + b"]")
+        objects, marks = values[::2], values[1::2]
+        _require(len(objects) == len(messages) and set(marks) <= {_MARK})
+        _require(set(map(type, objects)) == {dict})
+        return columns(*(objects, whole.count(b":")))
     except (_OddError, ValueError, TypeError, KeyError, OverflowError):
         return None
-
-
-def _parsed(messages: Sequence[bytes]) -> tuple[list[Json], int]:
-    """The messages as objects, and how many colons their bytes have."""
-    mark = f'"{_MARK}"'.encode()
-    whole = (b"," + mark + b",").join(messages)
-    _require(max(map(len, messages)) <= MAX_MESSAGE)
-    _require(whole.count(mark) == len(messages) - 1)
-    _require(b"\\" not in whole)
-    values = orjson.loads(b"[" + whole + b"]")
-    objects, marks = values[::2], values[1::2]
-    _require(len(objects) == len(messages) and set(marks) <= {_MARK})
-    _require(set(map(type, objects)) == {dict})
-    return objects, whole.count(b":")
 
 
 def _signals(objects: list[Json], colons: int) -> Alike:
@@ -116,7 +113,10 @@ def _signals(objects: list[Json], colons: int) -> Alike:
 def _markers(objects: list[Json], colons: int) -> Alike:
     get = itemgetter("stamp", "frame", "names", "x", "y", "z", "sd")
     stamps, frames, lists, x, y, z, sds = zip(*map(get, objects), strict=True)
-    frame, names = _text(frames), _names(lists)
+    _require(set(map(type, lists)) == {list})
+    names: tuple[str, ...] = _only(list(map(tuple, lists)))
+    _require(set(map(type, names)) <= {str})
+    frame = _text(frames)
     keys = _keys(objects, 7) + _keys(stamps, 2)
     _require(colons == keys + len(objects) * (frame.count(":") + "".join(names).count(":")))
     axes = [x, y] if z.count(None) == len(z) else [x, y, z]
@@ -144,13 +144,6 @@ def _text(values: Sequence[Any]) -> str:
 def _number(values: Sequence[Any]) -> float:
     _require(set(map(type, values)) <= _NUMBER)
     return float(_only(values))
-
-
-def _names(values: Sequence[Any]) -> tuple[str, ...]:
-    _require(set(map(type, values)) == {list})
-    names: tuple[str, ...] = _only(list(map(tuple, values)))
-    _require(set(map(type, names)) <= {str})
-    return names
 
 
 def _keys(objects: Sequence[Any], count: int) -> int:

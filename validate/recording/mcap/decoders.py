@@ -1,20 +1,24 @@
-"""Decoders of third-party messages: ROS 2 (CDR), Protobuf, JSON, CBOR as plain dicts.
+"""Decoders of third-party messages (ROS 2 CDR, Protobuf, JSON, CBOR) and a topic's messages as
+dicts.
 
 Numbers stay numbers, texts texts, bytes bytes, lists lists; times of Protobuf become {sec, nsec}.
 """
 
 import base64
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from mcap.records import Schema as TheirSchema
 
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
 from validate.files import json_value
 from validate.installation import install_command
-from validate.recording.mcap.records import Channel, Schema
+from validate.recording.mcap.integrity import verify
+from validate.recording.mcap.records import Channel, Schema, messages_of, opened
 
 Plain = dict[str, Any]
 Decoder = Callable[[bytes], Plain]
@@ -35,7 +39,9 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
         if channel.encoding == "json":
             return _guarded(_json)
         if channel.encoding == "cbor":
-            return _cbor()
+            import cbor2
+
+            return _guarded(cbor2.loads)
     except ImportError as missing:
         return f"the library '{missing.name}' that reads it is not installed; {install_command()}"
     except Exception as error:  # a schema that its own library cannot parse
@@ -115,12 +121,6 @@ def _json(data: bytes) -> Any:
     return json_value(data.decode("utf-8"))
 
 
-def _cbor() -> Decoder:
-    import cbor2
-
-    return _guarded(cbor2.loads)
-
-
 def binary(value: Any) -> bytes:
     """Return the bytes of a field: as they are, as a list of numbers, or base64 in JSON."""
     if isinstance(value, str):
@@ -132,3 +132,45 @@ def binary(value: Any) -> bytes:
         return bytes(value)
     except (TypeError, ValueError) as error:
         raise RecordingError(f"not bytes ({error})") from None
+
+
+LONGEST = 64  # elements of a list that are shown
+
+
+def messages_in(path: Path, topic: str, most: int) -> Iterator[dict[str, Any]]:
+    """Log and publish time (ns) and fields of the first `most` messages of a topic.
+
+    Bytes and long lists are shortened, and say so. Raises `UsageError` for a topic that is not
+    there, `RecordingError` for one that nothing here decodes, and a damaged file or message.
+    """
+    with opened(path) as stream:
+        verified = verify(stream, path)
+        found = {i: c for i, c in verified.channels.items() if c.topic == topic}
+        if not found:
+            there = ", ".join(sorted(c.topic for c in verified.channels.values())) or "none"
+            raise UsageError(f"{path.name}: no topic '{topic}'; topics: {there}")
+        decoders = {i: decoder_of(verified.schemas.get(c.schema_id), c) for i, c in found.items()}
+        for message in islice(messages_of(stream, verified, found.keys()), most):
+            decode = decoders[message.channel_id]
+            if isinstance(decode, str):
+                raise RecordingError(f"{path.name}: {topic}: {decode}")
+            yield {
+                "log_ns": message.log_ns,
+                "publish_ns": message.publish_ns,
+                "message": shortened(decode(message.data)),
+            }
+
+
+def shortened(value: Any) -> Any:
+    """As JSON can hold it: bytes by their count, numbers that are not finite as texts."""
+    if isinstance(value, dict):
+        return {str(k): shortened(v) for k, v in value.items()}
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return f"{len(value)} bytes"
+    if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
+        listed = list(value)
+        rest = [f"... {len(listed)} in all"] if len(listed) > LONGEST else []
+        return [shortened(v) for v in listed[:LONGEST]] + rest
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return str(value)
+    return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)

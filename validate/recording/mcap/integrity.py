@@ -32,16 +32,18 @@ from validate.recording.mcap.records import (
     Attachment,
     Channel,
     Chunk,
+    Cut,
     Footer,
     Header,
     Metadata,
     Op,
     Schema,
+    Span,
+    Verified,
     chunk_index_place,
     records_in,
     statistics_messages,
 )
-from validate.recording.mcap.verified_file import Cut, Span, Verified
 from validate.recording.types import Source
 
 # --- SHA-256 and CRC-32 of bytes that come one after another, taken by a thread beside the
@@ -70,7 +72,12 @@ class Sums:
         self._waiting.append(data)
         self._size += len(data)
         if self._size >= _HASHED_AT_ONCE:
-            self._hand_over()
+            if len(self._handed) >= _AHEAD:
+                self._handed.popleft().result()
+            if self._thread is None:
+                self._thread = ThreadPoolExecutor(1, "sums")
+            self._handed.append(self._thread.submit(self._take, self._waiting))
+            self._waiting, self._size = [], 0
 
     def crc(self) -> int:
         """Of all bytes since the last restart."""
@@ -93,14 +100,6 @@ class Sums:
         while self._handed:
             self._handed.popleft().result()
         self._take(self._waiting)
-        self._waiting, self._size = [], 0
-
-    def _hand_over(self) -> None:
-        if len(self._handed) >= _AHEAD:
-            self._handed.popleft().result()
-        if self._thread is None:
-            self._thread = ThreadPoolExecutor(1, "sums")
-        self._handed.append(self._thread.submit(self._take, self._waiting))
         self._waiting, self._size = [], 0
 
     def _take(self, parts: list[bytes]) -> None:
@@ -248,9 +247,30 @@ class _Walk:
         if (opcode == Op.HEADER) != (self._header is None):
             raise RecordingError("the first record, and only the first, must be the header")
         if opcode == Op.DATA_END:
-            self._data_end(content)
+            if self._data_crc is not None:
+                raise RecordingError("a second end of the data section")
+            declared, actual = int.from_bytes(content[:4], "little"), self._sums.crc()
+            if len(content) < 4 or declared not in (0, actual):
+                raise RecordingError(f"data section CRC {actual:#010x}, declared {declared:#010x}")
+            self._data_crc = declared
+            self._data = (self.record_at, actual)
+            self._summary_at = self._at
         elif opcode == Op.FOOTER:
-            self._footer(head, content)
+            footer = Footer.read(content)
+            if self._data_crc is None:
+                raise RecordingError("a footer without an end of the data section before it")
+            actual = zlib.crc32(content[:16], zlib.crc32(head, self._sums.crc()))
+            if footer.summary_crc not in (0, actual):
+                raise RecordingError(
+                    f"summary CRC {actual:#010x}, declared {footer.summary_crc:#010x}"
+                )
+            empty = self._summary_at == self.record_at
+            if footer.summary_start not in ((0,) if empty else (self._summary_at,)):
+                raise RecordingError(
+                    f"footer: summary at byte {footer.summary_start}, found at {self._summary_at}"
+                )
+            if self._indexed_places:
+                self._misindexed = len(set(self._indexed_places) ^ self._chunk_places)
         else:
             self._dispatch(opcode, content)
 
@@ -265,7 +285,10 @@ class _Walk:
             case Op.CHANNEL:
                 self._take_channel(content)
             case Op.MESSAGE:
-                self._take_message(content)
+                channel = self._count(content, 0, len(content))
+                at = self._at - len(content)
+                self._spans.append(Span(at, len(content), False, frozenset([channel])))
+                self._hand_on()
             case Op.CHUNK:
                 self._take_chunk(content)
             case Op.ATTACHMENT:
@@ -292,12 +315,6 @@ class _Walk:
             raise RecordingError(f"{channel.topic!r} uses schema {channel.schema_id}, undeclared")
         if self._channels.setdefault(channel.id, channel) != channel:
             raise RecordingError(f"channel {channel.id} declared twice, differently")
-
-    def _take_message(self, content: bytes) -> None:
-        channel = self._count(content, 0, len(content))
-        at = self._at - len(content)
-        self._spans.append(Span(at, len(content), False, frozenset([channel])))
-        self._hand_on()
 
     def _count(self, data: bytes, at: int, end: int) -> int:
         """The channel of the message that stands there in a chunk, or in a record of its own."""
@@ -350,31 +367,6 @@ class _Walk:
         self._chunk_places.add((self.record_at, HEAD.size + len(content)))
         at = self._at - len(content)
         self._spans.append(Span(at, len(content), True, frozenset(channels)))
-
-    def _data_end(self, content: bytes) -> None:
-        if self._data_crc is not None:
-            raise RecordingError("a second end of the data section")
-        declared, actual = int.from_bytes(content[:4], "little"), self._sums.crc()
-        if len(content) < 4 or declared not in (0, actual):
-            raise RecordingError(f"data section CRC {actual:#010x}, declared {declared:#010x}")
-        self._data_crc = declared
-        self._data = (self.record_at, actual)
-        self._summary_at = self._at
-
-    def _footer(self, head: bytes, content: bytes) -> None:
-        footer = Footer.read(content)
-        if self._data_crc is None:
-            raise RecordingError("a footer without an end of the data section before it")
-        actual = zlib.crc32(content[:16], zlib.crc32(head, self._sums.crc()))
-        if footer.summary_crc not in (0, actual):
-            raise RecordingError(f"summary CRC {actual:#010x}, declared {footer.summary_crc:#010x}")
-        empty = self._summary_at == self.record_at
-        if footer.summary_start not in ((0,) if empty else (self._summary_at,)):
-            raise RecordingError(
-                f"footer: summary at byte {footer.summary_start}, found at {self._summary_at}"
-            )
-        if self._indexed_places:
-            self._misindexed = len(set(self._indexed_places) ^ self._chunk_places)
 
     def found(self, path: Path) -> Verified:
         assert self._header is not None  # any other first record was refused

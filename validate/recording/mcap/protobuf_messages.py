@@ -15,8 +15,8 @@ from typing import Any
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 
-from validate.recording.mcap.channels import MessageSchema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, PROTOBUF, SIGNAL, Json
+from validate.recording.mcap.write import MessageSchema
 
 _FILE = "validate.proto"
 _TEXT, _NUMBER, _TEXTS, _NUMBERS, _STAMP = "text", "number", "texts", "numbers", "stamp"

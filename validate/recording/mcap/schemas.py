@@ -1,4 +1,4 @@
-"""JSON schemas of this package's messages, and their encoding and decoding.
+"""Messages and metadata records of this package's recordings: schemas, encoding and decoding.
 
     validate.Markers   {stamp, frame, names, x, y, z, sd}   m; null in a list: point not seen;
                                                            z null as a whole: points in a plane
@@ -11,23 +11,28 @@
     foxglove.PosesInFrame                                   mirror of markers, for viewing only
 
 `stamp` is {sec, nsec}; a foreign writer may leave it out, then publish time counts. Numbers are
-written in their shortest exact form, so they return bit for bit. Own schemas because the
-well-known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
-(`own_protobuf`), where NaN is a point not seen, no z is points in a plane, and an image is bytes.
+written in their shortest exact form, so they return bit for bit. Own schemas because the well-
+known pose list has no names and JSON has no NaN. A replay holds the same in Protobuf
+(`protobuf_messages`), where NaN is a point not seen, no z is points in a plane, and an image is
+bytes.
 """
 
 import base64
 import binascii
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, checked
 from validate.errors import RecordingError
 from validate.recording.images.image import Pixels, decode_png, encode_png
+from validate.recording.mcap.records import Metadata
+from validate.recording.types import Contours, Frames, Record, Recording
 
 MARKERS, SIGNAL, CONTOUR = "validate.Markers", "validate.Signal", "validate.Contour"
 IMAGE = "foxglove.CompressedImage"
@@ -194,11 +199,20 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
     """
     message = parse(data)
     if schema == IMAGE:
-        return _image(message)
+        if _text(message, "format") != "png":
+            raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
+        ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
+        return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
     names: tuple[str, ...] = ()
     unit = ""
     if schema == MARKERS:
-        names, values = _names(message), _points(message)
+        names = _field(message, "names")
+        if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+            raise RecordingError("field 'names' is not a list of texts")
+        columns = [_numbers(message, axis, null=True) for axis in "xy"]
+        if _field(message, "z") is not None:
+            columns.append(_numbers(message, "z", null=True))
+        names, values = tuple(names), _columns(columns)
         if len(names) != len(values):
             raise RecordingError(f"{len(names)} names for {len(values)} points")
     elif schema == SIGNAL:
@@ -217,13 +231,6 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
 
 def _number(message: Json, name: str) -> float:
     return float(_array(name, [_field(message, name)], {int, float})[0])
-
-
-def _image(message: Json) -> Sample:
-    if _text(message, "format") != "png":
-        raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
-    ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
-    return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
 
 
 def _picture(message: Json) -> bytes:
@@ -258,13 +265,6 @@ def _text(message: Json, name: str) -> str:
     if not isinstance(value, str):
         raise RecordingError(f"field '{name}' is {type(value).__name__}, expected text")
     return value
-
-
-def _names(message: Json) -> tuple[str, ...]:
-    names = _field(message, "names")
-    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
-        raise RecordingError("field 'names' is not a list of texts")
-    return tuple(names)
 
 
 def _stamp_ns(message: Json, name: str) -> int | None:
@@ -302,15 +302,101 @@ def _array(name: str, values: list[Any], allowed: set[type]) -> Floats:
     return array
 
 
-def _points(message: Json) -> Floats:
-    columns = [_numbers(message, axis, null=True) for axis in "xy"]
-    if _field(message, "z") is not None:
-        columns.append(_numbers(message, "z", null=True))
-    return _columns(columns)
-
-
 def _columns(columns: list[Floats]) -> Floats:
     lengths = [len(c) for c in columns]
     if len(set(lengths)) != 1:
         raise RecordingError(f"lengths of x, y, z differ: {lengths}")
     return np.stack(columns, axis=1)
+
+
+RECORD = "validate.recording"  # the recording's name and the format of its file
+FORMAT = "1"
+POSE = "pose/"  # POSE + topic of every stream of contours or frames
+POSE_KEY = "T_frame_from_image"
+FOUND_IN = "found_in"  # in the pose record of contours: the topic of the images they come from
+CALIBRATION = "calibration/"  # CALIBRATION + topic of every stream of frames
+CALIBRATION_KEYS = ("m_per_px_x", "m_per_px_y")
+
+
+def own_records(recording: Recording) -> dict[str, Record]:
+    """Return the records that a recording's file adds to the recording's."""
+    own: dict[str, Record] = {RECORD: {"format": FORMAT, "name": recording.name}}
+    posed: dict[str, Contours | Frames] = {**recording.contours, **recording.frames}
+    for topic, stream in posed.items():
+        own[POSE + topic] = {POSE_KEY: " ".join(map(repr, stream.pose.ravel().tolist()))}
+        if isinstance(stream, Contours) and stream.images:
+            own[POSE + topic] = {**own[POSE + topic], FOUND_IN: stream.images}
+    for topic, frames in recording.frames.items():
+        scales = zip(CALIBRATION_KEYS, frames.m_per_px, strict=True)
+        own[CALIBRATION + topic] = {key: repr(scale) for key, scale in scales}
+    return own
+
+
+def all_records(recording: Recording) -> dict[str, Record]:
+    """Return the recording's records and those that its file adds.
+
+    Raises `RecordingError` for records that bear a name of the file's own or hold more than texts.
+    """
+    own = own_records(recording)
+    taken = sorted(own.keys() & recording.metadata.keys())
+    if taken:
+        raise RecordingError(f"{recording.name}: metadata names {taken} are reserved; rename them")
+    for name, values in recording.metadata.items():
+        if not all(isinstance(text, str) for pair in values.items() for text in pair):
+            raise RecordingError(
+                f"{recording.name}: metadata {name!r} has values that are not text"
+            )
+    return {**own, **recording.metadata}
+
+
+def by_name(found: Iterable[Metadata]) -> dict[str, Record]:
+    """Metadata records by name; the second of one name is called `name#2`, and so on."""
+    records: dict[str, Record] = {}
+    counts: Counter[str] = Counter()
+    for record in found:
+        counts[record.name] += 1
+        again = counts[record.name] > 1
+        name = f"{record.name}#{counts[record.name]}" if again else record.name
+        if name in records:
+            raise RecordingError(f"metadata {name!r} occurs twice; rename one")
+        records[name] = record.values
+    return records
+
+
+def name_of(records: Mapping[str, Record], path: Path) -> str:
+    """What the recording calls itself, else its file's name; refuses formats of other versions."""
+    record = records.get(RECORD)
+    if record is None:
+        return path.stem
+    if record.get("format") != FORMAT or "name" not in record:
+        raise RecordingError(
+            f"record '{RECORD}' is {dict(record)}, expected format {FORMAT} and a name; "
+            "read it with the version that wrote it"
+        )
+    return record["name"]
+
+
+def pose_of(records: Mapping[str, Record], topic: str) -> Floats:
+    """T_frame_from_image (4, 4) of a topic; raises `RecordingError` where there is none."""
+    return _record_numbers(records, POSE + topic, (POSE_KEY,), 16).reshape(4, 4)
+
+
+def scale_of(records: Mapping[str, Record], topic: str) -> tuple[float, float]:
+    """Size (x, y) m of a topic's pixels; raises `RecordingError` where there is none."""
+    x, y = _record_numbers(records, CALIBRATION + topic, CALIBRATION_KEYS, 2).tolist()
+    return x, y
+
+
+def _record_numbers(
+    records: Mapping[str, Record], name: str, keys: tuple[str, ...], count: int
+) -> Floats:
+    """The `count` numbers under `keys` of a topic's metadata record."""
+    record = records.get(name, {})
+    missing = [key for key in keys if key not in record]
+    if missing:
+        raise RecordingError(f"no record {name!r} with {', '.join(missing)}, {count} numbers")
+    try:
+        numbers = np.array([float(word) for key in keys for word in record[key].split()])
+    except ValueError as error:
+        raise RecordingError(f"record {name!r}: {error}") from None
+    return checked(numbers, f"record {name!r}: {', '.join(keys)}", (count,), error=RecordingError)

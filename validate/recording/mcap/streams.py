@@ -14,22 +14,25 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError
 from validate.recording.mcap.decoders import decoder_of
-from validate.recording.mcap.metadata import CALIBRATION, FOUND_IN, POSE, pose_of, scale_of
-from validate.recording.mcap.records import Channel, Message, Schema
+from validate.recording.mcap.records import Channel, Message, Schema, Verified
 from validate.recording.mcap.schemas import (
+    CALIBRATION,
     CONTOUR,
+    FOUND_IN,
     IMAGE,
     JSON_SCHEMA,
     MARKERS,
     MIRROR_OF,
+    POSE,
     PROTOBUF,
     SIGNAL,
     Parse,
     Sample,
     decode,
     parse_json,
+    pose_of,
+    scale_of,
 )
-from validate.recording.mcap.verified_file import Verified
 from validate.recording.types import Contours, Frames, Markers, Record, Signal, Stream
 
 OURS = (MARKERS, SIGNAL, CONTOUR)
@@ -119,21 +122,17 @@ def parser_of(channel: Channel, schema: Schema) -> tuple[Parse, str]:
         found = decoder_of(schema, channel)
         if isinstance(found, str):
             return parse_json, f"{channel.topic!r}: {found}"
-        return _null_of_none(found), ""
+
+        # A list of no z is what JSON writes as null: points in a plane.
+        def parsed(data: bytes) -> dict[str, Any]:
+            message = found(data)
+            return {**message, "z": message.get("z") or None}
+
+        return parsed, ""
     return parse_json, (
         f"{channel.topic!r}: {schema.name} in '{encodings}', expected '{JSON_SCHEMA}/json' or "
         f"'{PROTOBUF}/protobuf'"
     )
-
-
-def _null_of_none(parse: Parse) -> Parse:
-    """A list of no z is what JSON writes as null: points in a plane."""
-
-    def parsed(data: bytes) -> dict[str, Any]:
-        message = parse(data)
-        return {**message, "z": message.get("z") or None}
-
-    return parsed
 
 
 def not_ours(verified: Verified) -> dict[str, str]:

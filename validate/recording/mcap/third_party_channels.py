@@ -4,7 +4,7 @@ Of a type that is not known a field becomes a signal by `--map /topic.field.sub=
 put in the order of their stamps; how many were not is told. What is no stream is listed with why.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,17 +12,14 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.clocks.clock_check import clock_of
-from validate.recording.formats.options import length
 from validate.recording.images.image import shallow
 from validate.recording.mcap.decoders import Plain, decoder_of
 from validate.recording.mcap.known_messages import MessagePart, parts_of, stamp_ns
-from validate.recording.mcap.records import Channel, Message, Schema
+from validate.recording.mcap.records import Channel, Message, Schema, Verified
 from validate.recording.mcap.schemas import MIRROR_OF
 from validate.recording.mcap.streams import MAX_NUMBERS, ours
-from validate.recording.mcap.verified_file import Verified
-from validate.recording.reader import Options
-from validate.recording.types import Clock, Frames, Markers, Signal, Stream
+from validate.recording.reader import Options, length
+from validate.recording.types import Clock, Frames, Markers, Signal, Stream, clock_of
 from validate.units import si_of
 
 _DATE = 10**17  # ns: three years; clocks that count from a start stay below
@@ -102,13 +99,7 @@ def _parts(
             f"messages of unknown meaning ({name}); import a number with "
             f"--map {channel.topic}.FIELD=UNIT"
         )
-    return _both(decode, known)
-
-
-def _both(
-    decode: Callable[[bytes], Plain], parts: Callable[[Plain], Iterable[MessagePart]]
-) -> Callable[[bytes], Iterable[MessagePart]]:
-    return lambda data: parts(decode(data))
+    return lambda data: known(decode(data))
 
 
 def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[MessagePart]]:
@@ -186,12 +177,28 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
             continue
         for name, whole in _by_size(one.samples):
             topic = f"{one.channel.topic}{name}"
-            samples, gone = _with_numbers(whole)
+            # Without samples that hold NaN, as where a tool was lost; all where none is left.
+            kept = [s for s in whole if s[0].names or not np.isnan(s[0].values).any()]
+            lost = len(whole) - len(kept)
+            samples, gone = (
+                (kept, f"{lost} samples without numbers left out") if kept and lost else (whole, "")
+            )
             why = _why_none([part for part, _, _ in samples], side)
             if why or topic in make:
                 never[topic] = why or "two channels have this topic"
                 continue
-            times, unset = _times(samples)
+            # When the samples were measured, ns: by their stamps; where those were never set, which
+            # makes them 0, by when they were published.
+            stamps = np.array(
+                [p if part.ns is None else part.ns for part, p, _ in samples], np.int64
+            )
+            zero = stamps == 0
+            if not zero.any() or 0 < stamps.max() < _DATE:
+                times, unset = stamps, ""
+            else:
+                published = np.array([p for _, p, _ in samples], np.int64)
+                times = np.where(zero, published, stamps)
+                unset = f"{int(zero.sum())} stamps of 0: replaced by the publish time"
             order = np.argsort(times, kind="stable")
             moved = int((order != np.arange(len(order))).sum())
             try:
@@ -209,27 +216,6 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
-
-
-def _with_numbers(samples: list[Sample]) -> tuple[list[Sample], str]:
-    """Samples without those of numbers that hold NaN, as where a tool was lost; all where none is
-    left."""
-    kept = [s for s in samples if s[0].names or not np.isnan(s[0].values).any()]
-    gone = len(samples) - len(kept)
-    return (kept, f"{gone} samples without numbers left out") if kept and gone else (samples, "")
-
-
-def _times(samples: Sequence[Sample]) -> tuple[Ints, str]:
-    """When the samples were measured, ns: by their stamps; where those were never set, which makes
-    them 0, by when they were published."""
-    stamps = np.array([p if part.ns is None else part.ns for part, p, _ in samples], np.int64)
-    zero = stamps == 0
-    if not zero.any() or 0 < stamps.max() < _DATE:
-        return stamps, ""
-    published = np.array([p for _, p, _ in samples], np.int64)
-    return np.where(
-        zero, published, stamps
-    ), f"{int(zero.sum())} stamps of 0: replaced by the publish time"
 
 
 def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:

@@ -14,13 +14,22 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, metres, spread
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.motion_capture.c3d_bytes import BLOCK, MOST, layout, records
+from validate.recording.motion_capture.c3d_arrays import BLOCK, MOST, layout, records
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.motion_capture.text_rows import LEFT_OUT, told_zeros, without_zeros
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Record, Recording, Signal, Stream
 
 # --- What a C3D file holds as streams: points, computed outputs, analog channels, poses of
@@ -187,12 +196,10 @@ def _require_whole(path: Path) -> None:
             f"{lies.points} points and {lies.analog} analog numbers: {lies.needs} bytes; "
             f"truncated or damaged"
         )
-    _require_parameters(path, head(path, lies.at(0)), BLOCK * max(first[0] - 1, 1))
-
-
-def _require_parameters(path: Path, raw: bytes, begin: int) -> None:
-    """No parameter declares more values than the file has bytes left: ezc3d takes memory for them
-    before it reads, for seconds."""
+    # No parameter declares more values than the file has bytes left: ezc3d takes memory for
+    # them before it reads, for seconds.
+    raw = head(path, lies.at(0))
+    begin = BLOCK * max(first[0] - 1, 1)
     size = path.stat().st_size
     for group, name, at in records(raw, begin):
         dimensions = raw[at + 4 : at + 4 + raw[at + 3]] if group > 0 else b""

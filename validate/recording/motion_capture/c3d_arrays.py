@@ -1,7 +1,12 @@
-"""Arrays of a C3D file. The only file that imports ezc3d."""
+"""Arrays of a C3D file, and its byte layout. The only file that imports ezc3d.
 
+A header counts at most 65535 frames; a longer file is read in parts that a header can count.
+"""
+
+import struct
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -11,16 +16,86 @@ from numpy.typing import NDArray
 
 from validate.errors import RecordingError
 from validate.files import read_bytes
-from validate.recording.motion_capture.c3d_bytes import (
-    BIG,
-    BLOCK,
-    INTEL,
-    MOST,
-    layout,
-    parts_beyond,
-    records,
-)
 from validate.recording.reader import head
+
+BLOCK = 512  # bytes
+INTEL, BIG = 84, 86  # processors; numbers of the latter (SGI) stand the other way round
+_DEC = 85  # the one whose floats stand so by halves
+MOST = 65535  # frames that a header counts
+_FRAMES = 6  # where the header has its first and last frame
+
+
+@dataclass(frozen=True)
+class Layout:
+    """`points` and `analog` numbers of one frame, `frames` by the header, the block (from 1) in
+    which they `start`, and bytes `each`."""
+
+    processor: int
+    points: int
+    analog: int
+    frames: int
+    start: int
+    each: int
+
+    @property
+    def needs(self) -> int:
+        """Bytes to the end of the last frame that the header counts."""
+        return self.at(self.frames)
+
+    def at(self, frame: int) -> int:
+        """Where a frame begins, bytes."""
+        return BLOCK * (self.start - 1) + frame * self.each
+
+
+def layout(path: Path, first: bytes) -> Layout:
+    """By the first block. The last frame of a trial that begins late is counted modulo 65536."""
+    # Whose numbers the whole file is in, as its parameters state: 84 Intel, 85 DEC, 86 SGI.
+    begin = BLOCK * (max(first[0], 2) - 1)
+    processor = (head(path, begin + 4)[begin + 3 :] or b"\0")[0]
+    order = ">" if processor == BIG else "<"
+    points, analog, begin, end = struct.unpack(f"{order}4H", first[2:10])
+    (start,) = struct.unpack(f"{order}H", first[16:18])
+    size = (4 if _negative(processor, first) else 2) * (4 * points + analog)
+    frames = end - begin + 1 + (MOST + 1 if end < begin else 0)
+    return Layout(processor, points, analog, frames, start, size)
+
+
+def _negative(processor: int, first: bytes) -> bool:
+    """Whether the header's scale is below 0: coordinates are floats, not integers."""
+    sign = {BIG: 0, _DEC: 1}.get(processor, 3)  # the byte of its highest bits
+    return first[12 + sign] >= 128
+
+
+def parts_beyond(path: Path, frames: int, copy: Path) -> Iterator[Path]:
+    """The frames after those that the header counts, up to `frames`, as whole files that are
+    written to `copy` one after the other."""
+    raw = read_bytes(path)
+    lies = layout(path, raw[:BLOCK])
+    for begin in range(lies.frames, frames, MOST):
+        count = min(MOST, frames - begin)
+        front = bytearray(raw[: lies.at(0)])
+        front[_FRAMES : _FRAMES + 4] = struct.pack("<2H", 1, count)
+        copy.write_bytes(front + raw[lies.at(begin) : lies.at(begin + count)])
+        yield copy
+
+
+def records(raw: bytes, begin: int) -> Iterator[tuple[int, bytes, int]]:
+    """Group number (below 0: a group itself), name and the place of the link of each record, as far
+    as the links lead.
+
+    C3D user guide, parameter section: four bytes, then records that are linked.
+    """
+    order = ">" if raw[begin + 3 : begin + 4] == bytes([BIG]) else "<"
+    at, ahead = begin + 4, 1
+    while ahead > 0 and at + 2 <= len(raw):
+        length, group = struct.unpack("bb", raw[at : at + 2])
+        after = at + 2 + abs(length)  # of a locked one it is negative
+        if length == 0 or after + 4 > len(raw):
+            return
+        yield group, raw[at + 2 : after], after
+        (ahead,) = struct.unpack(f"{order}h", raw[after : after + 2])
+        at = after + ahead
+
 
 # --- C3D in the byte order of SGI, as the same file in Intel's: the library reads that one.
 
@@ -84,39 +159,56 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises `RecordingError` for a file without all frames that its parameters tell of.
     """
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
-        return _held(turned(path, Path(folder) / "turned.c3d"), Path(folder) / "part.c3d")
+        # Of a file in an order that the library reads; a long trial is read by parts.
+        path = turned(path, Path(folder) / "turned.c3d")
+        import ezc3d
 
-
-def _held(path: Path, part: Path) -> dict[str, NDArray[Any]]:
-    """Of a file in an order that the library reads; a long trial is read by parts."""
-    import ezc3d
-
-    found = ezc3d.c3d(str(path))
-    parameters = found["parameters"]
-    lies = layout(path, head(path, BLOCK))
-    frames = _count(parameters) if lies.frames == MOST else 0
-    size = path.stat().st_size
-    if size < lies.at(frames):
-        raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
-    rest = parts_beyond(path, frames, part)
-    held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
-    header = found["header"]
-    rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
-             _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
-    return {
-        **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
-        "rates": np.array(rates),
-        "labels": _words(parameters, "POINT", "LABELS"),
-        "unit": _words(parameters, "POINT", "UNITS")[:1],
-        "channels": _words(parameters, "ANALOG", "LABELS"),
-        "channel_units": _words(parameters, "ANALOG", "UNITS"),
-        "bodies": _words(parameters, "ROTATION", "LABELS"),
-        "outputs": _outputs(parameters),
-        "first_frame": np.array(header["points"]["first_frame"] + 1),
-        "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
-        "events": _event_names(parameters),
-        "event_times": _event_times(parameters),
-    }
+        found = ezc3d.c3d(str(path))
+        parameters = found["parameters"]
+        lies = layout(path, head(path, BLOCK))
+        if lies.frames == MOST:
+            # Frames of a long trial as programs tell of them: Vicon's first and last field, of two
+            # words each, else a number beside or in place of the one that counts to 65535.
+            ends = ("START", "END")
+            fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ends]
+            if all(len(words) == 2 for words in fields):
+                begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
+                frames = end - begin + 1
+            else:
+                told = (_values(parameters, "POINT", n) for n in ("LONG_FRAMES", "FRAMES"))
+                frames = max((int(v) for values in told for v in values), default=0)
+        else:
+            frames = 0
+        size = path.stat().st_size
+        if size < lies.at(frames):
+            raise RecordingError(f"{size} bytes, {frames} frames need {lies.at(frames)}: truncated")
+        rest = parts_beyond(path, frames, (Path(folder) / "part.c3d"))
+        held = [_frames(found), *(_frames(ezc3d.c3d(str(one))) for one in rest)]
+        header = found["header"]
+        rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
+                 _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
+        # Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise.
+        group = parameters.get("EVENT", {})
+        times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
+        # Labels and units of computed outputs, which lie among the points.
+        pairs = []
+        for group, units in _OUTPUTS.items():
+            unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
+            pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
+        return {
+            **{name: np.concatenate([one[name] for one in held]) for name in held[0]},
+            "rates": np.array(rates),
+            "labels": _words(parameters, "POINT", "LABELS"),
+            "unit": _words(parameters, "POINT", "UNITS")[:1],
+            "channels": _words(parameters, "ANALOG", "LABELS"),
+            "channel_units": _words(parameters, "ANALOG", "UNITS"),
+            "bodies": _words(parameters, "ROTATION", "LABELS"),
+            "outputs": np.array(pairs, dtype=str).reshape(-1, 2),
+            "first_frame": np.array(header["points"]["first_frame"] + 1),
+            "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
+            "events": _event_names(parameters),
+            "event_times": times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0)),
+        }
 
 
 def _frames(found: Any) -> dict[str, NDArray[Any]]:
@@ -151,26 +243,6 @@ def _numbers(parameters: Any, group: str, name: str, many: int) -> NDArray[np.fl
     return np.array(held + [1.0] * (many - len(held)))
 
 
-def _count(parameters: Any) -> int:
-    """Frames of a long trial as programs tell of them: Vicon's first and last field, of two words
-    each, else a number beside or in place of the one that counts to 65535."""
-    fields = [list(_values(parameters, "TRIAL", f"ACTUAL_{w}_FIELD")) for w in ("START", "END")]
-    if all(len(words) == 2 for words in fields):
-        begin, end = (int(low) % _WORD + _WORD * int(high) for low, high in fields)
-        return end - begin + 1
-    told = [v for name in ("LONG_FRAMES", "FRAMES") for v in _values(parameters, "POINT", name)]
-    return max((int(v) for v in told), default=0)
-
-
-def _outputs(parameters: Any) -> NDArray[Any]:
-    """Labels and units of computed outputs, which lie among the points."""
-    pairs = []
-    for group, units in _OUTPUTS.items():
-        unit = next((str(u).strip() for u in _values(parameters, "POINT", units)), "")
-        pairs += [(label, unit) for label in _words(parameters, "POINT", group)]
-    return np.array(pairs, dtype=str).reshape(-1, 2)
-
-
 def _event_names(parameters: Any) -> NDArray[Any]:
     """Labels, each after its context (Left, Right), where as many are stated."""
     labels, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
@@ -178,13 +250,6 @@ def _event_names(parameters: Any) -> NDArray[Any]:
         return labels
     pairs = zip(sides.tolist(), labels.tolist(), strict=True)
     return np.array([f"{side} {label}".strip() for side, label in pairs], dtype=str)
-
-
-def _event_times(parameters: Any) -> NDArray[np.float64]:
-    """Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise."""
-    group = parameters.get("EVENT", {})
-    times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
-    return times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0))
 
 
 def _rate(parameters: Any, group: str, samples: NDArray[np.float64]) -> float:

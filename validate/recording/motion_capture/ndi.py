@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
-from validate.recording.formats.options import RATE, UNIT, above_zero, frame, length
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
 from validate.recording.motion_capture.text_rows import (
@@ -30,7 +29,18 @@ from validate.recording.motion_capture.text_rows import (
     text_rows,
     told_left,
 )
-from validate.recording.reader import MapOption, Options, Reader, head, source_of
+from validate.recording.reader import (
+    RATE,
+    UNIT,
+    MapOption,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    source_of,
+)
 from validate.recording.tables.table import split_unit
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Recording, Stream
@@ -83,46 +93,38 @@ def tools_of(header: TextRow) -> tuple[Tool, ...]:
             continue
         position, turn, name = group
         port = next((m for c in cells[after:i] if (m := _PORT.fullmatch(c))), None)
+        # The unit of length in brackets, or none.
+        told = _BRACKETS.search(header.cells[i + position[0]])
         found.append(
             Tool(
                 name or (f"{port[1]}{port[2]}" if port else f"tool{len(found) + 1}"),
                 tuple(i + j for j in position),
                 tuple(i + j for j in turn),
                 None,
-                _unit(header.cells[i + position[0]]),
+                told[1].strip() if told and in_si(1.0, told[1].strip(), "m") else "",
             )
         )
         i += 7
         after = i
     labels = distinct([tool.name for tool in found], len(found))
-    states = _states(cells, found)
-    return tuple(replace(t, name=n, state=s) for t, n, s in zip(found, labels, states, strict=True))
-
-
-def _states(cells: Sequence[str], tools: Sequence[Tool]) -> list[int | None]:
-    """The column of each tool's state: one that carries its name, else the nearest before its own,
-    of one tool alone also after; those of single markers are none."""
+    # The column of each tool's state: one that carries its name, else the nearest before its
+    # own, of one tool alone also after; those of single markers are none.
     of = [j for j, c in enumerate(cells) if _STATE.fullmatch(c) and "marker" not in c]
     named = [
         next((j for j in of if tool.name.lower() in _IN_NAME.sub("", cells[j])), None)
-        for tool in tools
+        for tool in found
     ]
     of = [j for j in of if j not in named]
-    begins = [min(*tool.position, *tool.turn) for tool in tools]
+    begins = [min(*tool.position, *tool.turn) for tool in found]
     ends = [0, *(begin + 7 for begin in begins)]
     before = [
         next((j for j in reversed(of) if end <= j < begin), None)
         for end, begin in zip(ends, begins, strict=False)
     ]
-    if len(tools) == 1 and before[0] is None:
+    if len(found) == 1 and before[0] is None:
         before = [next((j for j in of if j >= ends[1]), None)]
-    return [b if n is None else n for n, b in zip(named, before, strict=True)]
-
-
-def _unit(cell: str) -> str:
-    """The unit of length in brackets, or none."""
-    told = _BRACKETS.search(cell)
-    return told[1].strip() if told and in_si(1.0, told[1].strip(), "m") else ""
+    states = [b if n is None else n for n, b in zip(named, before, strict=True)]
+    return tuple(replace(t, name=n, state=s) for t, n, s in zip(found, labels, states, strict=True))
 
 
 def _group(cells: Sequence[str]) -> tuple[tuple[int, ...], tuple[int, ...], str] | None:
@@ -194,7 +196,14 @@ def read_ndi(path: Path, options: Options) -> Recording:
     clock = clock_of_columns(header)
     body = _rows(held, header, [i for i, _ in clock])
     columns = [*(i for tool in tools for i in (*tool.position, *tool.turn)), *(i for i, _ in clock)]
-    values, rows, left = numbers(held, body, _width(header, body), columns)
+    # Columns; those after a name that ends in dots, as of NDI's own sample, go on.
+    last = next((c for c in reversed(header.cells) if c), "")
+    values, rows, left = numbers(
+        held,
+        body,
+        max((len(r.cells) for r in body), default=0) if last.endswith("...") else len(header.cells),
+        columns,
+    )
     whose = _whose(header, rows, tools)
     t = _times(held, values[:, 7 * len(tools) :], [f for _, f in clock], options, whose)
     stated = tools[0].unit or above.get("units", "")
@@ -260,14 +269,6 @@ def _recording(
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, never)
-
-
-def _width(header: TextRow, body: Sequence[TextRow]) -> int:
-    """Columns; those after a name that ends in dots, as of NDI's own sample, go on."""
-    last = next((c for c in reversed(header.cells) if c), "")
-    return (
-        max((len(r.cells) for r in body), default=0) if last.endswith("...") else len(header.cells)
-    )
 
 
 def _rows(held: TextRows, header: TextRow, clock: Sequence[int]) -> list[TextRow]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, metres, spread
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
 from validate.recording.motion_capture.text_rows import (
@@ -21,7 +20,17 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording, Stream
 
 _MAGIC = b"Format Version"
@@ -78,13 +87,43 @@ def read_optitrack(path: Path, options: Options) -> Recording:
     damaged.
     """
     held = text_rows(path)
-    header = _header(held)
+    if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
+        raise RecordingError(
+            f"{held.name}: not a Motive CSV file: its first cell is not 'Format Version'"
+        )
+    first = held.rows[0].cells
+    header = dict(zip(first[::2], first[1::2], strict=False))
     table, left = _table(held)
     unit = header.get("Length Units", "")
     factor, stated = metres(options, _UNITS.get(unit, unit), path.name)
     frame = options.get("frame", header.get("Coordinate Space", "capture").lower())
-    poses, unread = _poses(table, factor, frame)
-    points, zeros = _points(table, factor, spread(options), frame)
+    # Poses of rigid bodies where they were seen, and why others have none.
+    poses: dict[str, Stream] = {}
+    unread = {}
+    for name, at in table.triples((_BODY,)):
+        q = table.turn(name)
+        pose = table.values[:, [*at, *q]]
+        seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
+        if not q:
+            unread[name] = "its rotation is not a quaternion; export it as Rotation Type Quaternion"
+        elif not seen.any():
+            unread[name] = "never seen"
+        else:
+            R = rotations(pose[seen, 3:], f"{table.held.name}: {name}")
+            t = table.values[seen, _TIME]
+            poses |= pose_signals(name, t, R, factor * pose[seen, :3], frame)
+    # Markers by topic, and how many points were three zeros; those of a kind that the file
+    # does not have are left out.
+    sd = spread(options)
+    points: dict[str, Stream] = {}
+    zeros = 0
+    for topic, kinds in _POINTS.items():
+        if columns := table.triples(kinds):
+            names = distinct([name for name, _ in columns], len(columns))
+            x, count = without_zeros(table.values[:, [at for _, at in columns]])
+            x = factor * whole_points(table.held, x, names, table.rows)
+            zeros += count
+            points[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
     streams = {**points, **poses}
     if not streams:
         raise RecordingError(f"{path.name}: neither markers nor poses of bodies: {unread}")
@@ -95,15 +134,6 @@ def read_optitrack(path: Path, options: Options) -> Recording:
     }  # fmt: skip
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, unread)
-
-
-def _header(held: TextRows) -> dict[str, str]:
-    if not held.rows or held.rows[0].cell(0) != _MAGIC.decode():
-        raise RecordingError(
-            f"{held.name}: not a Motive CSV file: its first cell is not 'Format Version'"
-        )
-    first = held.rows[0].cells
-    return dict(zip(first[::2], first[1::2], strict=False))
 
 
 def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
@@ -123,45 +153,6 @@ def _table(held: TextRows) -> tuple[MotiveTable, tuple[str, ...]]:
     values = np.full((len(rows), width), np.nan)
     values[:, kept] = found
     return MotiveTable(held, above[0], above[1], parts, axes, rows, values), left
-
-
-def _points(
-    table: MotiveTable, factor: float, sd: float, frame: str
-) -> tuple[dict[str, Stream], int]:
-    """Markers by topic, and how many points were three zeros; those of a kind that the file does
-    not have are left out."""
-    found: dict[str, Stream] = {}
-    count = 0
-    for topic, kinds in _POINTS.items():
-        points = table.triples(kinds)
-        if points:
-            names = distinct([name for name, _ in points], len(points))
-            x, zeros = without_zeros(table.values[:, [at for _, at in points]])
-            x = factor * whole_points(table.held, x, names, table.rows)
-            count += zeros
-            found[topic] = Markers(table.values[:, _TIME], names, x, sd, frame)
-    return found, count
-
-
-def _poses(
-    table: MotiveTable, factor: float, frame: str
-) -> tuple[dict[str, Stream], dict[str, str]]:
-    """Poses of rigid bodies where they were seen, and why others have none."""
-    found: dict[str, Stream] = {}
-    unread = {}
-    for name, at in table.triples((_BODY,)):
-        q = table.turn(name)
-        pose = table.values[:, [*at, *q]]
-        seen = ~np.isnan(pose).any(axis=1) & pose.any(axis=1)
-        if not q:
-            unread[name] = "its rotation is not a quaternion; export it as Rotation Type Quaternion"
-        elif not seen.any():
-            unread[name] = "never seen"
-        else:
-            R = rotations(pose[seen, 3:], f"{table.held.name}: {name}")
-            t = table.values[seen, _TIME]
-            found |= pose_signals(name, t, R, factor * pose[seen, :3], frame)
-    return found, unread
 
 
 OPTITRACK = Reader(

@@ -10,7 +10,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, length, spread
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.motion_capture.text_rows import (
@@ -25,7 +24,17 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    length,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording, Signal, Stream
 
 # --- Analog channels and force plates as Qualisys Track Manager exports them: a text of samples.
@@ -42,7 +51,9 @@ def read_qualisys_analog(path: Path, options: Options) -> Recording:
     `RecordingError` for a file without names or frequency, or damaged.
     """
     held = text_rows(path)
-    first = next((i for i, r in enumerate(held.rows) if _is_sample(r)), len(held.rows))
+    first = next(
+        (i for i, r in enumerate(held.rows) if (as_number(r.cell(0)) is not None)), len(held.rows)
+    )
     above = held.rows[:first]
     header = {r.cell(0): r.cell(1) for r in above}
     rate = as_number(header.get("FREQUENCY", "")) or 0.0
@@ -69,10 +80,6 @@ def read_qualisys_analog(path: Path, options: Options) -> Recording:
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, streams, told, never)
-
-
-def _is_sample(row: TextRow) -> bool:
-    return as_number(row.cell(0)) is not None
 
 
 def _analog_columns(above: tuple[TextRow, ...]) -> list[str]:
@@ -117,10 +124,33 @@ def read_qualisys(path: Path, options: Options) -> Recording:
     """
     held = text_rows(path)
     header, names, body = _parts(held)
-    rate = _rate(held, header)
+    rate = as_number(header.get("FREQUENCY", "")) or 0.0
+    if not 0 < rate < np.inf:
+        raise RecordingError(
+            f"{held.name}: FREQUENCY '{header.get('FREQUENCY', '')}' is not a rate above 0 Hz"
+        )
+
     if header.get("DATA_INCLUDED") == _SIX:
         return _bodies(path, held, header, names, body, rate, options)
-    before, each = _columns(body, len(names), rate)
+    # Columns before the first coordinate, and those of each point: three, or its residual
+    # too.
+    points = len(names)
+    width = max((len(r.cells) for r in body), default=0)
+    clock = 3 if any(":" in r.cell(2) for r in body[:1]) else 2
+    every = [(before, each) for before in (0, clock) for each in (3, 4)]
+    over = {(b, each): width - b - each * points for b, each in every}
+    open_end = not any(r.cell(width - 1) for r in body)
+    fitting = [one for one in every if over[one] == 0 or (open_end and over[one] == 1)]
+    if len(fitting) > 1:
+        # Whether the first two columns of two rows go on as a frame's number and its time do.
+        two = [[as_number(c) for c in r.cells[:2]] for r in body[:2]]
+        cells = [c for row in two for c in row if c is not None]
+        if len(cells) < 4:
+            timed = False
+        else:
+            timed = cells[2] - cells[0] == 1 and abs(cells[3] - cells[1] - 1 / rate) < _ROUNDED
+        fitting.sort(key=lambda one: ((one[0] > 0) != timed, over[one]))
+    before, each = fitting[0] if fitting else (clock if width > 3 * points else 0, 3)
     width = before + each * len(names)
     values, rows, left = numbers(held, body, width, range(before, width))
     shown, zeros = without_zeros(values.reshape(len(values), -1, each)[..., :3])
@@ -231,42 +261,6 @@ def _turned(what: str, columns: Floats) -> Floats:
             f"{off[bad.argmax()]:.3g}); expected the columns of Qualisys 6D, or the file is damaged"
         )
     return np.asarray(R)
-
-
-def _rate(held: TextRows, header: dict[str, str]) -> float:
-    rate = as_number(header.get("FREQUENCY", "")) or 0.0
-    if not 0 < rate < np.inf:
-        raise RecordingError(
-            f"{held.name}: FREQUENCY '{header.get('FREQUENCY', '')}' is not a rate above 0 Hz"
-        )
-    return rate
-
-
-def _columns(rows: list[TextRow], points: int, rate: float) -> tuple[int, int]:
-    """Columns before the first coordinate, and those of each point: three, or its residual too.
-
-    Before them stand none, or frame and time, and a code of time or none; a line may end in a
-    separator. Where two of these are as wide, as for two points, the times decide.
-    """
-    width = max((len(r.cells) for r in rows), default=0)
-    clock = 3 if any(":" in r.cell(2) for r in rows[:1]) else 2
-    every = [(before, each) for before in (0, clock) for each in (3, 4)]
-    over = {(b, each): width - b - each * points for b, each in every}
-    open_end = not any(r.cell(width - 1) for r in rows)
-    fitting = [one for one in every if over[one] == 0 or (open_end and over[one] == 1)]
-    if len(fitting) > 1:
-        timed = _timed(rows, rate)
-        fitting.sort(key=lambda one: ((one[0] > 0) != timed, over[one]))
-    return fitting[0] if fitting else (clock if width > 3 * points else 0, 3)
-
-
-def _timed(rows: list[TextRow], rate: float) -> bool:
-    """Whether the first two columns of two rows go on as a frame's number and its time do."""
-    two = [[as_number(c) for c in r.cells[:2]] for r in rows[:2]]
-    cells = [c for row in two for c in row if c is not None]
-    if len(cells) < 4:
-        return False
-    return cells[2] - cells[0] == 1 and abs(cells[3] - cells[1] - 1 / rate) < _ROUNDED
 
 
 QUALISYS = Reader(

@@ -67,7 +67,8 @@ def rows_of(name: str, data: bytes) -> TextRows:
     often = {mark: sum(mark in line for line in lines[:_FIRST]) for mark in "\t;,"}
     separator = max(often, key=lambda mark: often[mark])
     if not often[separator]:
-        lines, separator = [_spaced(line) for line in lines], " "
+        # With one space between words; a mark of comments is none: `# t x` is `#t x`.
+        lines, separator = [re.sub(r"^#+ ", "#", " ".join(line.split())) for line in lines], " "
     cells = csv.reader(lines, delimiter=separator, skipinitialspace=True, quoting=csv.QUOTE_MINIMAL)
     try:
         rows = tuple(
@@ -76,11 +77,6 @@ def rows_of(name: str, data: bytes) -> TextRows:
     except csv.Error as error:
         raise RecordingError(f"{name}: not a table of cells ({error})") from None
     return TextRows(name, rows, not text.endswith(("\n", "\r")))
-
-
-def _spaced(line: str) -> str:
-    """With one space between words; a mark of comments is none: `# t x` is `#t x`."""
-    return re.sub(r"^#+ ", "#", " ".join(line.split()))
 
 
 def fields_above(held: TextRows, header: TextRow) -> dict[str, str]:

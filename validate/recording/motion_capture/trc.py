@@ -6,11 +6,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import RATE, SD, UNIT, above_zero, frame, metres, spread
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
-    TextRow,
     TextRows,
     as_number,
     numbers,
@@ -20,7 +18,19 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    RATE,
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording
 
 _MAGIC = b"PathFileType"
@@ -36,9 +46,27 @@ def read_trc(path: Path, options: Options) -> Recording:
     `RecordingError` for a table that is no TRC, or damaged.
     """
     held = text_rows(path)
-    header = _header(held)
-    names = _names(held, header)
-    values, rows, left = numbers(held, _rows(held), _BEFORE + 3 * len(names))
+    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
+        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
+    pairs = zip(held.rows[1].cells, held.rows[2].cells, strict=False)
+    header = {k: v for k, v in pairs if k}
+    # Every third cell of the fourth line; where programs left no blanks between, all of them.
+    cells = held.rows[3].cells[_BEFORE:]
+    named = [c for c in cells if c]
+    stated = header.get("NumMarkers", "")
+    if stated.isdecimal() and int(stated) != len(named):
+        raise RecordingError(
+            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
+        )
+    if not named:
+        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
+    names = distinct(named, len(named))
+    # From the first that begins with a number, blank lines apart.
+    body = held.rows[4:]
+    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
+    values, rows, left = numbers(
+        held, [r for r in body[begin:] if any(r.cells)], _BEFORE + 3 * len(names)
+    )
     shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
     x = whole_points(held, shown, names, rows)
     factor, stated = metres(options, header.get("Units", ""), path.name)
@@ -54,34 +82,6 @@ def read_trc(path: Path, options: Options) -> Recording:
     source = source_of(path, "text file: integrity not provable")
     told |= counted | told_zeros(zeros) | told_left(left)
     return recorded(path.stem, source, {"markers": markers}, told)
-
-
-def _header(held: TextRows) -> dict[str, str]:
-    if len(held.rows) < 5 or not held.rows[0].cell(0).startswith(_MAGIC.decode()):
-        raise RecordingError(f"{held.name}: not a TRC file: its first cell is not PathFileType")
-    keys, values = held.rows[1].cells, held.rows[2].cells
-    return {k: v for k, v in zip(keys, values, strict=False) if k}
-
-
-def _names(held: TextRows, header: dict[str, str]) -> tuple[str, ...]:
-    """Every third cell of the fourth line; where programs left no blanks between, all of them."""
-    cells = held.rows[3].cells[_BEFORE:]
-    named = [c for c in cells if c]
-    stated = header.get("NumMarkers", "")
-    if stated.isdecimal() and int(stated) != len(named):
-        raise RecordingError(
-            f"{held.name}: line 4 names {len(named)} points, line 3 states {stated}; damaged"
-        )
-    if not named:
-        raise RecordingError(f"{held.name}: line 4 names no point; not a TRC file, or damaged")
-    return distinct(named, len(named))
-
-
-def _rows(held: TextRows) -> list[TextRow]:
-    """From the first that begins with a number, blank lines apart."""
-    body = held.rows[4:]
-    begin = next((i for i, r in enumerate(body) if r.cell(0)), len(body))
-    return [r for r in body[begin:] if any(r.cells)]
 
 
 def _times(

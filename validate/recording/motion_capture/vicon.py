@@ -12,9 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.formats.options import SD, UNIT, frame, metres, spread
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     LEFT_OUT,
@@ -28,7 +26,17 @@ from validate.recording.motion_capture.text_rows import (
     whole_points,
     without_zeros,
 )
-from validate.recording.reader import Options, Reader, head, source_of
+from validate.recording.reader import (
+    SD,
+    UNIT,
+    Options,
+    Reader,
+    frame,
+    head,
+    metres,
+    source_of,
+    spread,
+)
 from validate.recording.types import Markers, Recording, Signal, Stream
 
 _POINTS, _DEVICES, _EVENTS = "Trajectories", "Devices", "Events"
@@ -69,7 +77,17 @@ def read_vicon(path: Path, options: Options) -> Recording:
     `RecordingError` for a file without trajectories and devices, or damaged.
     """
     held = text_rows(path)
-    blocks = _blocks(held)
+    # Blocks by title, numbered where one stands twice; one without rows is left out.
+    begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
+    found: dict[str, CsvBlock] = {}
+    titles: Counter[str] = Counter()
+    for begin, end in pairwise([*begins, len(held.rows)]):
+        title = held.rows[begin].cell(0)
+        block = _block(held, held.rows[begin:end]) if title != _EVENTS else None
+        if block is not None:
+            titles[title] += 1
+            found[title if titles[title] == 1 else f"{title} ({titles[title]})"] = block
+    blocks = found
     streams: dict[str, Stream] = {}
     told = {"kind": "motion capture (Vicon CSV)"}
     if _POINTS in blocks:
@@ -94,20 +112,6 @@ def read_vicon(path: Path, options: Options) -> Recording:
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), told, unread)
-
-
-def _blocks(held: TextRows) -> dict[str, CsvBlock]:
-    """Blocks by title, numbered where one stands twice; one without rows is left out."""
-    begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
-    found: dict[str, CsvBlock] = {}
-    titles: Counter[str] = Counter()
-    for begin, end in pairwise([*begins, len(held.rows)]):
-        title = held.rows[begin].cell(0)
-        block = _block(held, held.rows[begin:end]) if title != _EVENTS else None
-        if block is not None:
-            titles[title] += 1
-            found[title if titles[title] == 1 else f"{title} ({titles[title]})"] = block
-    return found
 
 
 def _events(held: TextRows) -> dict[str, str]:
@@ -169,32 +173,25 @@ def _signals(
 ) -> tuple[dict[str, Signal], dict[str, str]]:
     """Channels of devices; one with blank cells is left out and told. `more` follows each name."""
     values, _, left = numbers(held, block.rows, block.width)
-    t = _sub_frames(values) / block.rate
+    # Samples counted from frame 0: the block's rate is that of its rows, so that a frame has
+    # as many samples as it has sub-frames.
+    each = values[:, 1].max() + 1
+    t = np.asarray(values[:, 0] * each + values[:, 1]) / block.rate
     found, gone = {}, list(left)
     frame = options.get("frame", "capture")
-    for i, topic in enumerate(_channels(block, more), start=_BEFORE):
+    # A topic for every column of a device: its name stands above the first of them.
+    device, topics = "device", []
+    for column in range(_BEFORE, block.width):
+        if column < len(block.names) and block.names[column]:
+            device = block.names[column]
+        topics.append(f"analog/{device}.{block.columns[column]}{more}")
+    for i, topic in enumerate(distinct(topics, len(topics)), start=_BEFORE):
         if np.isnan(values[:, i]).any():
             gone.append(f"{topic}: {int(np.isnan(values[:, i]).sum())} blank cells")
             continue
         unit = block.units[i] if i < len(block.units) else ""
         found[topic] = Signal(t, values[:, [i]], unit or "not stated", 0.0, frame)
     return found, {"analog_rate_hz": repr(block.rate), **told_left(gone)}
-
-
-def _channels(block: CsvBlock, more: str) -> tuple[str, ...]:
-    """A topic for every column of a device: its name stands above the first of them."""
-    device, topics = "device", []
-    for i in range(_BEFORE, block.width):
-        device = block.names[i] if i < len(block.names) and block.names[i] else device
-        topics.append(f"analog/{device}.{block.columns[i]}{more}")
-    return distinct(topics, len(topics))
-
-
-def _sub_frames(values: Floats) -> Floats:
-    """Samples counted from frame 0: the block's rate is that of its rows, so that a frame has as
-    many samples as it has sub-frames."""
-    each = values[:, 1].max() + 1
-    return np.asarray(values[:, 0] * each + values[:, 1])
 
 
 def _recognises(path: Path) -> bool:

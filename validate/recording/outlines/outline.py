@@ -1,11 +1,11 @@
 """Outline of an anechoic inclusion in a B-mode image, with uncertainty or a reason for refusal.
 
 No grey level is set by hand. A rough disc is found by comparing discs with the sectors around them
-(`discs`), unless a centre and radius are given; the wall is the closed path in polar
-coordinates that best parts two kinds of speckle (`polar`); it is then moved to where half
-of the power is left (`wall`) and judged (`quality`). Refusals rest on numbers that
-do not depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall
-that is closed or lies outside the image.
+(`polar.candidates`), unless a centre and radius are given. The wall is the closed path in polar
+coordinates that best parts two kinds of speckle (`polar.trace`). It is then moved to where half of
+the power is left (`polar.placed`) and judged (`quality`). Refusals rest on numbers that do not
+depend on the grey scale: overlap of the grey levels, evidence in nats, share of the wall that is
+closed or lies outside the image.
 
 Limits: the region must be star-shaped about its centroid; regions under about 20 speckles are lost.
 """
@@ -23,17 +23,18 @@ from scipy.optimize import least_squares
 from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError
 from validate.recording.images.image import ellipse_through
-from validate.recording.outlines.discs import candidates, scanned
 from validate.recording.outlines.polar import (
     ANGLES,
     DIRECTIONS,
     RAYS,
     Grey,
     Wall,
+    candidates,
+    placed,
+    scanned,
     speckle_area,
     trace,
 )
-from validate.recording.outlines.wall import placed
 from validate.recording.types import Contours, Frames
 
 # --- Is a traced path the wall of a closed dark region, and how well is it known?
@@ -60,7 +61,16 @@ def quality(grey: Grey, wall: Wall) -> Quality:
     at least a third of the outline's median contrast.
     """
     within, beside = (_band(grey, wall, *span) for span in ((0.1, 0.85), (1.1, 1.5)))
-    return Quality(_gcnr(within[0], beside[0]), _closed(within, beside))
+    values = beside[0]
+    seen = ~np.isnan(values)
+    width = _SECTOR / 360 * RAYS / 2
+    total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
+    count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
+    step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
+    return Quality(
+        _gcnr(within[0], beside[0]),
+        float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0,
+    )
 
 
 def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floats]:
@@ -76,16 +86,6 @@ def _gcnr(inside: Floats, outside: Floats) -> float:
     if not (a.sum() and b.sum()):
         return 0.0
     return float(1 - np.minimum(a / a.sum(), b / b.sum()).sum())
-
-
-def _closed(within: tuple[Floats, Floats], beside: tuple[Floats, Floats]) -> float:
-    values = beside[0]
-    seen = ~np.isnan(values)
-    width = _SECTOR / 360 * RAYS / 2
-    total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
-    count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
-    step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
-    return float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0
 
 
 def wall_sd(grey: Grey, wall: Wall) -> float:
@@ -186,7 +186,20 @@ def extract_outline(
     border.
     """
     grey = _darkened(image, m_per_px, bright)
-    return _placed(grey, *_first(_walls(grey, centre, radius), bright), shape, bright)
+    refusals = []
+    # The first wall that is closed, apart in grey level and large.
+    for wall, judged in _walls(grey, centre, radius):
+        refusal = _refusal(wall, judged)
+        if not refusal:
+            break
+        refusals.append(refusal)
+    else:
+        raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
+    found = placed(grey, wall, bright)
+    middle, size = _enclosed(found.points)
+    sd = wall_sd(grey, wall)
+    free = Outline(found.points, sd, middle, size, judged.gcnr, judged.closed, found.moved, "free")
+    return free if shape == "free" else _fitted(free, shape, grey)
 
 
 @dataclass(frozen=True)
@@ -236,12 +249,6 @@ def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: b
     plain = image.astype(np.float64)
     dark = 255.0 - plain if bright else plain
     return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
-
-
-def _placed(grey: Grey, wall: Wall, judged: Quality, shape: Shape, bright: bool) -> Outline:
-    found = placed(grey, wall, bright)
-    free = _outline(found.points, wall_sd(grey, wall), judged, found.moved)
-    return free if shape == "free" else _fitted(free, shape, grey)
 
 
 def outlines_of(
@@ -314,17 +321,6 @@ def _walls(
         yield wall, quality(grey, wall)
 
 
-def _first(walls: Iterator[tuple[Wall, Quality]], bright: bool) -> tuple[Wall, Quality]:
-    """The first whose wall is closed, apart in grey level and large."""
-    refusals = []
-    for wall, judged in walls:
-        refusal = _refusal(wall, judged)
-        if not refusal:
-            return wall, judged
-        refusals.append(refusal)
-    raise RecordingError(f"no closed {'bright' if bright else 'dark'} region: {refusals[0]}")
-
-
 def _strength(wall: Wall, judged: Quality) -> float:
     return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
 
@@ -363,11 +359,6 @@ def _refusal(wall: Wall, judged: Quality) -> str:
             f"(needs {100 * MIN_CLOSED:g} %); give its rough centre and radius"
         )
     return ""
-
-
-def _outline(points: Floats, sd: float, judged: Quality, moved: float) -> Outline:
-    centre, radius = _enclosed(points)
-    return Outline(points, sd, centre, radius, judged.gcnr, judged.closed, moved, "free")
 
 
 def _enclosed(points: Floats) -> tuple[Floats, float]:

@@ -79,7 +79,17 @@ def followed(
     first search finds nothing, where over half of the images have no outline, and where rivals
     leave the first image's less confidence than `least`.
     """
-    found, without = _searched(frames, hint, told)
+    # Outlines, and reasons for none, by the number of the image.
+    found: dict[int, Outline] = {}
+    without: dict[int, str] = {}
+    last = None
+    for i, image in enumerate(frames.images):
+        told(i, len(frames.images), f"image {i}")
+        try:
+            last = _next(image, frames.m_per_px, hint, last)
+            found[i] = last
+        except RecordingError as error:
+            without[i] = str(error)
     if len(without) >= len(frames.images) / 2:
         i, why = next(iter(without.items()))
         raise RecordingError(
@@ -96,21 +106,6 @@ def followed(
         rms(each[:, 0]), frames.pose, frames.frame, images, each,
     )  # fmt: skip
     return FollowedOutline(contours, rivals, beside, without)
-
-
-def _searched(frames: Frames, hint: Hint, told: Told) -> tuple[dict[int, Outline], dict[int, str]]:
-    """Outlines, and reasons for none, by the number of the image."""
-    found: dict[int, Outline] = {}
-    without: dict[int, str] = {}
-    last = None
-    for i, image in enumerate(frames.images):
-        told(i, len(frames.images), f"image {i}")
-        try:
-            last = _next(image, frames.m_per_px, hint, last)
-            found[i] = last
-        except RecordingError as error:
-            without[i] = str(error)
-    return found, without
 
 
 def _next(
@@ -149,7 +144,6 @@ def _require_sure(rivals: tuple[RivalRegion, ...], confidence: float, least: flo
         named = "; ".join(r.words for r in rivals)
         raise RecordingError(
             f"the outline has confidence {confidence:.2f}, but {least:g} is needed, as other "
-            f"regions "
-            f"are as distinct: {named}; choose one (--centre X,Y) or accept it (--confidence "
-            f"{floor(100 * confidence) / 100:g})"
+            f"regions are as distinct: {named}; choose one (--centre X,Y) or accept it "
+            f"(--confidence {floor(100 * confidence) / 100:g})"
         )

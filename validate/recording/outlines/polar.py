@@ -1,17 +1,27 @@
-"""Wall of a dark region in polar coordinates: speckle statistics, closed path, wall position.
+"""Wall of a dark region in an image: rough search, closed path in polar coordinates, wall position.
 
 Every pixel weighs in by how much likelier it is inside than outside (Gaussian grey levels of the
-region and of its surroundings, the latter from ray to ray, so that a shadow weighs little), divided
-by the size of a speckle, so that costs are natural logarithms of probabilities.
+region and of its surroundings, the latter from ray to ray, so that a shadow weighs little),
+divided by the size of a speckle, so that costs are natural logarithms of probabilities.
+
+Position of a blurred wall, corrected for blur.
+
+A path between grey levels lies inward of the wall, because the logarithm lifts the skirt of the
+point spread. The wall of the scatterers is where half of the power is left: 3.01 dB below the
+level of the brighter side. A grey level's dB are known from the speckle itself, whose log
+envelope has a standard deviation of 5.57 dB whatever the dynamic range, so no setting of the
+scanner is needed. Where that level would lie below the middle of both sides (low contrast) the
+middle is taken, and towards the middle where the scanner smoothed the logarithm too, which blurs
+evenly to both sides: the skewness of log speckle tells how much.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, label
 
 from validate.arrays import Floats, Ints, rms
-from validate.recording.images.image import blurred, sampled
+from validate.recording.images.image import blurred, correlated, sampled, shrunk
 
 # --- The cheapest closed path over a polar map, by dynamic programming.
 
@@ -136,14 +146,24 @@ def trace(grey: Grey, centre: Floats, radius: float, rounds: int = len(_SURROUND
         radii: Floats = np.arange(1.0, int(_REACH * _STEPS) + 1.0) * step
         polar = grey.at(centre + radii[None, :, None] * DIRECTIONS[:, None, :])
         levels = levels_beside(polar, radii, path, surround)
-        cost = _cost(polar, radii, levels, grey.speckle)
+        # Cost (RAYS, m) in nats of a wall at each grid radius: region on both sides, and edge.
+        step = radii[1] - radii[0]
+        outside = np.maximum(levels.outside, levels.inside + 0.3 * levels.sd_outside)[:, None]
+        near = -0.5 * ((polar - levels.inside) / levels.sd_inside) ** 2 - np.log(levels.sd_inside)
+        far = -0.5 * ((polar - outside) / levels.sd_outside) ** 2 - np.log(levels.sd_outside)
+        bright = polar > outside
+        likelier = np.clip(np.where(bright, -_CLIP, near - far), -_CLIP, _CLIP)
+        likelier = np.where(np.isnan(polar), 0.0, likelier)
+        cells = radii[None, :] * step * (2 * np.pi / RAYS) / grey.speckle
+        cost = np.asarray(-np.cumsum(likelier * cells, axis=1))
         slope = 2 * np.pi / RAYS * _STEPS  # grid steps of a climb of one radius per radian
         chosen = closed_path(cost, _STIFFNESS * (2 * np.pi / RAYS) / slope**2)
         path = gaussian_filter1d(radii[chosen], 1.4, mode="wrap")
         centre, path = recentred(centre, path)
         radius = rms(path)
     evidence = -float(cost[np.arange(RAYS), chosen].sum())
-    return Wall(centre, path, levels, evidence, _missing(grey, centre, path))
+    around = grey.at(centre + 1.03 * path[:, None] * DIRECTIONS)
+    return Wall(centre, path, levels, evidence, float(np.isnan(around).mean()))
 
 
 def recentred(centre: Floats, path: Floats) -> tuple[Floats, Floats]:
@@ -187,19 +207,142 @@ def levels_beside(polar: Floats, radii: Floats, path: Floats, surround: float) -
     return Levels(inside, sd_inside, outside, sd_outside, skew_inside, skew_outside)
 
 
-def _cost(polar: Floats, radii: Floats, levels: Levels, speckle: float) -> Floats:
-    """Cost (RAYS, m) in nats of a wall at each grid radius: region on both sides, and edge."""
-    step = radii[1] - radii[0]
-    outside = np.maximum(levels.outside, levels.inside + 0.3 * levels.sd_outside)[:, None]
-    near = -0.5 * ((polar - levels.inside) / levels.sd_inside) ** 2 - np.log(levels.sd_inside)
-    far = -0.5 * ((polar - outside) / levels.sd_outside) ** 2 - np.log(levels.sd_outside)
-    bright = polar > outside
-    likelier = np.clip(np.where(bright, -_CLIP, near - far), -_CLIP, _CLIP)
-    likelier = np.where(np.isnan(polar), 0.0, likelier)
-    cells = radii[None, :] * step * (2 * np.pi / RAYS) / speckle
-    return np.asarray(-np.cumsum(likelier * cells, axis=1))
+_SPAN = 0.35  # of the radius, to both sides of the path
+_SAMPLES = 71
+_RAW_SKEW = 0.8  # log speckle has 1.14, less what the texture of tissue takes
+_SMOOTHED = 0.35  # of the step from the brighter side: blurred before and after the logarithm
+_MOST = 1.5  # speckle sizes; a blur is not wider
 
 
-def _missing(grey: Grey, centre: Floats, path: Floats) -> float:
-    around = grey.at(centre + 1.03 * path[:, None] * DIRECTIONS)
-    return float(np.isnan(around).mean())
+@dataclass(frozen=True)
+class Placed:
+    """Points (RAYS, 2) m on the wall and their mean outward move m from the path."""
+
+    points: Floats
+    moved: float
+
+
+def placed(grey: Grey, wall: Wall, bright: bool) -> Placed:
+    """Return the wall's points moved from the path to where half of the power is left."""
+    points = wall.centre + wall.radius[:, None] * DIRECTIONS
+    # Outward normals (k, 2) of a closed outline with growing polar angle.
+    tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    tangent = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    s = np.linspace(-_SPAN, _SPAN, _SAMPLES) * float(wall.radius.mean())
+    profile = grey.at(points[:, None, :] + s[None, :, None] * normals[:, None, :])
+    # Share 0..1 of the step from inside to outside at which the wall lies.
+    levels = wall.levels
+    step = max(float(np.mean(levels.outside)) - levels.inside, 1e-9)
+    spread = levels.sd_inside if bright else levels.sd_outside
+    skew = levels.skew_inside if bright else -levels.skew_outside
+    raw = float(np.clip(skew / _RAW_SKEW, 0, 1))
+    below = raw * min(HALF_POWER / LOG_SPECKLE_SD * spread / step, 0.5) + (1 - raw) * _SMOOTHED
+    level = float(below if bright else 1 - below)
+    across = normals[:, 0] ** 2  # 1: the wall faces sideways, 0: it faces along depth
+    sideways = _crossing(profile, s, wall, level, across)
+    along = _crossing(profile, s, wall, level, 1 - across)
+    most = _MOST * float(np.sqrt(grey.speckle))
+    sideways, along = (float(np.clip(m, -most, most)) for m in (sideways, along))
+    move = across * sideways + (1 - across) * along
+    there = points + move[:, None] * normals
+    # Whether polar angles of (k, 2) grow: a wall moved along normals that cross folds.
+    away = there - wall.centre
+    one, next_ = away, np.roll(away, -1, axis=0)
+    if not bool((one[:, 0] * next_[:, 1] > one[:, 1] * next_[:, 0]).all()):
+        there = points + move[:, None] * DIRECTIONS
+    return Placed(there, float(move.mean()))
+
+
+def _crossing(profile: Floats, s: Floats, wall: Wall, level: float, weight: Floats) -> float:
+    """Where the weighted mean profile passes `level`, m from the path, nearest to it."""
+    seen = ~np.isnan(profile)
+    step = np.maximum(wall.levels.outside - wall.levels.inside, 0)[:, None] * seen
+    rise = np.where(seen, profile - wall.levels.inside, 0) * weight[:, None]
+    mean = rise.sum(axis=0) / np.maximum((step * weight[:, None]).sum(axis=0), 1e-9)
+    mean = gaussian_filter1d(mean, 1.0, mode="nearest")
+    above = mean >= level
+    passes = np.flatnonzero(~above[:-1] & above[1:])
+    if not len(passes):
+        return 0.0
+    places = s[passes] + (s[1] - s[0]) * (level - mean[passes]) / (mean[passes + 1] - mean[passes])
+    return float(min(places.tolist(), key=abs))
+
+
+_SIDE = 88  # px of the longer side while searching
+_SECTORS = 8
+_SMALLEST, _GROWTH = 4.0, 1.25  # px of the shrunk image; factor from radius to radius
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A disc darker than what surrounds it: centre (2,) px and radius m, both of the image."""
+
+    centre: Floats  # m
+    radius: float  # m
+    score: float
+
+
+def candidates(image: Floats, m_per_px: tuple[float, float], most: int = 4) -> list[Candidate]:
+    """Return the best dark discs of an image (h, w), the best first, none inside another one's
+    middle.
+
+    A disc's score is how much darker its mean is than the third darkest of eight sectors around it
+    (so two may lie in a shadow), in standard deviations of the image, times the root of its radius.
+    """
+    # The image with square pixels of the returned size m.
+    sizes = np.array(image.shape) * np.array(m_per_px[::-1])
+    scale = max(float(sizes.max()) / _SIDE, *m_per_px)
+    rows, columns = (max(round(s / scale), 1) for s in sizes)
+    small = shrunk(image, (rows, columns))
+    spread = float(small.std()) or 1.0
+    found: list[Candidate] = []
+    largest = 0.46 * min(small.shape)
+    radius = _SMALLEST
+    while radius <= largest:
+        reach = int(np.ceil(1.55 * radius))
+        y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+        away, angle = np.hypot(x, y), np.mod(np.arctan2(y, x), 2 * np.pi)
+        disc = (away <= 0.85 * radius).astype(np.float64)
+        ring = (away >= 1.15 * radius) & (away <= 1.55 * radius)
+        sector = np.floor(angle / (2 * np.pi / _SECTORS)).astype(int)
+        parts = [(ring & (sector == k)).astype(np.float64) for k in range(_SECTORS)]
+        disc, sectors = disc / disc.sum(), [p / max(p.sum(), 1.0) for p in parts]
+        inside = correlated(small, disc)
+        around = np.sort(np.stack([correlated(small, s) for s in sectors]), axis=0)
+        score = (
+            (0.5 * around[2] + 0.5 * around[2:].mean(axis=0) - inside) / spread * np.sqrt(radius)
+        )
+        margin = int(np.ceil(0.9 * radius))
+        score[:margin], score[-margin:] = -np.inf, -np.inf
+        score[:, :margin], score[:, -margin:] = -np.inf, -np.inf
+        best: list[Candidate] = []
+        for place in np.argsort(score, axis=None)[::-1][:200]:
+            row, column = np.unravel_index(place, score.shape)
+            if score[row, column] <= 1e-6 or len(best) == 4:
+                break
+            centre = (np.array([column, row]) + 0.5) * scale
+            if all(np.linalg.norm(centre - b.centre) > radius * scale for b in best):
+                best.append(Candidate(centre, radius * scale, float(score[row, column])))
+        found += best
+        radius *= _GROWTH
+    kept: list[Candidate] = []
+    for c in sorted(found, key=lambda c: -c.score):
+        near = (np.linalg.norm(c.centre - k.centre) < 0.5 * max(c.radius, k.radius) for k in kept)
+        if not any(near):
+            kept.append(c)
+        if len(kept) == most:
+            break
+    return kept
+
+
+def scanned(image: Floats) -> Floats:
+    """Return the image (h, w) with the grey of what was scanned in place of what was not: all of
+    one level from a corner on, as outside of a sector probe's fan. A search would find that
+    first."""
+    parts, _ = label(image == image.min())
+    corners = {int(parts[i, j]) for i in (0, -1) for j in (0, -1)} - {0}
+    outside = np.isin(parts, sorted(corners))
+    if not outside.any() or outside.all():
+        return image
+    return np.where(outside, image[~outside].mean(), image)

@@ -26,7 +26,7 @@ from validate.errors import RecordingError, UsageError
 from validate.files import buffered, json_value, npz_arrays, read_bytes, read_text
 from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.images.image import decode_png
-from validate.recording.images.numbered_files import number_key, numbered
+from validate.recording.images.png_stack import number_key, numbered
 from validate.recording.types import Contours, Frames
 from validate.units import in_si
 
@@ -60,7 +60,16 @@ def foreign_outlines(
     scale = _scale(path, frames, unit)
     at = sorted(found)
     outlines = tuple(found[i] * scale for i in at)
-    _require_inside(path, dict(zip(at, outlines, strict=True)), frames)
+    # No point far off its image: then the unit is another, or the images are.
+    for i, outline in zip(at, outlines, strict=True):
+        places, size = outline / frames.m_per_px, np.array(frames.images[i].shape[1::-1])
+        out = ~np.all((places > -_BEYOND * size) & (places < (1 + _BEYOND) * size), axis=1)
+        if out.any():
+            x, y = places[out][0]
+            raise RecordingError(
+                f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
+                f"{size[0]} x {size[1]}: check the size of the images it was drawn in, and --unit"
+            )
     return Contours(frames.t[at], outlines, sd, frames.pose, frames.frame, images)
 
 
@@ -70,19 +79,6 @@ def _scale(path: Path, frames: Frames, unit: str) -> Floats:
         raise UsageError(f"unit {unit} of {path.name}: expected px, or a unit of length as mm")
     drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
     return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
-
-
-def _require_inside(path: Path, outlines: Outlines, frames: Frames) -> None:
-    """No point far off its image: then the unit is another, or the images are."""
-    for i, outline in outlines.items():
-        at, size = outline / frames.m_per_px, np.array(frames.images[i].shape[1::-1])
-        out = ~np.all((at > -_BEYOND * size) & (at < (1 + _BEYOND) * size), axis=1)
-        if out.any():
-            x, y = at[out][0]
-            raise RecordingError(
-                f"{path.name}: image {i}: a point at ({x:.4g}, {y:.4g}) px, the image is "
-                f"{size[0]} x {size[1]}: check the size of the images it was drawn in, and --unit"
-            )
 
 
 def _read(path: Path, frames: Frames, label: str) -> Outlines:
@@ -99,30 +95,53 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
             return _table(path)
         if kind == ".json":
             return _polygons(path, files, frames, label)
-        named: Mapping[str, int] = {}
+        named: dict[str, int] = {}
         if kind == ".nrrd":
-            masks, named = _volume(path)
+            # Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image: x first, as it is
+            # stored; the values of regions by name, as 3D Slicer has them.
+            held = decoded("validate.recording.images.nrrd", path)
+            masks: Any = held["pixels"]
+            if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
+                raise RecordingError(
+                    f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) "
+                    "of whole numbers"
+                )
+            texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
+            for key, text in texts.items():
+                name = f"{key.removesuffix('LabelValue')}Name"
+                if key.endswith("LabelValue") and name in texts and text.isdigit():
+                    named[texts[name]] = int(text)
+            masks = masks.T if masks.ndim == 3 else masks.T[None]
         else:
-            masks = _pictures(files) if kind == ".png" else _array(path)
-        return _masks(path, _of_label(path, masks, named, label), frames)
+            masks = (
+                [decode_png(read_bytes(file, MAX_FILE)) for file in files]
+                if kind == ".png"
+                else _array(path)
+            )
+        # The masks of one region: of the only value that is not zero, or of that which is said.
+        values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
+        if len(values) > _MOST:
+            raise RecordingError(
+                f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other "
+                "value"
+            )
+        names = {v: name for name, v in named.items()}
+        regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
+        meant = values[_meant(path, label, regions)] if values else 0
+        masks = [mask == meant for mask in masks] if values else masks
+        _require_each(path, len(masks), "masks", len(frames.images))
+        shape, found = frames.images[0].shape, {}
+        for i, mask in enumerate(masks):
+            if mask.shape != shape:
+                raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
+            if mask.any():
+                found[i] = _edge(mask, f"{path.name}: mask {i}")
+        return found
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
 
 
 # --- masks ----------------------------------------------------------------------------------------
-
-
-def _of_label(path: Path, masks: Any, named: Mapping[str, int], label: str) -> Any:
-    """The masks of one region: of the only value that is not zero, or of that which is said."""
-    values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
-    if len(values) > _MOST:
-        raise RecordingError(
-            f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other value"
-        )
-    names = {v: name for name, v in named.items()}
-    regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
-    meant = values[_meant(path, label, regions)] if values else 0
-    return [mask == meant for mask in masks] if values else masks
 
 
 def _meant(path: Path, label: str, regions: Sequence[tuple[str, str]]) -> int:
@@ -146,27 +165,12 @@ def _of_names(path: Path, label: str, names: Iterable[str]) -> str:
     return regions[_meant(path, label, regions)][0] if regions else label
 
 
-def _masks(path: Path, masks: Any, frames: Frames) -> Outlines:
-    _require_each(path, len(masks), "masks", len(frames.images))
-    shape, found = frames.images[0].shape, {}
-    for i, mask in enumerate(masks):
-        if mask.shape != shape:
-            raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
-        if mask.any():
-            found[i] = _edge(mask, f"{path.name}: mask {i}")
-    return found
-
-
 def _require_each(path: Path, count: int, what: str, images: int) -> None:
     if count != images:
         raise RecordingError(
             f"{path.name}: {count} {what} for {images} images do not show which belongs to which "
             f"image; give one per image (an empty mask for no outline), or a CSV of frame, x, y"
         )
-
-
-def _pictures(files: list[Path]) -> list[Any]:
-    return [decode_png(read_bytes(file, MAX_FILE)) for file in files]
 
 
 def _array(path: Path) -> Any:
@@ -183,24 +187,6 @@ def _array(path: Path) -> Any:
     if masks.ndim not in (2, 3):
         raise RecordingError(f"{path.name}: {masks.shape}, expected masks (n, h, w) or (h, w)")
     return masks if masks.ndim == 3 else masks[None]
-
-
-def _volume(path: Path) -> tuple[Any, Mapping[str, int]]:
-    """Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image; x first, as it is stored. The
-    values of regions by name, as 3D Slicer has them."""
-    held = decoded("validate.recording.images.nrrd_arrays", path)
-    masks = held["pixels"]
-    if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
-        raise RecordingError(
-            f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) of "
-            "whole numbers"
-        )
-    texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
-    values = {k.removesuffix("LabelValue"): v for k, v in texts.items() if k.endswith("LabelValue")}
-    named = {
-        texts[f"{k}Name"]: int(v) for k, v in values.items() if f"{k}Name" in texts and v.isdigit()
-    }
-    return (masks.T if masks.ndim == 3 else masks.T[None]), named
 
 
 def _edge(inside: Any, what: str) -> Floats:

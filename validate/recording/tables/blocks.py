@@ -10,29 +10,27 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.tables.cells import (
+from validate.recording.tables.columns import Said, time_column
+from validate.recording.tables.encoding import Text, decode
+from validate.recording.tables.table import (
     NOTHING,
     Line,
     Split,
+    Table,
+    columns_of,
     decimal_sign,
     decimals,
+    header_of,
     is_data,
     is_names,
     is_remark,
     is_row,
     is_unit_row,
+    labview_units,
     looks_numeric,
     number,
-    split_lines,
-)
-from validate.recording.tables.columns import Said, time_column
-from validate.recording.tables.encoding import Text, decode
-from validate.recording.tables.table import (
-    Table,
-    columns_of,
-    header_of,
-    labview_units,
     size_lines,
+    split_lines,
     split_unit,
 )
 from validate.recording.tables.vocabulary import SPECIMEN, holds
@@ -59,14 +57,28 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     text amid the rows, and where no line is a row.
     """
     count = max(i + 1 for i, cell in enumerate(names[1]) if cell)
-    rows, footer = _rows(lines, count)
+    # Rows, and the text lines below the table.
+    rows: list[Line] = []
+    footer: list[Line] = []
+    for line, cells in lines:
+        # A remark below a table (at most key and value); a damaged row is a row, not a remark.
+        if is_remark(cells) and sum(map(bool, cells)) < min(count, 3):
+            footer.append((line, cells))
+            continue
+        if footer:
+            refuse_text(*footer[0])
+        rows.append((line, cells))
     if not rows:
         raise RecordingError(
             f"line {names[0]} names {count} columns, but no row of samples follows; export the "
             f"samples too"
         )
     notes = []
-    beside = _beside(rows, count)
+    # Lines with cells right of the table that cannot be its own: behind a gap, or remarks.
+    right = [(line, cells[count:]) for line, cells in rows if any(cells[count:])]
+    behind = all(not cells[0] for _, cells in right)
+    remarks = all(not looks_numeric(c) and c.lower() not in NOTHING for _, r in right for c in r)
+    beside = [line for line, _ in right] if behind or remarks else []
     if beside:
         notes.append(f"cells right of the table: {len(beside)} rows, first line {beside[0]}")
         rows = [(line, cells[:count]) for line, cells in rows]
@@ -86,39 +98,12 @@ def fitted(names: Line, lines: Sequence[Line]) -> Fitted:
     return Fitted([(line, cells[:count]) for line, cells in padded], footer, tuple(notes))
 
 
-def _rows(lines: Sequence[Line], count: int) -> tuple[list[Line], list[Line]]:
-    """Rows, and the text lines below the table."""
-    rows: list[Line] = []
-    footer: list[Line] = []
-    for line, cells in lines:
-        if _is_text(cells, count):
-            footer.append((line, cells))
-            continue
-        if footer:
-            refuse_text(*footer[0])
-        rows.append((line, cells))
-    return rows, footer
-
-
 def refuse_text(line: int, words: Sequence[str]) -> NoReturn:
     """Raise `RecordingError` for words that stand amid samples."""
     raise RecordingError(
         f"line {line}: text '{' '.join(words).strip()[:60]}' between the rows; export one test "
         f"per file and correct this line"
     )
-
-
-def _is_text(cells: Sequence[str], count: int) -> bool:
-    """A remark below a table (at most key and value); a damaged row is a row, not a remark."""
-    return is_remark(cells) and sum(map(bool, cells)) < min(count, 3)
-
-
-def _beside(rows: Sequence[Line], count: int) -> list[int]:
-    """Lines with cells right of the table that cannot be its own: behind a gap, or remarks."""
-    right = [(line, cells[count:]) for line, cells in rows if any(cells[count:])]
-    behind = all(not cells[0] for _, cells in right)
-    remarks = all(not looks_numeric(c) and c.lower() not in NOTHING for _, r in right for c in r)
-    return [line for line, _ in right] if behind or remarks else []
 
 
 def is_sparse(cells: Sequence[str]) -> bool:
@@ -156,7 +141,11 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
     them. `keep` is the user's: of rows that only share their time the `first` or the `last` is
     used; None leaves them, to be refused. Raises `UsageError` for another `keep`.
     """
-    times = None if time is not None and time.column == "every" else _times(table)
+    if time is not None and time.column == "every":
+        times = None
+    else:
+        column = time_column(table)
+        times = [number(cell, table.decimal) for cell in column.cells] if column else None
     if keep not in (None, "first", "last"):
         raise UsageError(f"--map repeated={keep}: expected first or last")
     if times is None:
@@ -168,23 +157,8 @@ def without_repeats(table: Table, time: Said | None, keep: str | None) -> Table:
     if start:
         note = f"{start} first rows, from line {table.lines[0]} on, occur twice: they are read once"
         table, times = table.take(range(start, len(rows)), note), times[start:]
-    return table if keep is None else _one_per_time(table, times, keep)
-
-
-def _times(table: Table) -> list[float | None] | None:
-    column = time_column(table)
-    return [number(cell, table.decimal) for cell in column.cells] if column else None
-
-
-def _repeated(rows: Sequence[tuple[str, ...]]) -> int:
-    """k when the first k rows stand again directly below themselves; 0 when they do not."""
-    for k in range(1, len(rows) // 2 + 1):
-        if rows[k] == rows[0] and list(rows[:k]) == list(rows[k : 2 * k]):
-            return k
-    return 0
-
-
-def _one_per_time(table: Table, times: Sequence[float | None], keep: str) -> Table:
+    if keep is None:
+        return table
     count = len(times)
     if keep == "first":
         kept = [i for i in range(count) if i == 0 or times[i] != times[i - 1]]
@@ -194,6 +168,14 @@ def _one_per_time(table: Table, times: Sequence[float | None], keep: str) -> Tab
         f"{count - len(kept)} rows left out: the {keep} row of each time is read, as given by --map"
     )
     return table.take(kept, note)
+
+
+def _repeated(rows: Sequence[tuple[str, ...]]) -> int:
+    """k when the first k rows stand again directly below themselves; 0 when they do not."""
+    for k in range(1, len(rows) // 2 + 1):
+        if rows[k] == rows[0] and list(rows[:k]) == list(rows[k : 2 * k]):
+            return k
+    return 0
 
 
 # -------------------------------------------------------------------------------------------------
@@ -281,7 +263,15 @@ def _poses(row: Sequence[str]) -> str:
 
 def _blocks(split: Split) -> list[TextBlock]:
     lines, run = split.lines, split.run
-    tops = _tops(lines)
+    # Indices of the lines of names that rows follow: the nearest line of names above each.
+    tops: list[int] = []
+    top = -1
+    for i, (_, cells) in enumerate(lines):
+        if is_names(cells):
+            top = i
+        elif top >= 0 and is_data(cells):
+            tops.append(top)
+            top = -1
     if not tops or tops[0] > run:
         between = {"\t": " <tab> "}.get(split.separator, split.separator)
         raise RecordingError(
@@ -300,7 +290,12 @@ def _blocks(split: Split) -> list[TextBlock]:
         last = k + 1 == len(tops)
         rows, tail = (zone, []) if last and sizes[k] >= least else _parted(zone)
         if sizes[k] < least:
-            _refuse_pretender(names, units, rows, blocks)
+            # Words amid samples, with a few more samples below, are no table of their own.
+            width = max(len(cells) for _, cells in rows)
+            alike = blocks and width == len(blocks[-1].names[1])
+            bare = not units and not any(split_unit(cell)[1] for cell in names[1])
+            if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
+                refuse_text(*names)
             small.append(f"{len(rows)} rows below line {names[0]} ('{names[1][0]}', ...)")
             above += lines[top : tops[k + 1] if not last else len(lines)]
             above += size_lines(names, units, rows)
@@ -310,25 +305,14 @@ def _blocks(split: Split) -> list[TextBlock]:
         if blocks:
             found = [replace(b, shared=shared) for b in found]
         else:
-            shared = _shared(found[0].header)
+            # The lines of the first table's header that are the file's: those above its specimen's.
+            marks = [i for i, line in enumerate(found[0].header) if specimen_label(line[1])]
+            shared = found[0].header[: marks[0]] if marks else found[0].header
         blocks += found
         above = tail
     blocks[-1] = replace(blocks[-1], header=blocks[-1].header + above)
     note = (f"tables not used: {'; '.join(small)}",) if small else ()
     return [replace(b, notes=b.notes + note) for b in blocks]
-
-
-def _tops(lines: Sequence[Line]) -> list[int]:
-    """Indices of the lines of names that rows follow: the nearest line of names above each."""
-    tops: list[int] = []
-    names = -1
-    for i, (_, cells) in enumerate(lines):
-        if is_names(cells):
-            names = i
-        elif names >= 0 and is_data(cells):
-            tops.append(names)
-            names = -1
-    return tops
 
 
 def _size(lines: Sequence[Line], tops: Sequence[int], k: int) -> int:
@@ -355,23 +339,6 @@ def _parted(zone: list[Line]) -> tuple[list[Line], list[Line]]:
     while end and not is_data(zone[end - 1][1]) and is_remark(zone[end - 1][1]):
         end -= 1
     return zone[:end], zone[end:]
-
-
-def _refuse_pretender(
-    names: Line, units: list[str], rows: Sequence[Line], blocks: Sequence[TextBlock]
-) -> None:
-    """Words amid samples, with a few more samples below, are no table of their own."""
-    width = max(len(cells) for _, cells in rows)
-    alike = blocks and width == len(blocks[-1].names[1])
-    bare = not units and not any(split_unit(cell)[1] for cell in names[1])
-    if blocks and (sum(map(bool, names[1])) != width or (alike and bare)):
-        refuse_text(*names)
-
-
-def _shared(header: list[Line]) -> list[Line]:
-    """The lines of the first table's header that are the file's: those above its specimen's."""
-    marks = [i for i, line in enumerate(header) if specimen_label(line[1])]
-    return header[: marks[0]] if marks else header
 
 
 def _stacked(block: TextBlock) -> list[TextBlock]:

@@ -13,8 +13,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.reader import MapOption, did_you_mean
-from validate.recording.tables.cells import looks_numeric
-from validate.recording.tables.table import LABVIEW_X, Column, Table
+from validate.recording.tables.table import LABVIEW_X, Column, Table, looks_numeric
 from validate.recording.tables.vocabulary import LENGTH_OR_STRAIN, holds, role_of_name
 from validate.units import si_factor
 
@@ -171,7 +170,18 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{other}"
         )
     able = [column for column in found if not _unusable(role, column)] or found
-    return _one_of(_moving([picked(role, column, table, None) for column in able]), role)
+    picks = [picked(role, column, table, None) for column in able]
+    # An idle sensor is no rival: constant columns leave where others move.
+    picks = [p for p in picks if np.ptp(p.values) > 0] or picks
+    # Several columns are one when they hold the same motion up to sign and zero.
+    first = min(picks, key=lambda pick: "compress" not in pick.column.name.casefold())
+    for pick in picks:
+        if not _same(first.values, pick.values):
+            raise RecordingError(
+                f"{len(picks)} different columns may be {role}: "
+                f"{', '.join(repr(p.column.label) for p in picks)}; choose with --map {role}=COLUMN"
+            )
+    return first
 
 
 def _by_unit(role: str, table: Table) -> str:
@@ -260,8 +270,16 @@ def _without_numbers(column: Column) -> str:
 
 def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
     """Return the column in SI; raises as `needed_pick`."""
-    if said is not None:
-        _refuse_derived(role, column)
+    # No unit makes a length of a strain, nor a force of a stress: a size is missing.
+    if said is not None and role in _SIZE_OF and not _measures(column, QUANTITY[role]):
+        called = role_of(column)
+        for derived in DERIVED:
+            if called == derived or (called != role and _measures(column, QUANTITY[derived])):
+                raise UsageError(
+                    f"--map {role}={column.label}: this column is a {derived}, not a {role}; give "
+                    f"--map '{derived}={column.label}' and the specimen's size, as --map "
+                    f"{_SIZE_OF['force' if derived == 'stress' else 'displacement']}"
+                )
     unit = (said.unit if said else None) or column.unit
     if column.problem and not (said and said.unit):
         raise RecordingError(f"column '{column.label}': {column.problem}")
@@ -279,20 +297,6 @@ def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
     return Pick(role, column, unit, factor, table.numbers(column) * factor, said)
 
 
-def _refuse_derived(role: str, column: Column) -> None:
-    """No unit makes a length of a strain, nor a force of a stress: a size is missing."""
-    if role not in _SIZE_OF or _measures(column, QUANTITY[role]):
-        return
-    called = role_of(column)
-    for derived in DERIVED:
-        if called == derived or (called != role and _measures(column, QUANTITY[derived])):
-            raise UsageError(
-                f"--map {role}={column.label}: this column is a {derived}, not a {role}; give "
-                f"--map '{derived}={column.label}' and the specimen's size, as --map "
-                f"{_SIZE_OF['force' if derived == 'stress' else 'displacement']}"
-            )
-
-
 def _way_out(role: str, column: Column) -> str:
     weight = (column.unit or "").lower()
     if role == "force" and weight in ("g", "kg"):
@@ -301,23 +305,6 @@ def _way_out(role: str, column: Column) -> str:
         "if columns are swapped or the unit is wrong, give --map "
         f"'{role}={column.label}:UNIT' or another COLUMN"
     )
-
-
-def _moving(picks: list[Pick]) -> list[Pick]:
-    """The columns that are not constant, where there are any: an idle sensor is no rival."""
-    return [p for p in picks if np.ptp(p.values) > 0] or picks
-
-
-def _one_of(picks: list[Pick], role: str) -> Pick:
-    """Several columns are one when they hold the same motion up to sign and zero."""
-    first = min(picks, key=lambda pick: "compress" not in pick.column.name.casefold())
-    for other in picks:
-        if not _same(first.values, other.values):
-            raise RecordingError(
-                f"{len(picks)} different columns may be {role}: "
-                f"{', '.join(repr(p.column.label) for p in picks)}; choose with --map {role}=COLUMN"
-            )
-    return first
 
 
 def _same(a: Floats, b: Floats) -> bool:

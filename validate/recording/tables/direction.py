@@ -102,8 +102,27 @@ def signs(
     """
     d, f = excursion(displacement.values), excursion(force.values)
     if _said_sign(displacement) or _said_sign(force):
-        return _as_said(d, f, displacement, force, kind)
-    kind = kind or _by_strain(d, f, strain, stress)
+        # The flips that the user gives; the kind of test is then what they make of it.
+        said_d, said_f = _said_sign(displacement), _said_sign(force)
+        flip_d = said_d or _matching(d, f * (said_f or 1))
+        flip_f = said_f or _matching(f, d * flip_d)
+        given = _NAMES.get(flip_d * d or flip_f * f)
+        if kind and kind.said and given and given != kind.name:
+            raise UsageError(
+                f"--map test={kind.name}: the signs of the other --map options mean {given}"
+            )
+        shown = Kind(given, "follows from the sign given by --map") if given else kind
+        return Signs(flip_d, flip_f, "sign given by --map", shown)
+    if not kind:
+        # Compression, where what derives from the test says so: tension is positive by
+        # convention.
+        derived = [p for p in (strain, stress) if p]
+        ways = {excursion(p.values) for p in derived} - {0}
+        names = " and ".join(f"'{p.column.label}'" for p in derived)
+        if ways == {-1} and (d * f >= 0 or len(derived) == 2):
+            kind = Kind(
+                "compression", f"{names} go negative, and tension is positive by convention"
+            )
     if kind is None:
         raise UsageError(
             f"unclear whether compression or tension: '{displacement.column.label}' goes "
@@ -115,7 +134,9 @@ def signs(
             f"tension test ({kind.why}); {ASK}"
         )
     wanted = 1 if kind.name == "compression" else -1
-    return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, _reason(d, f, kind), kind)
+    written = "opposite signs" if d * f < 0 else f"{_way(d or f)} as written"
+    why = f"{written} in a {kind.name} test"
+    return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, why, kind)
 
 
 def _of_neither(displacement: Pick, force: Pick) -> str:
@@ -125,39 +146,6 @@ def _of_neither(displacement: Pick, force: Pick) -> str:
         return ""
     return ("; a bent or an indented body is neither: give compression if the tool moves into it "
             "and answer experiment = body in `validate new`")  # fmt: skip
-
-
-def _as_said(d: int, f: int, displacement: Pick, force: Pick, kind: Kind | None) -> Signs:
-    """The flips that the user gives; the kind of test is then what they make of it."""
-    said_d, said_f = _said_sign(displacement), _said_sign(force)
-    flip_d = said_d or _matching(d, f * (said_f or 1))
-    flip_f = said_f or _matching(f, d * flip_d)
-    given = _NAMES.get(flip_d * d or flip_f * f)
-    if kind and kind.said and given and given != kind.name:
-        raise UsageError(
-            f"--map test={kind.name}: the signs of the other --map options mean {given}"
-        )
-    shown = Kind(given, "follows from the sign given by --map") if given else kind
-    return Signs(flip_d, flip_f, "sign given by --map", shown)
-
-
-def _reason(d: int, f: int, kind: Kind) -> str:
-    if d * f < 0:
-        return f"opposite signs in a {kind.name} test"
-    return f"{_way(d or f)} as written in a {kind.name} test"
-
-
-def _by_strain(d: int, f: int, strain: Pick | None, stress: Pick | None) -> Kind | None:
-    """Compression, where what derives from the test says so: tension is positive by convention.
-
-    Positive strain tells nothing: many machines write compression so.
-    """
-    derived = [p for p in (strain, stress) if p]
-    ways = {excursion(p.values) for p in derived} - {0}
-    names = " and ".join(f"'{p.column.label}'" for p in derived)
-    if ways == {-1} and (d * f >= 0 or len(derived) == 2):
-        return Kind("compression", f"{names} go negative, and tension is positive by convention")
-    return None
 
 
 def excursion(x: Floats) -> int:

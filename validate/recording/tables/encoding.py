@@ -95,25 +95,23 @@ def _chosen(data: bytes) -> tuple[str, str]:
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        return _old(data)
+        # The best of the older encodings; a file without any evidence is read as the first one.
+        # Only lines with letters beyond ASCII tell something.
+        lines = b"\n".join(line for line in re.split(rb"[\r\n]+", data) if not line.isascii())
+        found = [r for r in (_reading(lines, name) for name in CANDIDATES) if r is not None]
+        if not found:
+            return CANDIDATES[0], "no known encoding fits"
+        best = max(found, key=lambda r: (r.hits, -r.odd))  # the first of equals
+        if best.words:
+            return best.encoding, f"by its words {', '.join(best.words[:4])}"
+        tied = [
+            r for r in found if (r.hits, r.odd) == (best.hits, best.odd) and r.text != best.text
+        ]
+        doubt = f"; {' and '.join(r.encoding for r in tied)} would fit as well" if tied else ""
+        return best.encoding, f"by the kind of its letters{doubt}"
     if data.startswith(codecs.BOM_UTF8):
         return "utf-8-sig", "byte order mark"
     return "utf-8-sig", "ASCII only" if data.isascii() else "valid UTF-8"
-
-
-def _old(data: bytes) -> tuple[str, str]:
-    """The best of the older encodings; a file without any evidence is read as the first one."""
-    # Only lines with letters beyond ASCII tell something.
-    lines = b"\n".join(line for line in re.split(rb"[\r\n]+", data) if not line.isascii())
-    found = [r for r in (_reading(lines, name) for name in CANDIDATES) if r is not None]
-    if not found:
-        return CANDIDATES[0], "no known encoding fits"
-    best = max(found, key=lambda r: (r.hits, -r.odd))  # the first of equals
-    if best.words:
-        return best.encoding, f"by its words {', '.join(best.words[:4])}"
-    tied = [r for r in found if (r.hits, r.odd) == (best.hits, best.odd) and r.text != best.text]
-    doubt = f"; {' and '.join(r.encoding for r in tied)} would fit as well" if tied else ""
-    return best.encoding, f"by the kind of its letters{doubt}"
 
 
 def _reading(lines: bytes, encoding: str) -> _Reading | None:
@@ -122,31 +120,23 @@ def _reading(lines: bytes, encoding: str) -> _Reading | None:
         text = lines.decode(encoding)
     except UnicodeDecodeError:
         return None
-    words = _known(text)
-    hits = len(words) + _common_gb(encoding, lines)
-    if encoding in _BY_WORDS and not hits:
-        return None
-    return _Reading(encoding, text, tuple(words), hits, _odd(text))
-
-
-def _known(text: str) -> list[str]:
-    """Known words with letters beyond ASCII, as written."""
+    # Known words with letters beyond ASCII, as written.
     found = {
         w for w in re.findall(r"[^\W\d_]+", text) if not w.isascii() and plain(w) in evidence()
     }
     whole = plain(text)
     found |= {w for w in evidence() if is_ideographic(w) and w in whole}
-    return sorted(found)
-
-
-def _common_gb(encoding: str, lines: bytes) -> int:
-    """1 when every run of high bytes is made of frequent Chinese characters."""
+    words = sorted(found)
+    # 1 when every run of high bytes is made of frequent Chinese characters.
     runs = _HIGH.findall(lines)
-    return int(encoding == "gb18030" and bool(runs) and all(map(_GB_COMMON.fullmatch, runs)))
-
-
-def _odd(text: str) -> int:
-    """Signs between letters, and letters of scripts that no word vouches for."""
+    hits = len(words) + int(
+        encoding == "gb18030" and bool(runs) and all(map(_GB_COMMON.fullmatch, runs))
+    )
+    if encoding in _BY_WORDS and not hits:
+        return None
+    # Signs between letters, and letters of scripts that no word vouches for.
     strange = sum(ord(c) >= 0x400 or 0x2500 <= ord(c) < 0x2600 for c in text)
     spacing = sum(c in "˛˘˙˝ˇ¨¸¯" for c in text)
-    return len(_ODD_SIGN.findall(text)) + strange + spacing
+    return _Reading(
+        encoding, text, tuple(words), hits, (len(_ODD_SIGN.findall(text)) + strange + spacing)
+    )

@@ -1,6 +1,8 @@
-"""Columns of points in a table, by names: coordinates, times, labels, units.
+"""Columns of points and of displacement fields in a table, by names.
 
 A line of names, as `time (s), tip_x (mm), ...`; DeepLabCut's three or four lines, a column a cell.
+In a displacement field a row is a point of a grid and all rows are one instant. It is refused: read
+over time, its rows would be one point that jumps from place to place.
 """
 
 import re
@@ -9,10 +11,73 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
+import numpy as np
+
+from validate.arrays import Floats
 from validate.recording.motion_capture.text_rows import TextRow, TextRows, as_number, fields_above
 from validate.recording.tables.table import split_unit
-from validate.recording.tables.vocabulary import role_of_name, words
+from validate.recording.tables.vocabulary import plain, role_of_name, words
 from validate.units import in_si
+
+_BESIDE = r"(coord(inate)?s?|pos(ition)?|ref(erence)?|pixel|px)?"
+_PLACE = re.compile(rf"{_BESIDE}(?P<axis>[xyz])[0c]?{_BESIDE}")
+_COMPONENT = re.compile(r"(?P<u>[uvw])(px|pixel)?|u(?P<x>[xyz])")
+_NAMED = re.compile(
+    r"disp|deplacement|verschiebung|desplazamiento|spostamento|deslocamento|verplaatsing|"
+    r"przemieszczenie|перемещени|位移|変位"
+)
+_STRAIN = re.compile(r"e(ps(ilon)?)?(xx|yy|zz|xy|yx|xz|zx|yz|zy|[123])|eps(ilon)?[xyz]")
+
+
+@dataclass(frozen=True)
+class FieldColumns:
+    """The columns of a displacement field by their names without units: places, displacements
+    and strains."""
+
+    places: tuple[str, ...]
+    displacements: tuple[str, ...]
+    strains: tuple[str, ...]
+
+    def refusal(self, held: str) -> str:
+        """Return why `held` (as "240 rows") of these columns are not read, and what to do."""
+        columns = ", ".join((*self.places, *self.displacements, *self.strains))
+        return (
+            f"{held} of {columns}: a field of displacements or strains at one instant, not the "
+            "motion of one point; export chosen points over time, one row per instant, as time "
+            "(s), p1_x (mm), p1_y (mm), p2_x (mm), p2_y (mm)"
+        )
+
+
+def field_columns(names: Sequence[str]) -> FieldColumns | None:
+    """Return the columns x and y with displacements or strains beside them; None where there are
+    none. A displacement is u and v together, or called so."""
+    kinds = {name: _kind(name) for name in names}
+    by = {kind: tuple(n for n, k in kinds.items() if k[:1] == kind) for kind in "pds"}
+    axes, components = ({kinds[n][1:] for n in by[kind]} for kind in "pd")
+    moved = {"x", "y"} <= components or "" in components
+    if {"x", "y"} <= axes and (moved or by["s"]):
+        return FieldColumns(by["p"], by["d"], by["s"])
+    return None
+
+
+def _kind(name: str) -> str:
+    """p, d or s for a place, displacement or strain, then its axis; empty for another column."""
+    text = "".join(re.findall(r"[^\W_]+", plain(name)))
+    if found := _PLACE.fullmatch(text):
+        return "p" + found["axis"]
+    if found := _COMPONENT.fullmatch(text):
+        return "d" + (found["x"] or "xyz"["uvw".index(found["u"])])
+    if _NAMED.search(text):
+        return "d"
+    return "s" if _STRAIN.fullmatch(text) or role_of_name(name) == "strain" else ""
+
+
+def is_grid(places: Floats) -> bool:
+    """Return whether different places (n, 2 or more) fill a grid: every x with (nearly) every y."""
+    x, y = (len(np.unique(places[:, i])) for i in (0, 1))
+    different = len(np.unique(places[:, :2], axis=0)) == len(places)
+    return different and min(x, y) > 2 and 9 <= x * y <= 1.5 * len(places)
+
 
 AXES = "xyz"
 PIXELS = ("px", "pixel", "pixels")
@@ -82,7 +147,11 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
         return None
     split = [split_unit(c) for c in cells]
     names, units = [n for n, _ in split], [u or "" for _, u in split]
-    points = _lengths(_points_of(names), units)
+    # The points without velocities and the like: beside lengths, what has another unit.
+    points = _points_of(names)
+    of = {n: {units[i] for i in columns} for n, columns in points.items()}
+    lengths = {n for n, own in of.items() if all(in_si(1.0, u, "m") for u in own if u) and any(own)}
+    points = {n: c for n, c in points.items() if not lengths or n in lengths or not any(of[n])}
     if not points:
         return None
     below = [r for r in below if any(r.cells) and not r.cell(0).startswith("#")]
@@ -91,25 +160,29 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
     if said:  # of several, as below the names of TrackMate, the last are the units
         units = [u or said[-1].cell(i).strip("()[] ") for i, u in enumerate(units)]
         below = below[len(said) :]
-    time = next((i for i, n in enumerate(names) if _is_time(n)), None)
+    time = next(
+        (
+            i
+            for i, n in enumerate(names)
+            if (role_of_name(n) == "time" or n.strip().lower() in ("timestamp", "time stamp"))
+        ),
+        None,
+    )
+    # The column that numbers images; one of text is of something else, as a frame's name.
+    at = (i for i, n in enumerate(names) if _FRAMES.fullmatch(n))
     layout = PointLayout(
-        points, time, None, cells, tuple(units), below, frames=_frames(names, below)
+        points,
+        time,
+        None,
+        cells,
+        tuple(units),
+        below,
+        frames=next((i for i in at if all(_is_count(r.cell(i)) for r in below)), None),
     )
     if layout.instant is not None and (whose := _whose(names, layout)) is not None:
         return replace(layout, whose=whose)
     label = next(iter(_labels(names)), None)
     return replace(layout, label=label if list(points) == [_ALONE] and time is None else None)
-
-
-def _is_time(name: str) -> bool:
-    return role_of_name(name) == "time" or name.strip().lower() in ("timestamp", "time stamp")
-
-
-def _lengths(points: dict[str, list[int]], units: Sequence[str]) -> dict[str, list[int]]:
-    """The points without velocities and the like: beside lengths, what has another unit."""
-    of = {n: {units[i] for i in columns} for n, columns in points.items()}
-    lengths = {n for n, own in of.items() if all(in_si(1.0, u, "m") for u in own if u) and any(own)}
-    return {n: c for n, c in points.items() if not lengths or n in lengths or not any(of[n])}
 
 
 def _is_words(row: TextRow, columns: Sequence[int]) -> bool:
@@ -120,12 +193,6 @@ def _is_words(row: TextRow, columns: Sequence[int]) -> bool:
 def _labels(names: Sequence[str]) -> list[int]:
     """The columns that may name the points of a row."""
     return [i for i, n in enumerate(names) if words(n) & _LABELS and not _FRAMES.fullmatch(n)]
-
-
-def _frames(names: Sequence[str], rows: Sequence[TextRow]) -> int | None:
-    """The column that numbers images; one of text is of something else, as a frame's name."""
-    at = (i for i, n in enumerate(names) if _FRAMES.fullmatch(n))
-    return next((i for i in at if all(_is_count(r.cell(i)) for r in rows)), None)
 
 
 def _is_count(cell: str) -> bool:
@@ -169,23 +236,20 @@ def _points_of(names: Sequence[str]) -> dict[str, list[int]]:
     """Columns of x, y, z of each point (of x, y where none has a z); none where they differ."""
     found: dict[str, dict[str, int]] = {}
     for i, name in enumerate(names):
-        axis, whose = _axis_of(name)
+        # The axis and the point of a column's name; empty where it is none.
+        text = name.strip()
+        if text.lower() in ("x", "y", "z"):
+            axis, whose = text.lower(), _ALONE
+        elif (last := _LAST.fullmatch(text)) and _NO_PLACE.fullmatch(last["name"]):
+            axis, whose = "", ""
+        elif last and last["name"]:
+            axis, whose = (last["low"] or last["glued"]).lower(), last["name"]
+        else:
+            first = _FIRST.fullmatch(text)
+            axis, whose = (first["low"].lower(), first["name"]) if first else ("", "")
         if axis and found.setdefault(whose, {}).setdefault(axis, i) != i:
             return {}
     turns = {_W.sub("", n.strip()) for n in names if _W.search(n.strip())}
     whole = {n: a for n, a in found.items() if {"x", "y"} <= a.keys() and n not in turns}
     axes = [c for c in AXES if any(c in a for a in whole.values())]
     return {n: [a[c] for c in axes] for n, a in whole.items() if len(a) == len(axes)}
-
-
-def _axis_of(name: str) -> tuple[str, str]:
-    """The axis and the point of a column's name; empty where it is none."""
-    text = name.strip()
-    if text.lower() in ("x", "y", "z"):
-        return text.lower(), _ALONE
-    if (last := _LAST.fullmatch(text)) and _NO_PLACE.fullmatch(last["name"]):
-        return "", ""
-    if last and last["name"]:
-        return (last["low"] or last["glued"]).lower(), last["name"]
-    first = _FIRST.fullmatch(text)
-    return (first["low"].lower(), first["name"]) if first else ("", "")

@@ -13,17 +13,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError, ValidateError
-from validate.recording.formats.options import (
-    M_PER_PX,
-    RATE,
-    SD,
-    UNIT,
-    above_zero,
-    frame,
-    length,
-    metres,
-    spread,
-)
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
@@ -38,9 +27,30 @@ from validate.recording.motion_capture.text_rows import (
     told_left,
     whole_points,
 )
-from validate.recording.reader import MapOption, Options, Reader, head, source_of
-from validate.recording.tables.displacement_field import field_columns, is_grid
-from validate.recording.tables.point_layout import AXES, PIXELS, PointLayout, layout_of
+from validate.recording.reader import (
+    M_PER_PX,
+    RATE,
+    SD,
+    UNIT,
+    MapOption,
+    Options,
+    Reader,
+    above_zero,
+    frame,
+    head,
+    length,
+    metres,
+    source_of,
+    spread,
+)
+from validate.recording.tables.point_layout import (
+    AXES,
+    PIXELS,
+    PointLayout,
+    field_columns,
+    is_grid,
+    layout_of,
+)
 from validate.recording.tables.table import split_unit
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Markers, Recording
@@ -74,7 +84,22 @@ def read_point_table(path: Path, options: Options) -> Recording:
     instant = [] if layout.instant is None else [layout.instant]
     columns = [*layout.columns, *layout.sure, *instant]
     values, rows, left = numbers(held, layout.rows, len(layout.names), columns)
-    _require_motion(held, layout, values)
+    # Refuse points of a grid at one instant: over time, one point would jump between them.
+    moves = layout.instant is not None
+    count = len(values) // len(np.unique(values[:, -1])) if moves else len(values)
+    field = field_columns([split_unit(name)[0] for name in layout.names])
+    size = f"{held.name}: {count} rows" + (
+        f" at each '{layout.names[layout.instant or 0]}'" * moves
+    )
+    if count > 1 and field and (layout.whose is None or field.strains):
+        raise RecordingError(field.refusal(size))
+    one = len(layout.points) == 1 and layout.label is None and layout.whose is None
+    if one and not moves and is_grid(values):
+        raise RecordingError(
+            f"{size} on a grid of {len(np.unique(values[:, 0]))} x {len(np.unique(values[:, 1]))} "
+            "places at one instant, not the motion of one point; add a column called name (a "
+            "landmark per row), or for a single point a column called time"
+        )
     x = _points(held, layout, values, rows)
     x, unsure = _without_unsure(layout, x, values, options)
     factor, stated = _scale(held, layout, options)
@@ -82,7 +107,18 @@ def read_point_table(path: Path, options: Options) -> Recording:
     x = _with_third(held, x, options) * np.array([factor, factor, third])
     landmarks = layout.label is not None
     t = np.zeros(1) if landmarks else _times(held, layout, values, options)
-    names = _labels(held, layout, rows) if landmarks else tuple(layout.points)
+    if landmarks:
+        # Names of landmarks; refuses names that all stand several times: rows of other instants.
+        labels = [row.cell(layout.label or 0) for row in rows]
+        often = Counter(labels)
+        if len(often) > 1 and min(often.values()) > 1:
+            raise RecordingError(
+                f"{held.name}: every one of {len(often)} names occurs in several rows, and no "
+                "column gives the time; add one called frame or time"
+            )
+        names = distinct(labels, len(rows))
+    else:
+        names = tuple(layout.points)
     if layout.whose is not None:
         t, names, x = _by_instants(held, layout, rows, t, x)
     markers = Markers(t, names, x, spread(options), options.get("frame", "capture"))
@@ -92,25 +128,6 @@ def read_point_table(path: Path, options: Options) -> Recording:
     topic = "landmarks" if landmarks else "markers"
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, {topic: markers}, told)
-
-
-def _require_motion(held: TextRows, layout: PointLayout, values: Floats) -> None:
-    """Refuse points of a grid at one instant: over time, one point would jump between them."""
-    moves = layout.instant is not None
-    count = len(values) // len(np.unique(values[:, -1])) if moves else len(values)
-    field = field_columns([split_unit(name)[0] for name in layout.names])
-    rows = f"{held.name}: {count} rows" + (
-        f" at each '{layout.names[layout.instant or 0]}'" * moves
-    )
-    if count > 1 and field and (layout.whose is None or field.strains):
-        raise RecordingError(field.refusal(rows))
-    one = len(layout.points) == 1 and layout.label is None and layout.whose is None
-    if one and not moves and is_grid(values):
-        raise RecordingError(
-            f"{rows} on a grid of {len(np.unique(values[:, 0]))} x {len(np.unique(values[:, 1]))} "
-            "places at one instant, not the motion of one point; add a column called name (a "
-            "landmark per row), or for a single point a column called time"
-        )
 
 
 def _points(
@@ -261,22 +278,9 @@ def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:
     if not 0 < stated < np.inf:
         raise UsageError(
             f"{held.name}: no column of time; if its rows are instants, give --map rate=HZ; if "
-            f"they "
-            "are points at one instant, name each in a column called name"
+            "they are points at one instant, name each in a column called name"
         )
     return stated
-
-
-def _labels(held: TextRows, layout: PointLayout, rows: Sequence[TextRow]) -> tuple[str, ...]:
-    """Names of landmarks; refuses names that all stand several times: rows of other instants."""
-    labels = [row.cell(layout.label or 0) for row in rows]
-    often = Counter(labels)
-    if len(often) > 1 and min(often.values()) > 1:
-        raise RecordingError(
-            f"{held.name}: every one of {len(often)} names occurs in several rows, and no column "
-            "gives the time; add one called frame or time"
-        )
-    return distinct(labels, len(rows))
 
 
 def _one_unit(held: TextRows, layout: PointLayout) -> str:

@@ -7,9 +7,8 @@ from itertools import pairwise
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.tables.blocks import refuse_text, specimen_label
-from validate.recording.tables.cells import looks_numeric, number
 from validate.recording.tables.columns import role_of, time_column
-from validate.recording.tables.table import Column, Table
+from validate.recording.tables.table import Column, Table, looks_numeric, number
 from validate.recording.tables.vocabulary import SPECIMEN, holds, plain
 
 _NUMBERS = re.compile(r"[\s_#.:-]*\(?[0-9]+\)?[\s_:-]*")
@@ -26,7 +25,10 @@ def specimen_tables(tables: Sequence[Table]) -> dict[str, Table]:
     useful = [p for p in parts if {"force", "displacement"} <= _roles(p)]
     others = [p for p in parts if p not in useful] if useful else []
     for other in others:
-        _refuse_nameless(other, useful)
+        # Rows as wide as the others below words that name no quantity are a test with text in it.
+        before = [t for t in useful if t.names_line < other.names_line]
+        if before and not _roles(other) and len(before[-1].columns) == len(other.columns):
+            refuse_text(other.names_line, [c.label for c in other.columns])
     note = [f"table without force and displacement in line {p.names_line}" for p in others]
     found = [replace(t, notes=(*t.notes, *note)) for t in _joined(useful or parts)]
     labels = [t.specimen for t in found]
@@ -55,13 +57,6 @@ def chosen(found: Mapping[str, Table], said: str | None) -> tuple[str, Table]:
     return label, found[label]
 
 
-def _refuse_nameless(other: Table, useful: Sequence[Table]) -> None:
-    """Rows as wide as the others below words that name no quantity are a test with text in it."""
-    before = [t for t in useful if t.names_line < other.names_line]
-    if before and not _roles(other) and len(before[-1].columns) == len(other.columns):
-        refuse_text(other.names_line, [c.label for c in other.columns])
-
-
 def _listed(found: Mapping[str, Table]) -> str:
     shown = [
         f"'{label}' ({len(t.lines)} rows from line {t.lines[0]} on, names in line {t.names_line})"
@@ -83,7 +78,16 @@ def _beside(table: Table) -> list[Table]:
     groups = column_groups([c.label if c.label[:1] != "#" else "" for c in table.columns])
     if len(groups) < 2:
         return [table]
-    labels = _group_labels(table, groups)
+    # What the file calls the groups: numbers in their names, else texts in a line above.
+    inline = [
+        {m[0] for i in g if (m := re.search(r"[0-9]+", table.columns[i].label))} for g in groups
+    ]
+    found = [next(iter(names)) if len(names) == 1 else "" for names in inline]
+    if all(found) and len(set(found)) == len(found):
+        labels = found
+    else:
+        above = _labels_above(table, len(groups))
+        labels = above or [str(i + 1) for i in range(len(groups))]
     return [_group(table, g, label) for g, label in zip(groups, labels, strict=True)]
 
 
@@ -110,25 +114,14 @@ def _group(table: Table, group: Sequence[int], label: str) -> Table:
     own = columns[1:] if group[0] == 0 and label != "" and len(columns) > 2 else columns
     filled = [i for i in range(len(table.lines)) if any(c.cells[i] for c in own)]
     last = filled[-1] + 1 if filled else 0
-    part = replace(table, columns=columns, specimen=label, notes=_own_notes(table))
+    # Notes of the whole table that hold for a group: not those of the ends of the others.
+    part = replace(
+        table,
+        columns=columns,
+        specimen=label,
+        notes=tuple(n for n in table.notes if not n.startswith(("columns with gaps", "rows end"))),
+    )
     return part.take(range(last))
-
-
-def _own_notes(table: Table) -> tuple[str, ...]:
-    """Notes of the whole table that hold for a group: not those of the ends of the others."""
-    return tuple(n for n in table.notes if not n.startswith(("columns with gaps", "rows end")))
-
-
-def _group_labels(table: Table, groups: Sequence[Sequence[int]]) -> list[str]:
-    """What the file calls the groups: numbers in their names, else texts in a line above."""
-    inline = [
-        {m[0] for i in g if (m := re.search(r"[0-9]+", table.columns[i].label))} for g in groups
-    ]
-    found = [next(iter(names)) if len(names) == 1 else "" for names in inline]
-    if all(found) and len(set(found)) == len(found):
-        return found
-    above = _labels_above(table, len(groups))
-    return above or [str(i + 1) for i in range(len(groups))]
 
 
 def _labels_above(table: Table, count: int) -> list[str]:
@@ -176,7 +169,17 @@ def _joined(tables: Sequence[Table]) -> list[Table]:
     found: list[Table] = []
     for table in tables:
         if found and not table.specimen and _goes_on(found[-1], table):
-            found[-1] = _appended(found[-1], table)
+            a = found[-1]
+            columns = tuple(
+                replace(x, cells=x.cells + y.cells)
+                for x, y in zip(a.columns, table.columns, strict=True)
+            )
+            note = f"names repeated in line {table.names_line} while time goes on: one test"
+            notes = tuple(dict.fromkeys((*a.notes, *table.notes, note)))
+            header = {**table.header, **a.header}
+            found[-1] = replace(
+                a, header=header, columns=columns, lines=a.lines + table.lines, notes=notes
+            )
         else:
             found.append(table)
     return found
@@ -190,16 +193,6 @@ def _goes_on(a: Table, b: Table) -> bool:
         return False
     last, first = number(before.cells[-1], a.decimal), number(after.cells[0], b.decimal)
     return last is not None and first is not None and first > last
-
-
-def _appended(a: Table, b: Table) -> Table:
-    columns = tuple(
-        replace(x, cells=x.cells + y.cells) for x, y in zip(a.columns, b.columns, strict=True)
-    )
-    note = f"names repeated in line {b.names_line} while time goes on: one test"
-    notes = tuple(dict.fromkeys((*a.notes, *b.notes, note)))
-    header = {**b.header, **a.header}
-    return replace(a, header=header, columns=columns, lines=a.lines + b.lines, notes=notes)
 
 
 def _time(table: Table) -> Column | None:

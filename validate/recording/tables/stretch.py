@@ -79,19 +79,10 @@ def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
     said = units.pop()
     stress = np.stack([table.numbers(c) for c in stresses], axis=1) * si_factor(said, "stress")
     stretch = np.stack([table.numbers(c) for c in stretches], axis=1)
-    _require_sense(stretch, stress, table.lines)
-    return Curve(stretch, stress), said if unit else f"{said}, from the header"
-
-
-def _named(table: Table, word: str) -> list[Column]:
-    return [c for c in table.columns if word in words(c.name)]
-
-
-def _require_sense(stretch: Floats, stress: Floats, lines: tuple[int, ...]) -> None:
     if stretch.min() <= 0:
         at = int(np.argmin(stretch.min(axis=1)))
         raise RecordingError(
-            f"line {lines[at]}: stretch {stretch.min():g}; a stretch is above 0 and 1 at rest"
+            f"line {table.lines[at]}: stretch {stretch.min():g}; a stretch is above 0 and 1 at rest"
         )
     if stretch.max() > _LONGEST:
         raise RecordingError(
@@ -103,3 +94,8 @@ def _require_sense(stretch: Floats, stress: Floats, lines: tuple[int, ...]) -> N
             f"stress and stretch - 1 differ in sign in {turned} of {len(stress)} rows; "
             "in tension stress is positive and stretch above 1; correct the signs"
         )
+    return Curve(stretch, stress), said if unit else f"{said}, from the header"
+
+
+def _named(table: Table, word: str) -> list[Column]:
+    return [c for c in table.columns if word in words(c.name)]

@@ -1,11 +1,13 @@
-"""Table of a testing machine's export: header block, columns with units, cells as text.
+"""Table of a testing machine's export: cells, decimal signs, header block, columns with units.
 
 Knows no quantities. Units may stand in the column names, as `(mm)`, `[mm]`, `/mm`, `in mm` or
 `_mm`, or in a row of their own.
 """
 
+import csv
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -13,9 +15,218 @@ import numpy as np
 
 from validate.arrays import Floats, checked
 from validate.errors import RecordingError
-from validate.recording.tables.cells import Line, looks_numeric, number
-from validate.recording.tables.vocabulary import OTHER_PARTS, SIZES, holds
+from validate.recording.tables.vocabulary import OTHER_PARTS, SIZES, UNIT_LABELS, holds
 from validate.units import is_unit
+
+# --- Numbers as spreadsheets write them: decimal sign and thousands separators, decided per
+# file.
+#
+# One file has one decimal sign. A cell such as `1,234` alone proves nothing; where no other cell
+# decides, it is refused instead of guessed.
+
+_LOOSE = re.compile(
+    r"[-+]?(?=[.,]?[0-9])[0-9]*(?:[.,' \u00a0\u202f][0-9]+)*[.,]?(?:[eE][-+]?[0-9]{1,3})?"
+)
+_EITHER = re.compile(r"[1-9][0-9]{0,2}[.,][0-9]{3}")
+_GROUPS = re.compile(r"[0-9]{1,3}(?P<mark>[.,])[0-9]{3}(?:(?P=mark)[0-9]{3})*")
+
+
+def _form(decimal: str, other: str) -> re.Pattern[str]:
+    grouped = rf"[0-9]{{1,3}}(?P<mark>[{other}' \u00a0\u202f])[0-9]{{3}}(?:(?P=mark)[0-9]{{3}})*"
+    return re.compile(
+        rf"(?P<whole>[-+]?(?:[0-9]+|{grouped})?)(?:{re.escape(decimal)}(?P<part>[0-9]*))?"
+        r"(?P<power>[eE][-+]?[0-9]{1,3})?"
+    )
+
+
+_FORMS = {".": _form(".", ","), ",": _form(",", ".")}
+
+
+def looks_numeric(cell: str) -> bool:
+    """Return whether the cell is a number in some notation."""
+    return _LOOSE.fullmatch(_plain_minus(cell)) is not None
+
+
+def decimal_sign(cells: Iterable[tuple[int, str]]) -> str:
+    """`.` or `,`: the decimal sign of (line number, cell) pairs; cells without numbers are ignored.
+
+    Raises `RecordingError` naming lines when cells contradict each other or when a comma may be
+    either a decimal or a thousands sign.
+    """
+    shown: dict[str, tuple[int, str]] = {}
+    for line, cell in cells:
+        if "." in cell or "," in cell:
+            for vote in _votes(_plain_minus(cell)):
+                shown.setdefault(vote, (line, cell))
+    if "." in shown and "," in shown:
+        (a, dot), (b, comma) = shown["."], shown[","]
+        raise RecordingError(
+            f"two decimal signs: '{dot}' in line {a}, '{comma}' in line {b}; export it with one"
+        )
+    decimal = "," if "," in shown else "."
+    doubtful = shown.get("?." if decimal == "," else "?,")
+    if doubtful and "grouped" not in shown:
+        line, cell = doubtful
+        raise RecordingError(
+            f"line {line}: '{cell}' may hold a thousands or a decimal sign; "
+            "export without thousands separators"
+        )
+    return decimal
+
+
+def number(cell: str, decimal: str) -> float | None:
+    """Return the finite number in the cell, or None: empty, text, NaN, infinite or wrongly
+    grouped."""
+    found = _FORMS[decimal].fullmatch(_plain_minus(cell))
+    if found is None or not looks_numeric(cell):
+        return None
+    whole = re.sub(r"[^-+0-9]", "", found["whole"])
+    value = float(f"{whole}.{found['part'] or '0'}{found['power'] or ''}")
+    return value if math.isfinite(value) else None
+
+
+def decimals(cell: str) -> int:
+    """Return the number of digits after the last decimal or thousands sign; 0 for integers."""
+    found = re.search(r"[.,]([0-9]*)[^.,]*$", cell)
+    return len(found[1]) if found else 0
+
+
+def _votes(cell: str) -> tuple[str, ...]:
+    """What a cell shows: the decimal sign, `?.` or `?,` when it may be either, and grouping."""
+    if _LOOSE.fullmatch(cell) is None:
+        return ()
+    body, *power = re.split("[eE]", cell.lstrip("-+"))
+    dots, commas = body.count("."), body.count(",")
+    if dots and commas:
+        decimal = "." if body.rfind(".") > body.rfind(",") else ","
+        whole, _, _ = body.rpartition(decimal)
+        return (decimal, "grouped") if _GROUPS.fullmatch(whole) else ()
+    mark, other = (",", ".") if commas else (".", ",")
+    if body.count(mark) > 1:
+        return (other, "grouped") if _GROUPS.fullmatch(body) else ()
+    if _EITHER.fullmatch(body) and not power:
+        return ("?" + mark,)
+    return (mark,)
+
+
+def _plain_minus(cell: str) -> str:
+    return cell.strip().replace("\u2212", "-")
+
+
+# -------------------------------------------------------------------------------------------------
+
+Line = tuple[int, list[str]]  # line number in the file, cells
+SEPARATORS = ("\t", ";", ",", "|", "  ", " ")  # two spaces or more; one, where none else does
+NOTHING = {"nan", "-nan", "inf", "-inf", "#n/a", "n/a", "null", "none", "--", "---", "err"}
+_UNIT_CELL = re.compile(r"[(\[{<][^()\[\]]*[)\]}>]")
+_WIDE_SIGNS = str.maketrans("（）［］【】：；＃", "()[][]:;#")
+_FEW = 4  # numbers: fewer are no table
+_LONGEST_UNIT = 12  # characters
+
+
+@dataclass(frozen=True)
+class Split:
+    """Lines in cells for one separator, without blank ones; `run` is where most rows begin."""
+
+    score: int
+    separator: str
+    lines: list[Line]
+    emptied: list[int]
+    run: int
+
+
+def split_lines(raw: Sequence[str]) -> Split:
+    """Return the lines split at the separator that gives most numbers.
+
+    Raises `RecordingError` when none gives a table.
+    """
+    best = Split(0, ",", [], [], 0)
+    for separator in SEPARATORS:
+        if not any(separator in line for line in raw) or (separator == " " and best.score >= _FEW):
+            continue
+        split = [(i + 1, _cells(line, separator)) for i, line in enumerate(raw)]
+        filled = [(i, cells) for i, cells in split if any(cells)]
+        score, run = _longest_run(filled)
+        if score > best.score:
+            emptied = [i for i, cells in split if len(cells) > 1 and not any(cells)]
+            best = Split(score, separator, filled, emptied, run)
+    if best.score < _FEW:
+        raise RecordingError(
+            f"no table of numbers in {len(raw)} lines of text "
+            f"(columns separated by comma, semicolon, tab, | or spaces were searched)"
+        )
+    return best
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    text = line.translate(_WIDE_SIGNS) if not line.isascii() else line
+    if separator == "  ":
+        return [cell.strip(' "') for cell in re.split(" {2,}", text.strip())]
+    if separator == " ":  # as numpy writes tables; a unit in brackets belongs to the name before
+        return re.split(r" +(?![(\[])", text.strip().lstrip("#%").strip())
+    text = text.rstrip("; \t") if separator == "," else text
+    try:
+        split = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise RecordingError(f"not CSV text: a line of {len(line)} characters: {error}") from error
+    return [cell.strip() for cell in split]
+
+
+def is_row(cells: Sequence[str], least: int = 1) -> bool:
+    """Return whether at least `least` cells and half of the filled ones are numbers."""
+    numbers = sum(looks_numeric(cell) or cell.lower() in NOTHING for cell in cells)
+    return len(cells) >= 2 and numbers >= least and 2 * numbers >= sum(map(bool, cells))
+
+
+def is_data(cells: Sequence[str]) -> bool:
+    """Return a row of a table, not a `key,number` line of a header block."""
+    return is_row(cells, least=2)
+
+
+def _longest_run(lines: Sequence[Line]) -> tuple[int, int]:
+    """Count of numbers in the longest run of rows, and the index where it starts."""
+    best, start, score = (0, 0), 0, 0
+    for index, (_, cells) in enumerate(lines):
+        if not is_row(cells):
+            start, score = index + 1, 0
+            continue
+        score += sum(looks_numeric(cell) for cell in cells)
+        best = max(best, (score, start), key=lambda found: found[0])
+    return best
+
+
+def is_unit_row(cells: Sequence[str]) -> bool:
+    """Return whether most cells are units or stand in brackets, and the others are as short."""
+    filled = [c for c in cells if c]
+    if filled and holds(filled[0], UNIT_LABELS) and not _UNIT_CELL.fullmatch(filled[0]):
+        filled = filled[1:]
+    units = sum(bool(_UNIT_CELL.fullmatch(c)) or is_unit(c) for c in filled)
+    short = all(len(c) <= _LONGEST_UNIT and not looks_numeric(c) for c in filled)
+    return (short and 2 * units > len(filled)) or (units == len(filled) > 0)
+
+
+def is_names(cells: Sequence[str]) -> bool:
+    """Return whether the cells may name columns: two words or more, no numbers before the first
+    gap."""
+    words = any(
+        len(named) >= 2 and not any(looks_numeric(c) or c.lower() in NOTHING for c in named)
+        for named in ([c for c in cells if c], [c for c in cells[: _gap(cells)] if c])
+    )
+    return words and not is_unit_row(cells)
+
+
+def _gap(cells: Sequence[str]) -> int:
+    """Index of the first empty cell after a filled one; the length where there is none."""
+    filled = next((i for i, c in enumerate(cells) if c), 0)
+    return next((i for i in range(filled, len(cells)) if not cells[i]), len(cells))
+
+
+def is_remark(cells: Sequence[str]) -> bool:
+    """Return whether the line begins with a word, as lines of header blocks do and rows do not."""
+    first = next(c for c in cells if c)
+    word = re.search(r"[^\W\d_]{2}|[^\W\d_\x00-\u2e7f]", first)
+    return bool(word) and not looks_numeric(first) and first.lower() not in NOTHING
+
 
 # --- What stands beside a table of samples in a form of its own: sizes in a table, LabVIEW's
 # units.
@@ -31,13 +242,13 @@ def size_lines(names: Line, units: Sequence[str], rows: Sequence[Line]) -> list[
     for i, name in enumerate(names[1]):
         unit = units[i] if i < len(units) else ""
         values = {cells[i] for _, cells in rows if i < len(cells)}
-        if is_unit(unit) and len(values) == 1 and _is_size(name):
+        if (
+            is_unit(unit)
+            and len(values) == 1
+            and (holds(name, _SIZE_WORDS) and not holds(name, OTHER_PARTS))
+        ):
             found.append((names[0], [name, *values, unit]))
     return found
-
-
-def _is_size(name: str) -> bool:
-    return holds(name, _SIZE_WORDS) and not holds(name, OTHER_PARTS)
 
 
 def labview_units(names: Sequence[str], above: Sequence[Line]) -> list[str]:
@@ -170,15 +381,16 @@ def header_of(lines: Sequence[Line], raw: Sequence[str]) -> dict[str, str]:
 def _key_value(raw: str, cells: Sequence[str]) -> tuple[str, str]:
     """Key and value of a header line; an empty key when the line is bare text."""
     first, *rest = [cell for cell in cells if cell]
-    if rest and (":" not in first or first.endswith(":") or _is_value(first, rest)):
+    # `Dimension : Diameter,,50.0,mm`: the colon belongs to the key, a number follows in a
+    # cell.
+    if rest and (
+        ":" not in first
+        or first.endswith(":")
+        or (looks_numeric(rest[0]) and not re.search(r"[0-9]", first.partition(":")[2]))
+    ):
         return first.rstrip(": "), " ".join(rest)
     plain = raw.strip().strip('"').rstrip('; ,\t"')
     key, colon, value = plain.partition(":")
     if not colon:
         key, colon, value = plain.partition("=")
     return (key.strip(' "'), value.strip(' ",;')) if colon else ("", plain)
-
-
-def _is_value(first: str, rest: Sequence[str]) -> bool:
-    """`Dimension : Diameter,,50.0,mm`: the colon belongs to the key, a number follows in a cell."""
-    return looks_numeric(rest[0]) and not re.search(r"[0-9]", first.partition(":")[2])

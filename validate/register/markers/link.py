@@ -1,12 +1,13 @@
-"""Correspondence of two unlinked clouds of the same particles.
+"""Correspondence of two unlinked clouds of the same particles, and interpolation between them.
 
 Nobody moves at first by less than half a spacing: where most neighbours agree on their nearest
 partner, links are taken. From there a front walks on: an unlinked particle is predicted by the
-local affine motion of its linked neighbours, and takes the nearest free partner. Links that do not
-fit their neighbours are cut, and may be made anew. (Idea: Patel et al. 2018, topology-based
+local affine motion of its linked neighbours, and takes the nearest free partner. Links that do
+not fit their neighbours are cut, and may be made anew. (Idea: Patel et al. 2018, topology-based
 tracking; Yang et al. 2022, SerialTrack; prediction by neighbours as in trackpy's predictors.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,89 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import RegistrationError
-from validate.register.markers.scattered import local_fit
+
+_EVEN = 1e-8  # of the normal matrix: points in one plane leave a slope across it at zero
+_TRIED = 400  # points left out in turn
+_WILD = 25.0  # squared deviations count no more than that, in variances of the noise
+_FAR = 3.0  # robust deviations at which a neighbour counts a quarter
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """At m places: `values` (m, c), `slopes` (m, c, d) per metre, `spread` (m, c) the neighbours'
+    robust standard deviation about the fit, `lever` (m,) the variance of a value over theirs."""
+
+    values: Floats
+    slopes: Floats
+    spread: Floats
+    lever: Floats
+
+
+def local_fit(
+    points: Floats,
+    values: Floats,
+    at: Floats,
+    neighbours: int,
+    order: int = 2,
+    *,
+    others: bool = False,
+    robust: bool = False,
+) -> LocalFit:
+    """Least squares by a polynomial of `order` 1 or 2 through the nearest points (n, d) to every
+    place (m, d), with values (n, c). `others`: the places are points, and their own value is left
+    out. `robust`: neighbours that deviate count less.
+    """
+    both = cKDTree(points).query(at, neighbours + others)
+    distance, index = (np.asarray(part) for part in both)
+    index, distance = index[:, others:], distance[:, others:]
+    reach = np.maximum(distance[:, -1:], 1e-300)
+    # Monomials (..., p) up to `order` of places (..., d).
+    x = (points[index] - at[:, None]) / reach[..., None]
+    d = x.shape[-1]
+    terms = [np.ones(x.shape[:-1]), *np.moveaxis(x, -1, 0)]
+    if order == 2:
+        terms += [x[..., i] * x[..., j] for i in range(d) for j in range(i, d)]
+    A = np.stack(terms, axis=-1)
+    y, w = values[index], np.ones(distance.shape)
+    for _ in range(3 if robust else 1):
+        normal, c = _solved(A, y, w)
+        off = np.abs(A @ c - y)
+        scale = np.maximum(np.median(off, axis=1, keepdims=True), 1e-300)
+        w = 1 / (1 + ((off / (_FAR * scale)) ** 2).sum(axis=-1)) ** 2
+    d = points.shape[1]
+    lever = np.asarray(np.linalg.inv(normal)[:, 0, 0], dtype=np.float64)
+    slopes = c[:, 1 : d + 1].swapaxes(1, 2) / reach[..., None]
+    return LocalFit(c[:, 0], slopes, 1.4826 * np.median(off, axis=1), lever)
+
+
+def _solved(A: Floats, y: Floats, w: Floats) -> tuple[Floats, Floats]:
+    weighted = (A * w[..., None]).swapaxes(1, 2)
+    normal = weighted @ A + _EVEN * np.eye(A.shape[-1])
+    return normal, np.asarray(np.linalg.solve(normal, weighted @ y))
+
+
+def noise(points: Floats, values: Floats, neighbours: int = 20) -> tuple[Floats, Floats]:
+    """Residuals (n, c) of every point about a local quadratic of it and its nearest, and what they
+    say of the noise (c,): less than it is, by the share of itself that a point fits."""
+    fit = local_fit(points, values, points, neighbours)
+    off = values - fit.values
+    sd = np.sqrt((off**2).sum(axis=0) / (1 - fit.lever).sum())
+    return off, np.asarray(sd, dtype=np.float64)
+
+
+def best_neighbours(points: Floats, values: Floats, rows: Ints, counts: Sequence[int]) -> int:
+    """Which of `counts` predicts values (n, c) at left-out points best, of those at `rows`: fewer
+    neighbours hand on their noise, more smooth the field. At most 400 rows are tried."""
+    _, sd = noise(points[rows], values[rows])
+    some = rows[:: -(-len(rows) // _TRIED)]
+
+    def missed(count: int) -> float:
+        fit = local_fit(points, values, points[some], count, others=True, robust=True)
+        off = (values[some] - fit.values) / np.maximum(sd, 1e-300)
+        return float(np.minimum(off**2, _WILD).mean())
+
+    return min((n for n in counts if n <= max(len(points) // 4, counts[0])), key=missed)
+
 
 _FEWEST = 60  # particles that local fits need
 _AGREE, _SAME = 0.6, 0.12  # share of 12 neighbours, within that many spacings
@@ -110,7 +193,12 @@ class _Front:
             predicted = self.before[young] + self._moved(young, x, u)
             self.to[young] = -1
             self._take(young, predicted, _REACH * self.spacing, np.ones(3))
-            self._cut_young(young)
+            rows, x, u = self._links()
+            new = np.isin(rows, young)
+            fit = local_fit(x, u, x[new], 24, 1, others=True, robust=True)
+            off = np.linalg.norm(u[new] - fit.values, axis=1)
+            allowed = np.maximum(4 * np.linalg.norm(fit.spread, axis=1), _OFF * self.spacing)
+            self.to[rows[new][off > allowed]] = -1
             age = np.where(self.to >= 0, age + 1, 0)
             if k > 3 and int((self.to[young] >= 0).sum()) - had < 0.002 * len(young):
                 return
@@ -137,14 +225,6 @@ class _Front:
         found = found[np.argsort(distance[found], kind="stable")]
         partner, first = np.unique(free[at[found]], return_index=True)
         self.to[rows[found[first]]] = partner
-
-    def _cut_young(self, young: Ints) -> None:
-        rows, x, u = self._links()
-        new = np.isin(rows, young)
-        fit = local_fit(x, u, x[new], 24, 1, others=True, robust=True)
-        off = np.linalg.norm(u[new] - fit.values, axis=1)
-        allowed = np.maximum(4 * np.linalg.norm(fit.spread, axis=1), _OFF * self.spacing)
-        self.to[rows[new][off > allowed]] = -1
 
     def cleaned(self, last: bool) -> int:
         """Cuts what deviates from a local quadratic of its neighbours; but for the `last` time,

@@ -18,17 +18,19 @@ from validate.fem.assembly.locate import (
 )
 from validate.recording.types import Markers, Recording
 from validate.register.clocks import SAME, clock_sd, interpolated, slopes, with_clock
-from validate.register.draws import AnyDraw, from_rest, shifted
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.quality import LINE, Registration, register_points
 from validate.register.markers.transform import spread
 from validate.register.observation import (
+    AnyDraw,
     Deviation,
     History,
     Role,
     Selection,
     Simulated,
     frame_at,
+    from_rest,
+    shifted,
 )
 from validate.scene.mesh import Mesh
 
@@ -157,7 +159,45 @@ class MarkerObservation:
 
     def deviations(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
         if self.together:
-            return self._gathered(run, selection)
+            selection = selection.instants(run)
+            samples = selection.samples(self.t, run.t, self.name)
+            shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
+            # Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating
+            # them, and s by which the sample of a hold lies off it: there the body stands, and what
+            # lies between two holds says nothing of them.
+            t = np.asarray(selection.t)
+            if len(t) == 1:
+                x, error = self.x[samples], np.zeros(self.x.shape[2])
+                late = abs(float(self.t[samples][0] - t[0]))
+                late = late if late > SAME else 0.0
+            else:
+                x, squared = interpolated(self.t, self.x.reshape(len(self.t), -1), t)
+                error = np.sqrt(squared.reshape(self.x.shape[1:]).mean(axis=0))
+                x, late = x.reshape(len(t), *self.x.shape[1:]), 0.0
+            off = (shown - x).reshape(-1, self.x.shape[2])
+            kept = np.isfinite(off).all(axis=1)
+            off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
+            t = np.repeat(np.asarray(selection.t), self.x.shape[1])[kept]
+            tre = rms(self.tre) / float(np.sqrt(3))
+            found = (
+                Deviation(
+                    g.quantity, off[:, list(g.axes)], "m",
+                    float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
+                    scale=_largest((self.x - self.rest)[..., list(g.axes)]),
+                    reference=moved[:, list(g.axes)],
+                    t=t if len(samples) > 1 else None,
+                    axes=tuple(_AXES[a] for a in g.axes),
+                )
+                for g in self.together
+            )  # fmt: skip
+            sd_t = float(np.sqrt(self.sd_t**2 + selection.sd_t**2 + late**2))
+            if sd_t == 0:
+                return tuple(found)
+            speed = self._speed(slice(None), samples, sd_t)
+            axes = (list(g.axes) for g in self.together)
+            return tuple(
+                with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True)
+            )
         each = (self._one(run, selection, j) for j in range(len(self.names)))
         return tuple(d for d in each if d is not None)
 
@@ -200,45 +240,6 @@ class MarkerObservation:
                 probe = np.stack([run.traces[f"{name}.{c}"].y for c in _AXES[:d]], axis=1)
                 x[:, j] = self.rest[j] + from_rest(run.t, probe, self.t)
         return x
-
-    def _gathered(self, run: Simulated, selection: Selection) -> tuple[Deviation, ...]:
-        selection = selection.instants(run)
-        samples = selection.samples(self.t, run.t, self.name)
-        shown = np.array([self.simulated(u) for u in frame_at(run, selection)])
-        x, error, late = self._seen(np.asarray(selection.t), samples)
-        off = (shown - x).reshape(-1, self.x.shape[2])
-        kept = np.isfinite(off).all(axis=1)
-        off, moved = off[kept], (x - self.rest).reshape(off.shape)[kept]
-        t = np.repeat(np.asarray(selection.t), self.x.shape[1])[kept]
-        tre = rms(self.tre) / float(np.sqrt(3))
-        found = (
-            Deviation(
-                g.quantity, off[:, list(g.axes)], "m",
-                float(np.hypot(self.along(g.axes), rms(error[list(g.axes)]))), tre, g.words,
-                scale=_largest((self.x - self.rest)[..., list(g.axes)]),
-                reference=moved[:, list(g.axes)],
-                t=t if len(samples) > 1 else None,
-                axes=tuple(_AXES[a] for a in g.axes),
-            )
-            for g in self.together
-        )  # fmt: skip
-        sd_t = float(np.sqrt(self.sd_t**2 + selection.sd_t**2 + late**2))
-        if sd_t == 0:
-            return tuple(found)
-        speed = self._speed(slice(None), samples, sd_t)
-        axes = (list(g.axes) for g in self.together)
-        return tuple(with_clock(d, sd_t, speed[..., a]) for d, a in zip(found, axes, strict=True))
-
-    def _seen(self, t: Floats, samples: Ints) -> tuple[Floats, Floats, float]:
-        """Positions (m, k, d) m at the instants t (m,) s, the rms error (d,) m of interpolating
-        them, and s by which the sample of a hold lies off it: there the body stands, and what lies
-        between two holds says nothing of them."""
-        if len(t) == 1:
-            late = abs(float(self.t[samples][0] - t[0]))
-            return self.x[samples], np.zeros(self.x.shape[2]), late if late > SAME else 0.0
-        x, squared = interpolated(self.t, self.x.reshape(len(self.t), -1), t)
-        error = np.sqrt(squared.reshape(self.x.shape[1:]).mean(axis=0))
-        return x.reshape(len(t), *self.x.shape[1:]), error, 0.0
 
     def _one(self, run: Simulated, selection: Selection, j: int) -> Deviation | None:
         """One marker's displacement, by the run's probe of its name."""
@@ -313,9 +314,17 @@ def observe_markers(
             robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
         )  # fmt: skip
     d = mesh.dimension
-    sds = _along_axes(registration, d)
+    # Noise m along the first d axes of the scene where it differs between directions.
+    if registration.noise is None:
+        sds = ()
+    else:
+        R = registration.transform.R
+        sds = tuple(np.sqrt(np.diag(R @ registration.noise @ R.T))[:d].tolist())
     places = rest[:, :d]
-    rows = _rows(mesh, places, sampling, stands)
+    if sampling == "nearest_node":
+        rows = nearest_node_rows(mesh, places)
+    else:
+        rows = (standing_rows if stands else barycentric_rows)(mesh, places)
     if sampling == "barycentric":
         require_inside(rows, markers.names, max(stands, _INSIDE))
     x = np.array([registration.transform.apply(frame) for frame in markers.x])
@@ -325,20 +334,6 @@ def observe_markers(
         rms(sds) if sds else registration.expected_sd,
         registration.tre_at(rest), registration, together, sd_t, sds,
     )  # fmt: skip
-
-
-def _rows(mesh: Mesh, places: Floats, sampling: Sampling, stands: float) -> Rows:
-    if sampling == "nearest_node":
-        return nearest_node_rows(mesh, places)
-    return (standing_rows if stands else barycentric_rows)(mesh, places)
-
-
-def _along_axes(found: Registration, d: int) -> tuple[float, ...]:
-    """Noise m along the first d axes of the scene where it differs between directions."""
-    if found.noise is None:
-        return ()
-    R = found.transform.R
-    return tuple(np.sqrt(np.diag(R @ found.noise @ R.T))[:d].tolist())
 
 
 def placed_markers(

@@ -21,12 +21,27 @@ from numpy.typing import ArrayLike
 from validate.arrays import Floats, checked, rms
 from validate.errors import RegistrationError
 from validate.register.markers import measures
-from validate.register.markers.anisotropic import covariance_of, fit_weighted, weighted_covariance
 from validate.register.markers.fitting import Method
-from validate.register.markers.measures import FEWEST, Fit, Mask, Outlier, Reflection, Scale
-from validate.register.markers.relabel import label_fault
-from validate.register.markers.transform import Similarity, check_spread, spread
-from validate.register.markers.two_step import Up, fit_plane, fit_two_step
+from validate.register.markers.measures import (
+    FEWEST,
+    Fit,
+    Mask,
+    Outlier,
+    Reflection,
+    Scale,
+    label_fault,
+)
+from validate.register.markers.transform import (
+    Similarity,
+    Up,
+    check_spread,
+    covariance_of,
+    fit_plane,
+    fit_two_step,
+    fit_weighted,
+    spread,
+    weighted_covariance,
+)
 
 LINE = 3.0  # spread across the markers' line, over the noise, that a rotation about it needs
 
@@ -334,3 +349,24 @@ def _excess(
         f"residual{without} {1e3 * per_axis:.3g} mm per axis is {per_axis / noise:.3g} times the "
         f"noise of {1e3 * noise:.3g} mm (declared, or rounding); check marker names and layout"
     ]
+
+
+@dataclass(frozen=True)
+class AsDeclared(Registration):
+    """The identity, without residuals: how well the frames agree is the word of who declared it."""
+
+    @property
+    def fle(self) -> float:
+        return 0.0
+
+    def tre_at(self, points: ArrayLike) -> Floats:
+        """Zeros (m,) m at points (m, d) m: what was declared has no error of a fit."""
+        return np.zeros(len(np.asarray(points)))
+
+
+def as_declared(names: Sequence[str], places: Floats, sd: float) -> AsDeclared:
+    """Return the markers at places (k, 3) m of both frames, with noise `sd` m per axis."""
+    return AsDeclared(
+        Similarity(np.eye(3), np.zeros(3)), tuple(names), places, np.zeros_like(places), sd,
+        "rigid", Reflection(0.0, np.inf), Scale(1.0, 0.0),
+    )  # fmt: skip

@@ -114,18 +114,20 @@ def section(points: Floats, triangles: Ints, pose: Floats) -> Floats:
             f"the image plane misses the inclusion, which spans {low:.2f}..{high:.2f} mm from it; "
             "check the pose of the images"
         )
-    rings = shapely.polygonize([shapely.line_merge(_segments(local, crossed))]).geoms
-    if not rings:
-        raise RegistrationError("the section with the image plane is not a closed outline")
-    ring = max(rings, key=lambda polygon: float(polygon.area))
-    return np.asarray(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1])
-
-
-def _segments(local: Floats, crossed: Ints) -> shapely.MultiLineString:
     pairs = np.sort(crossed[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
     above = local[:, 2] >= 0
     cut = pairs[above[pairs[..., 0]] != above[pairs[..., 1]]]  # two edges of every triangle
     start, end = local[cut[:, 0]], local[cut[:, 1]]
     s = start[:, 2] / (start[:, 2] - end[:, 2])
     places = start[:, :2] + s[:, None] * (end - start)[:, :2]
-    return shapely.multilinestrings(shapely.linestrings(places.reshape(-1, 2, 2)))
+    rings = shapely.polygonize(
+        [
+            shapely.line_merge(
+                shapely.multilinestrings(shapely.linestrings(places.reshape(-1, 2, 2)))
+            )
+        ]
+    ).geoms
+    if not rings:
+        raise RegistrationError("the section with the image plane is not a closed outline")
+    ring = max(rings, key=lambda polygon: float(polygon.area))
+    return np.asarray(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1])

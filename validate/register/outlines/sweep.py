@@ -70,7 +70,21 @@ def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
     at = _placed(sweep.t, t, positions)
     order = np.argsort(at, kind="stable")
     at, outlines = at[order], tuple(sweep.outlines[i] for i in order)
-    step = _step(at)
+    # The step m between slices at growing positions `at` (n,) m, none missing, none twice.
+    gaps = np.diff(at)
+    step = float(np.median(gaps))
+    near, far = int(gaps.argmin()), int(gaps.argmax())
+    if gaps[near] <= 0.1 * step:
+        raise RegistrationError(
+            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, in "
+            f"steps of {1e3 * step:.2f} mm otherwise; keep one of them"
+        )
+    if gaps[far] > _GAP * step:
+        raise RegistrationError(
+            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, and "
+            f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
+        )
+
     discs = [shapely.Polygon(o) for o in outlines]
     centres = np.array([shapely.get_coordinates(d.centroid)[0] for d in discs])
     radii = np.sqrt([d.area / np.pi for d in discs])
@@ -82,7 +96,22 @@ def stacked(sweep: Contours, t: Floats, positions: Floats) -> Stack:
     stack = Stack(
         sweep.pose, at, centres, radii, outlines, ends, sweep.sd, float(step / np.sqrt(12))
     )
-    _require_sections(stack)
+    worst = int((stack.off_round / stack.radii).argmax())
+    if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
+        raise RegistrationError(
+            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is not a section of an inclusion: "
+            f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
+            f"{1e3 * stack.radii[worst]:.2f} mm; repeat its outline"
+        )
+    moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
+    apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
+    i = int(apart.argmax())
+    if apart[i] > 0:
+        raise RegistrationError(
+            f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
+            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm from each other, more than a "
+            f"radius; outline them again"
+        )
     return stack
 
 
@@ -100,43 +129,6 @@ def _placed(seen: Floats, t: Floats, positions: Floats) -> Floats:
             f"known at {t[0]:.2f}..{t[-1]:.2f} s; record it over the whole sweep"
         )
     return np.asarray(np.interp(seen, t, positions))
-
-
-def _step(at: Floats) -> float:
-    """The step m between slices at growing positions `at` (n,) m, none missing, none twice."""
-    gaps = np.diff(at)
-    step = float(np.median(gaps))
-    near, far = int(gaps.argmin()), int(gaps.argmax())
-    if gaps[near] <= 0.1 * step:
-        raise RegistrationError(
-            f"two slices lie at {1e3 * at[near]:.2f} and {1e3 * at[near + 1]:.2f} mm, in "
-            f"steps of {1e3 * step:.2f} mm otherwise; keep one of them"
-        )
-    if gaps[far] > _GAP * step:
-        raise RegistrationError(
-            f"no slice between {1e3 * at[far]:.2f} and {1e3 * at[far + 1]:.2f} mm, and "
-            f"steps of {1e3 * step:.2f} mm otherwise; outline the missing image"
-        )
-    return step
-
-
-def _require_sections(stack: Stack) -> None:
-    worst = int((stack.off_round / stack.radii).argmax())
-    if stack.off_round[worst] > _OUT_OF_ROUND * stack.radii[worst]:
-        raise RegistrationError(
-            f"the slice at {1e3 * stack.positions[worst]:.2f} mm is not a section of an inclusion: "
-            f"{1e3 * stack.off_round[worst]:.2f} mm rms off a radius of "
-            f"{1e3 * stack.radii[worst]:.2f} mm; repeat its outline"
-        )
-    moved = np.linalg.norm(np.diff(stack.centres, axis=0), axis=1)
-    apart = moved - np.minimum(stack.radii[:-1], stack.radii[1:])
-    i = int(apart.argmax())
-    if apart[i] > 0:
-        raise RegistrationError(
-            f"the slices at {1e3 * stack.positions[i]:.2f} and {1e3 * stack.positions[i + 1]:.2f} "
-            f"mm cross: their centres lie {1e3 * moved[i]:.2f} mm from each other, more than a "
-            f"radius; outline them again"
-        )
 
 
 def sweep_outlines(

@@ -109,21 +109,17 @@ def image_plane(seen: SeenPoints) -> ImagePlane:
     off = _misses(seen, pose, scale)
     freedom = max(seen.equations - _UNKNOWN, 1)
     covariance = np.linalg.inv(J.T @ J) * float((off**2).sum()) / freedom
-    return ImagePlane(pose, scale, off, _left_out(seen), covariance)
-
-
-def _left_out(seen: SeenPoints) -> Floats:
     away = np.full(len(seen.px), np.nan)
     for image in np.unique(seen.image):
         there = seen.image == image
         if there.all():
             continue
         try:
-            pose, scale, _ = _fitted(seen.some(~there))
+            others = _fitted(seen.some(~there))
         except RegistrationError:
             continue  # the others alone leave something open
-        away[there] = np.linalg.norm(_misses(seen.some(there), pose, scale), axis=1)
-    return away
+        away[there] = np.linalg.norm(_misses(seen.some(there), *others[:2]), axis=1)
+    return ImagePlane(pose, scale, off, away, covariance)
 
 
 def _fitted(seen: SeenPoints) -> tuple[Similarity, tuple[float, float], Floats]:
@@ -132,29 +128,7 @@ def _fitted(seen: SeenPoints) -> tuple[Similarity, tuple[float, float], Floats]:
             f"{len(seen.px)} points give {seen.equations} equations for {_UNKNOWN} unknowns; mark "
             f"more points, in more images"
         )
-    start = _started(seen)
-
-    def left(by: Floats) -> Floats:
-        return _residuals(seen, start, by)
-
-    none = np.zeros(_UNKNOWN)
-    found = least_squares(left, none, xtol=_TIGHT, ftol=_TIGHT, gtol=_TIGHT, x_scale="jac")
-    pose, scale = _moved(start, found.x)
-    J = _slopes(seen, (pose, scale))
-    singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
-    if singular[-1] < _FLAT * singular[0]:
-        raise RegistrationError(
-            "the points do not fix the image plane: turn the probe further between images, or "
-            "mark targets at larger distances"
-        )
-    return pose, scale, J
-
-
-Plane = tuple[Similarity, tuple[float, float]]
-
-
-def _started(seen: SeenPoints) -> Plane:
-    """From the least squares in the nine entries of the affine map pixel -> probe."""
+    # From the least squares in the nine entries of the affine map pixel -> probe.
     size = np.abs(seen.px).max()
     u, v = (seen.px / size).T
     base = np.stack([u, v, np.ones_like(u)], axis=1)
@@ -171,7 +145,29 @@ def _started(seen: SeenPoints) -> Plane:
     axes = np.stack([across, down], axis=1) / (size * np.array(scale))
     U, _, V = np.linalg.svd(axes, full_matrices=False)
     x, y = (U @ V).T
-    return Similarity(np.stack([x, y, np.cross(x, y)], axis=1), shift), scale
+    start = Similarity(np.stack([x, y, np.cross(x, y)], axis=1), shift), scale
+
+    def left(by: Floats) -> Floats:
+        return _residuals(seen, start, by)
+
+    none = np.zeros(_UNKNOWN)
+    found = least_squares(left, none, xtol=_TIGHT, ftol=_TIGHT, gtol=_TIGHT, x_scale="jac")
+    pose, scale = _moved(start, found.x)
+    # Central differences of the residuals about a plane, (3 n, 8).
+    plane = (pose, scale)
+    steps = np.eye(_UNKNOWN) * _STEP
+    ways = [_residuals(seen, plane, s) - _residuals(seen, plane, -s) for s in steps]
+    J = np.stack(ways, axis=1) / (2 * _STEP)
+    singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
+    if singular[-1] < _FLAT * singular[0]:
+        raise RegistrationError(
+            "the points do not fix the image plane: turn the probe further between images, or "
+            "mark targets at larger distances"
+        )
+    return pose, scale, J
+
+
+Plane = tuple[Similarity, tuple[float, float]]
 
 
 def _moved(plane: Plane, by: Floats) -> Plane:
@@ -189,13 +185,6 @@ def _misses(seen: SeenPoints, pose: Similarity, scale: tuple[float, float]) -> F
 
 def _residuals(seen: SeenPoints, plane: Plane, by: Floats) -> Floats:
     return _misses(seen, *_moved(plane, by)).ravel()
-
-
-def _slopes(seen: SeenPoints, plane: Plane) -> Floats:
-    """Central differences of the residuals about a plane, (3 n, 8)."""
-    steps = np.eye(_UNKNOWN) * _STEP
-    ways = [_residuals(seen, plane, s) - _residuals(seen, plane, -s) for s in steps]
-    return np.stack(ways, axis=1) / (2 * _STEP)
 
 
 def by_target(seen: SeenPoints, off: Floats) -> Sequence[tuple[str, int, float]]:

@@ -65,7 +65,10 @@ def pivot(R: Floats, T: Floats, point: Ints) -> Pivot:
             f"tilt the tool to all sides"
         )
     tip = _solved(R[used], T[used], point[used])
-    points, off = _off(R, T, point, used, tip)
+    x = R @ tip + T
+    points = np.array([x[used][point[used] == k].mean(axis=0) for k in np.unique(point[used])])
+    of = np.searchsorted(np.unique(point[used]), point).clip(max=len(points) - 1)
+    off = np.asarray(x - points[of])
     found = Pivot(tip, _sd(R[used], T[used], point[used]), points, off, used, turns)
     travel = rms(_centred(T[used], point[used])) / float(np.sqrt(3))
     if found.rms > _STILL * travel:
@@ -95,16 +98,14 @@ def _turns(R: Floats, point: Ints) -> Floats:
     return np.asarray(size[::-1] / np.sqrt(len(R)))
 
 
-def _off(R: Floats, T: Floats, point: Ints, used: Ints, tip: Floats) -> tuple[Floats, Floats]:
-    x = R @ tip + T
-    points = np.array([x[used][point[used] == k].mean(axis=0) for k in np.unique(point[used])])
-    of = np.searchsorted(np.unique(point[used]), point).clip(max=len(points) - 1)
-    return points, np.asarray(x - points[of])
-
-
 def _standing(R: Floats, T: Floats, point: Ints) -> Ints:
     """Poses in which the tip stands: from the quarter that the most others follow, outwards."""
-    used = min(_quarters(len(R)), key=lambda some: _spread(_lengths(R, T, point, some)))
+    n = len(R)
+    starts = range(0, n - n // 4 + 1, max(n // 8, 1))
+    used = min(
+        [np.arange(n), *(np.arange(s, s + n // 4) for s in starts)],
+        key=lambda some: _spread(_lengths(R, T, point, some)),
+    )
     for _ in range(50):
         off = _lengths(R, T, point, used)
         near = np.flatnonzero(off <= _FAR * max(_spread(off), _FLOOR))
@@ -112,11 +113,6 @@ def _standing(R: Floats, T: Floats, point: Ints) -> Ints:
             break
         used = near
     return used
-
-
-def _quarters(n: int) -> list[Ints]:
-    starts = range(0, n - n // 4 + 1, max(n // 8, 1))
-    return [np.arange(n), *(np.arange(s, s + n // 4) for s in starts)]
 
 
 def _lengths(R: Floats, T: Floats, point: Ints, used: Ints) -> Floats:

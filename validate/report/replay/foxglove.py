@@ -30,7 +30,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats, Ints
-from validate.recording.mcap.channels import MessageSchema
+from validate.recording.mcap.write import MessageSchema
 
 Entity = SceneEntity
 _UNTURNED = Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)

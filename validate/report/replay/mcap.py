@@ -31,9 +31,9 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.result import MethodResult, Result
-from validate.recording.mcap.channels import WrittenChannel, WrittenMessage, write_channels
 from validate.recording.mcap.protobuf_messages import protobuf_schema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL
+from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
 from validate.report.replay import foxglove
 from validate.report.replay.layout import Shown, layout
 from validate.report.replay.signals import images, signals

@@ -6,9 +6,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.recording.images.image import encode_png
-from validate.recording.mcap.metadata import CALIBRATION, CALIBRATION_KEYS
 from validate.recording.mcap.protobuf_messages import protobuf_message
-from validate.recording.mcap.schemas import SIGNAL, signal_message
+from validate.recording.mcap.schemas import CALIBRATION, CALIBRATION_KEYS, SIGNAL, signal_message
 from validate.recording.types import Frames
 from validate.report.replay.foxglove import IMAGE, picture
 from validate.report.replay.view import ReplayView, Track, pose_records

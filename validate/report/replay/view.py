@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult
-from validate.recording.mcap.metadata import POSE, POSE_KEY
+from validate.recording.mcap.schemas import POSE, POSE_KEY
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registration import Registered

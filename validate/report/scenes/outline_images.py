@@ -13,7 +13,7 @@ from validate.compare.exhibit import Picture
 from validate.errors import RegistrationError
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
-from validate.register.outlines.circle import Circle, fit_circle
+from validate.register.outlines.round_outlines import Circle, fit_circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.scenes.animation import closed
 from validate.report.sections.observations import Held

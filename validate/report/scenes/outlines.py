@@ -11,8 +11,13 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Picture, Series, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
-from validate.register.outlines.distances import angular_points, enclosed, normal_distances
-from validate.register.outlines.outlines import Corner, OutlineObservation
+from validate.register.outlines.outlines import (
+    Corner,
+    OutlineObservation,
+    angular_points,
+    enclosed,
+    normal_distances,
+)
 from validate.report.charts.style import (
     MEASURED,
     WIDTH,

@@ -9,9 +9,8 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
-from validate.register.markers.identity_frame import AsDeclared
 from validate.register.markers.markers import MarkerObservation
-from validate.register.markers.quality import Registration
+from validate.register.markers.quality import AsDeclared, Registration
 from validate.report.scenes.residual_arrows import residual_arrows
 from validate.report.sections.observations import markers
 from validate.report.views.numbers import shown_unit, with_unit

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.mesh import (
     Mesh,
@@ -45,7 +44,8 @@ def quarter_cylinder(
         np.arange(radial + 1), np.arange(radial + 1), np.arange(axial + 1), indexing="ij"
     )
     ring = np.maximum(i, j)
-    angle = np.pi / 4 * _ratio(np.where(i >= j, j, i), ring)
+    part = np.where(i >= j, j, i)
+    angle = np.pi / 4 * np.asarray(np.divide(part, ring, out=np.zeros(part.shape), where=ring > 0))
     angle = np.where(i >= j, angle, np.pi / 2 - angle)
     corner = diameter / 2 * (1.0 if inscribed else _outside(radial))
     r = corner * (1 - (1 - ring / radial) ** grading)
@@ -77,10 +77,6 @@ def _outside(radial: float) -> float:
     return float(1 / np.sqrt(share))
 
 
-def _ratio(part: Floats, whole: Floats) -> Floats:
-    return np.asarray(np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0))
-
-
 def hexahedral_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:
     """Linear hexahedra of the whole cylinder about z, `radial` of them from axis to rim.
 
@@ -93,7 +89,27 @@ def hexahedral_cylinder(diameter: float, height: float, radial: int, axial: int)
             f"cylinder {1e3 * diameter:g} x {1e3 * height:g} mm with {radial} x {axial} "
             "hexahedra: all must be positive"
         )
-    disc, squares = _disc(radial)
+    # Nodes (k, 2) and quadrilaterals (q, 4) of a unit disc: n x n core cells in n / 2 rings.
+    count = (radial + 1) // 2
+    half = 1 / (2 * count / radial + 1.1)
+    line = np.linspace(-1.0, 1.0, radial + 1)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    number = np.arange((radial + 1) ** 2).reshape(radial + 1, radial + 1)
+    core = half * np.stack([x, y], axis=-1).reshape(-1, 2)
+    around = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
+    angle = 5 * np.pi / 4 + np.arange(4 * radial) * np.pi / (2 * radial)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    shares = np.arange(1, count + 1)[:, None, None] / count
+    rings = (1 - shares) * core[around] + shares * rim
+    loops = np.vstack([around, len(core) + np.arange(rings.size // 2).reshape(-1, 4 * radial)])
+    nodes = np.vstack([core, rings.reshape(-1, 2)])
+    inner, outer = loops[:-1], loops[1:]
+    ahead = [np.roll(loop, -1, axis=1) for loop in (inner, outer)]
+    faces = [
+        np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1),
+        np.stack([inner, outer, ahead[1], ahead[0]], axis=-1),
+    ]
+    disc, squares = nodes, np.vstack([f.reshape(-1, 4) for f in faces])
     radius = diameter / 2 * _outside(radial / 2)
     per, levels = len(disc), np.linspace(0.0, height, axial + 1)
     require_nodes((per, axial + 1))
@@ -107,33 +123,6 @@ def hexahedral_cylinder(diameter: float, height: float, radial: int, axial: int)
     mesh = Mesh(nodes, cells, "hex8", {name: outside[on] for name, on in sets.items()})
     require_positive_cells(mesh)
     return mesh
-
-
-def _disc(n: int) -> tuple[Floats, Ints]:
-    """Nodes (k, 2) and quadrilaterals (q, 4) of a unit disc: n x n core cells in n / 2 rings.
-
-    Corners run counter-clockwise. The size of the core makes its cells as long as rings are wide.
-    """
-    count = (n + 1) // 2
-    half = 1 / (2 * count / n + 1.1)
-    line = np.linspace(-1.0, 1.0, n + 1)
-    x, y = np.meshgrid(line, line, indexing="ij")
-    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    core = half * np.stack([x, y], axis=-1).reshape(-1, 2)
-    around = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
-    angle = 5 * np.pi / 4 + np.arange(4 * n) * np.pi / (2 * n)
-    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    shares = np.arange(1, count + 1)[:, None, None] / count
-    rings = (1 - shares) * core[around] + shares * rim
-    loops = np.vstack([around, len(core) + np.arange(rings.size // 2).reshape(-1, 4 * n)])
-    nodes = np.vstack([core, rings.reshape(-1, 2)])
-    inner, outer = loops[:-1], loops[1:]
-    ahead = [np.roll(loop, -1, axis=1) for loop in (inner, outer)]
-    faces = [
-        np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1),
-        np.stack([inner, outer, ahead[1], ahead[0]], axis=-1),
-    ]
-    return nodes, np.vstack([f.reshape(-1, 4) for f in faces])
 
 
 def whole_cylinder(diameter: float, height: float, radial: int, axial: int) -> Mesh:

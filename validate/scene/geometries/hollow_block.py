@@ -52,7 +52,32 @@ class HollowBlock:
         h = self.width / self.cells
         nx, ny = self.cells, _whole(self.height, h, "body.height")
         solid = np.ones((nx, ny), dtype=bool)
-        boxes = _boxes(self.cavities, h, nx, ny)
+        # The squares of each cavity, centred in the block.
+        cavities = self.cavities
+        if cavities.count not in (1, 2, 3):
+            raise SceneError(f"body.cavities.count = {cavities.count}: 1, 2 or 3")
+        wide = _whole(cavities.width, h, "body.cavities.width")
+        tall = _whole(cavities.height, h, "body.cavities.height")
+        if cavities.count > 1 and not cavities.septum > 0:
+            raise SceneError(
+                f"body.cavities.septum = {1e3 * cavities.septum:g} mm: the {cavities.count} "
+                "cavities touch each other; leave a wall between them"
+            )
+        apart = _whole(cavities.septum, h, "body.cavities.septum") if cavities.count > 1 else 0
+        row = cavities.count * wide + (cavities.count - 1) * apart
+        if row > nx - 2 or tall > ny - 2:
+            raise SceneError(
+                f"{cavities.count} cavities take {row} x {tall} of {nx} x {ny} squares: they "
+                "touch the outside; make them smaller"
+            )
+        if (nx - row) % 2 or (ny - tall) % 2:
+            raise SceneError(
+                f"{cavities.count} cavities take {row} x {tall} of {nx} x {ny} squares: not "
+                "centred on whole ones; take another body.cells"
+            )
+        left, bottom = (nx - row) // 2, (ny - tall) // 2
+        starts = [left + k * (wide + apart) for k in range(cavities.count)]
+        boxes = [(slice(s, s + wide), slice(bottom, bottom + tall)) for s in starts]
         for i, j in boxes:
             solid[i, j] = False
         x, y = np.meshgrid(
@@ -87,34 +112,6 @@ def _whole(length: float, h: float, name: str) -> int:
             "whole squares, or other body.cells"
         )
     return count
-
-
-def _boxes(cavities: Cavities, h: float, nx: int, ny: int) -> list[tuple[slice, slice]]:
-    """The squares of each cavity, centred in the block."""
-    if cavities.count not in (1, 2, 3):
-        raise SceneError(f"body.cavities.count = {cavities.count}: 1, 2 or 3")
-    wide = _whole(cavities.width, h, "body.cavities.width")
-    high = _whole(cavities.height, h, "body.cavities.height")
-    if cavities.count > 1 and not cavities.septum > 0:
-        raise SceneError(
-            f"body.cavities.septum = {1e3 * cavities.septum:g} mm: the {cavities.count} cavities "
-            "touch each other; leave a wall between them"
-        )
-    apart = _whole(cavities.septum, h, "body.cavities.septum") if cavities.count > 1 else 0
-    row = cavities.count * wide + (cavities.count - 1) * apart
-    if row > nx - 2 or high > ny - 2:
-        raise SceneError(
-            f"{cavities.count} cavities take {row} x {high} of {nx} x {ny} squares: they touch the "
-            "outside; make them smaller"
-        )
-    if (nx - row) % 2 or (ny - high) % 2:
-        raise SceneError(
-            f"{cavities.count} cavities take {row} x {high} of {nx} x {ny} squares: not centred on "
-            "whole ones; take another body.cells"
-        )
-    left, bottom = (nx - row) // 2, (ny - high) // 2
-    starts = [left + k * (wide + apart) for k in range(cavities.count)]
-    return [(slice(s, s + wide), slice(bottom, bottom + high)) for s in starts]
 
 
 def _split(nodes: Floats, solid: np.ndarray) -> tuple[Floats, Ints]:

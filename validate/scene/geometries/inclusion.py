@@ -287,9 +287,26 @@ def block_with_inclusion(block: Block, grid: tuple[int, int, int], shape: Inclus
             f"mesh of {grid} nodes: {int(np.prod(grid))} in total; expected at most "
             f"{_MOST_NODES}: use a coarser mesh"
         )
-    _require_inside(block, shape)
-    _require_resolved(block, grid, shape)
-    nodes = _graded_grid(block, grid, shape)
+    centre = np.array(shape.centre)
+    gaps = np.concatenate([centre - shape.reach, block.sizes - centre - shape.reach])
+    faces = [f"{axis} = {end}" for end in ("0", "max") for axis in "xyz"]
+    if gaps.min() <= 0:
+        raise SceneError(
+            f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
+            f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
+        )
+    spacing = np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1)
+    h = float(np.delete(spacing, shape.axis).max())
+    if 2 * shape.radius < h:
+        raise SceneError(
+            f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element of "
+            f"{1e3 * h:.3g} mm; refine the mesh"
+        )
+    lines = []
+    for count, size, middle in zip(grid, block.sizes, shape.centre, strict=True):
+        s = np.linspace(0, 1, count)
+        lines.append(np.where(s <= 0.5, 2 * s * middle, middle + (2 * s - 1) * (size - middle)))
+    nodes = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     cells = kuhn_cells(grid)
     removed = (shape.distance(nodes)[cells] < -1e-9).any(axis=1)
     if not removed.any():
@@ -307,75 +324,31 @@ def _projected(
 ) -> Mesh:
     """The cells with their wall on the shape; cells that the move would flatten are removed."""
     for _ in range(_ROUNDS):
-        facets = _named_facets(nodes, cells, block, grid)
+        outside = boundary_facets(cells, 3)
+        place = np.stack(np.unravel_index(np.arange(len(nodes)), grid), axis=-1)
+        last = np.array(grid) - 1
+        named, taken = {}, np.zeros(len(outside), dtype=bool)
+        for name, (axis, end) in zip(SIDES, product(range(3), (0, 1)), strict=True):
+            on = (place[outside, axis] == last[axis] * end).all(axis=1)
+            named[name], taken = outside[on], taken | on
+        named["cavity"] = outside[~taken]
+        wall = np.unique(named["cavity"])
+        on_face = ((place[wall] == 0) | (place[wall] == last)).any(axis=1)
+        if on_face.any():
+            raise SceneError(
+                f"the removed inclusion shares {int(on_face.sum())} nodes with the outer faces; "
+                "refine the mesh or move the inclusion inward"
+            )
+        facets = named
         wall = np.unique(facets["cavity"])
         moved = nodes.copy()
         moved[wall] = shape.project(nodes[wall])
-        mesh = _compact(moved, cells, facets)
+        used = np.unique(cells)
+        number = np.full(len(moved), -1)
+        number[used] = np.arange(len(used))
+        mesh = Mesh(moved[used], number[cells], "tet4", {k: number[f] for k, f in facets.items()})
         flat = cell_volumes(mesh) <= _FLAT * np.median(cell_volumes(mesh))
         if not flat.any():
             break
         cells = cells[~flat]
     return mesh
-
-
-def _require_inside(block: Block, shape: InclusionShape) -> None:
-    centre = np.array(shape.centre)
-    gaps = np.concatenate([centre - shape.reach, block.sizes - centre - shape.reach])
-    faces = [f"{axis} = {end}" for end in ("0", "max") for axis in "xyz"]
-    if gaps.min() <= 0:
-        raise SceneError(
-            f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
-            f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
-        )
-
-
-def _require_resolved(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> None:
-    centre = np.array(shape.centre)
-    spacing = np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1)
-    h = float(np.delete(spacing, shape.axis).max())
-    if 2 * shape.radius < h:
-        raise SceneError(
-            f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element of "
-            f"{1e3 * h:.3g} mm; refine the mesh"
-        )
-
-
-def _graded_grid(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> Floats:
-    lines = []
-    for count, size, centre in zip(grid, block.sizes, shape.centre, strict=True):
-        s = np.linspace(0, 1, count)
-        lines.append(np.where(s <= 0.5, 2 * s * centre, centre + (2 * s - 1) * (size - centre)))
-    return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def _named_facets(
-    nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int]
-) -> dict[str, Ints]:
-    outside = boundary_facets(cells, 3)
-    place = np.stack(np.unravel_index(np.arange(len(nodes)), grid), axis=-1)
-    last = np.array(grid) - 1
-    named, taken = {}, np.zeros(len(outside), dtype=bool)
-    for name, (axis, end) in zip(SIDES, product(range(3), (0, 1)), strict=True):
-        on = (place[outside, axis] == last[axis] * end).all(axis=1)
-        named[name], taken = outside[on], taken | on
-    named["cavity"] = outside[~taken]
-    _require_apart(named, place, last)
-    return named
-
-
-def _require_apart(named: dict[str, Ints], place: Ints, last: Ints) -> None:
-    wall = np.unique(named["cavity"])
-    on_face = ((place[wall] == 0) | (place[wall] == last)).any(axis=1)
-    if on_face.any():
-        raise SceneError(
-            f"the removed inclusion shares {int(on_face.sum())} nodes with the outer faces; "
-            "refine the mesh or move the inclusion inward"
-        )
-
-
-def _compact(nodes: Floats, cells: Ints, facets: dict[str, Ints]) -> Mesh:
-    used = np.unique(cells)
-    number = np.full(len(nodes), -1)
-    number[used] = np.arange(len(used))
-    return Mesh(nodes[used], number[cells], "tet4", {k: number[f] for k, f in facets.items()})

@@ -14,8 +14,7 @@ from scipy.optimize import brentq
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
-from validate.scene.geometries.box import grid
-from validate.scene.geometries.similar_grids import member
+from validate.scene.geometries.box import grid, member
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.places import OnPlane
 from validate.scene.scene import Support

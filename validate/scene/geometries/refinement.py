@@ -14,9 +14,8 @@ from scipy.spatial import KDTree
 from validate.arrays import Ints
 from validate.errors import SceneError, ValidateError
 from validate.places import cache
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
-from validate.scene.mesh_files.mesh_file import read_mesh, write_mesh
+from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.scene import Scene
 from validate.scene.shape_functions import CORNERS, LATTICE
 
@@ -45,7 +44,11 @@ def coarser(mesh: Mesh, times: int = 1) -> Mesh:
     if len(mesh.nodes) < _FEW:
         raise SceneError(f"{len(mesh.nodes)} nodes: too few for a mesh with fewer")
     by = (3.0 if len(mesh.nodes) > _LARGE else 2.0) * 2.0 ** (times - 1)
-    triangles = _triangles(mesh.surface, mesh.bricks)
+    # Triangles (t, 3) of a surface; a brick's face is two.
+    if not mesh.bricks:
+        triangles = mesh.surface[:, :3]
+    else:
+        triangles = np.concatenate([mesh.surface[:, [0, 1, 2]], mesh.surface[:, [0, 2, 3]]])
     edge = _EDGE * float(np.cbrt(np.abs(cell_volumes(mesh)).mean()))
     if mesh.bricks:
         edge /= _EDGE
@@ -63,20 +66,29 @@ def coarser(mesh: Mesh, times: int = 1) -> Mesh:
             f"a filling with edges of {1e3 * by * edge:.3g} mm has {len(coarse.nodes)} nodes, the "
             f"mesh {len(mesh.nodes)}: its surface has details that need small cells"
         )
-    return Mesh(coarse.nodes, coarse.cells, coarse.kind, _sets(mesh, coarse))
+    # The facet sets of the coarse mesh's surface by their nearest facets on the fine one.
+    count = 4 if mesh.bricks else 3
+    own, surface = mesh.surface[:, :count], coarse.surface
+    centres = mesh.nodes[own].mean(axis=1)
+    _, nearest = KDTree(centres).query(coarse.nodes[surface].mean(axis=1))
+    keys = {tuple(sorted(facet)): i for i, facet in enumerate(own.tolist())}
+    found = {}
+    for name, facets in mesh.facets.items():
+        rows = [keys.get(tuple(sorted(facet))) for facet in facets[:, :count].tolist()]
+        inside = np.zeros(len(own), dtype=bool)
+        inside[[row for row in rows if row is not None]] = True
+        if inside.any():
+            chosen = inside[nearest]
+            if not chosen.any():  # smaller than a facet here
+                chosen[KDTree(coarse.nodes[surface].mean(axis=1)).query(centres[inside])[1]] = True
+            found[name] = surface[chosen]
+    return Mesh(coarse.nodes, coarse.cells, coarse.kind, found)
 
 
 def size_against(own: Mesh, coarse: Mesh) -> float:
     """How many times as far apart the nodes of the coarse mesh are; cells of two shapes have no
     common size."""
     return float(np.cbrt(len(own.nodes) / len(coarse.nodes)))
-
-
-def _triangles(facets: Ints, bricks: bool) -> Ints:
-    """Triangles (t, 3) of a surface; a brick's face is two."""
-    if not bricks:
-        return facets[:, :3]
-    return np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
 
 
 @lru_cache(maxsize=4)
@@ -99,26 +111,6 @@ def _filling(points: bytes, triangles: bytes, edge: float, within: float) -> Mes
         kept.parent.mkdir(parents=True, exist_ok=True)
         write_mesh(mesh, kept)
     return mesh
-
-
-def _sets(fine: Mesh, coarse: Mesh) -> dict[str, Ints]:
-    """The facet sets of the coarse mesh's surface by their nearest facets on the fine one."""
-    corners = 4 if fine.bricks else 3
-    own, new = fine.surface[:, :corners], coarse.surface
-    middles = fine.nodes[own].mean(axis=1)
-    _, nearest = KDTree(middles).query(coarse.nodes[new].mean(axis=1))
-    keys = {tuple(sorted(facet)): i for i, facet in enumerate(own.tolist())}
-    found = {}
-    for name, facets in fine.facets.items():
-        rows = [keys.get(tuple(sorted(facet))) for facet in facets[:, :corners].tolist()]
-        inside = np.zeros(len(own), dtype=bool)
-        inside[[row for row in rows if row is not None]] = True
-        if inside.any():
-            chosen = inside[nearest]
-            if not chosen.any():  # smaller than a facet here
-                chosen[KDTree(coarse.nodes[new].mean(axis=1)).query(middles[inside])[1]] = True
-            found[name] = new[chosen]
-    return found
 
 
 # -------------------------------------------------------------------------------------------------

@@ -15,8 +15,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.parameters import known, quantity, take_units
-from validate.scene.geometries.box import box
-from validate.scene.geometries.similar_grids import member
+from validate.scene.geometries.box import box, member
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.places import InBox, Place
 

@@ -21,7 +21,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import known, quantity, take_units
-from validate.scene.geometries.box import box, grid
+from validate.scene.geometries.box import box, grid, member
 from validate.scene.geometries.cylinder import (
     hexahedral_cylinder,
     quarter_cone,
@@ -29,11 +29,9 @@ from validate.scene.geometries.cylinder import (
     whole_cylinder,
 )
 from validate.scene.geometries.refinement import coarser, linear, refined
-from validate.scene.geometries.similar_grids import member
-from validate.scene.geometries.tetrahedral_filling import filled
 from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
-from validate.scene.mesh_files.mesh_file import read_mesh
+from validate.scene.mesh_files.mesh_file import filled, read_mesh
 from validate.scene.places import facets_of, place_of
 from validate.scene.scene import Scene, Support
 

@@ -122,7 +122,11 @@ def arrays(path: Path, part: str | None = None) -> dict[str, NDArray[Any]]:
     (home, instance), beside = _body(blocks, part)
     own = [b for b in blocks if _belongs(b, home, instance)]
     numbers, points = nodes_of(own)
-    solids = _solids(own)
+    solids: Elements = {}
+    for block in filter(_is_solid, own):
+        for number, nodes in _rows_of(block, _size(block)):
+            if solids.setdefault(number, nodes) is not nodes:
+                raise block.wrong(f"element {number} is defined twice; export one part")
     sets = _Sets(own, {n: i for i, n in enumerate(numbers)}, solids)
     found = {
         "points": points if instance is None else placed(points, instance),
@@ -219,15 +223,6 @@ def _size(block: KeywordBlock) -> int:
     """Nodes of a solid element or a face; 0 for others."""
     found = _SOLID.match(_type(block)) or _FACE.match(_type(block))
     return int(found[1]) if found else 0
-
-
-def _solids(own: Sequence[KeywordBlock]) -> Elements:
-    found: Elements = {}
-    for block in filter(_is_solid, own):
-        for number, nodes in _rows_of(block, _size(block)):
-            if found.setdefault(number, nodes) is not nodes:
-                raise block.wrong(f"element {number} is defined twice; export one part")
-    return found
 
 
 def _cells(own: Sequence[KeywordBlock], place: Mapping[int, int]) -> dict[str, NDArray[Any]]:

@@ -73,18 +73,15 @@ class Deck:
         return path
 
     def _of(self, path: Path, of: str, inside: tuple[Path, ...]) -> Iterator[DeckLine]:
-        for line in _joined(self._text(path), of):
+        self._bytes += path.stat().st_size
+        if self._bytes > _MOST:
+            raise SceneError(f"more than {_MOST} bytes with what it includes")
+        for line in _joined(read_text(path, _MOST), of):
             included = _included(line)
             if included is None:
                 yield line
             else:
                 yield from self.beside(included, line.where, (*inside, path.resolve()))
-
-    def _text(self, path: Path) -> str:
-        self._bytes += path.stat().st_size
-        if self._bytes > _MOST:
-            raise SceneError(f"more than {_MOST} bytes with what it includes")
-        return read_text(path, _MOST)
 
 
 def files_named(path: Path) -> tuple[Path, ...]:
@@ -220,17 +217,13 @@ def blocks_of(deck: Deck) -> list[KeywordBlock]:
             system = None  # it holds in the part or instance in which it stands
         if block.keyword == "SYSTEM":
             system = block if block.rows else None
-        _require_own_rows(block)
+        if block.keyword in _MAKES:
+            raise block.wrong("is not supported; export plain nodes and elements")
+        if block.keyword == "NODE" and block.given.get("SYSTEM", "R").upper() != "R":
+            raise block.wrong("coordinates that are not Cartesian; export them as x, y, z")
         found.append(replace(block, home=home, system=system))
         home = NOWHERE if block.keyword in _ENDS.values() else home
     return found
-
-
-def _require_own_rows(block: KeywordBlock) -> None:
-    if block.keyword in _MAKES:
-        raise block.wrong("is not supported; export plain nodes and elements")
-    if block.keyword == "NODE" and block.given.get("SYSTEM", "R").upper() != "R":
-        raise block.wrong("coordinates that are not Cartesian; export them as x, y, z")
 
 
 def _split(deck: Deck) -> Iterator[KeywordBlock]:
@@ -243,18 +236,15 @@ def _split(deck: Deck) -> Iterator[KeywordBlock]:
         if current is not None:
             yield replace(current, rows=tuple(rows))
         current = KeywordBlock(*words_of(line.text), (), line.where)
-        rows = _of_its_file(current, deck)
+        # The rows that a keyword takes from the file it names by `input=`.
+        if current.keyword not in _ROWS or "INPUT" not in current.given:
+            rows = []
+        else:
+            lines = list(deck.beside(current.given["INPUT"], current.where))
+            if keyword := next((line for line in lines if line.is_keyword), None):
+                raise current.wrong(
+                    f"keyword '{keyword.text[:40]}' in {keyword.where}; only rows are supported"
+                )
+            rows = [line.text for line in lines]
     if current is not None:
         yield replace(current, rows=tuple(rows))
-
-
-def _of_its_file(block: KeywordBlock, deck: Deck) -> list[str]:
-    """The rows that a keyword takes from the file it names by `input=`."""
-    if block.keyword not in _ROWS or "INPUT" not in block.given:
-        return []
-    lines = list(deck.beside(block.given["INPUT"], block.where))
-    if keyword := next((line for line in lines if line.is_keyword), None):
-        raise block.wrong(
-            f"keyword '{keyword.text[:40]}' in {keyword.where}; only rows are supported"
-        )
-    return [line.text for line in lines]

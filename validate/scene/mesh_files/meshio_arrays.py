@@ -27,7 +27,17 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Points (n, 3), solid cells by meshio's names of their shapes, node sets, labelled facets and
     labelled cells (their numbers, where all have one shape) by name."""
     if path.suffix.lower() == ".msh":
-        _require_version(path)
+        # Raises `SceneError` for Gmsh's older and in-between formats, which no reader here takes.
+        with open_file(path) as file:
+            head = file.read(200).decode("latin-1").split()
+        version = head[1] if len(head) > 1 and head[0] == "$MeshFormat" else "1"
+        gmsh = bool(head) and head[0] in ("$MeshFormat", "$NOD")
+        plain = version.rstrip("0").rstrip(".") if "." in version else version  # netgen's 2.000000
+        if gmsh and plain not in _READ:
+            raise SceneError(
+                f"Gmsh's format {version} is not supported; save it as 2.2 or 4.1: gmsh FILE -0 "
+                "-format msh41 -o NEW.msh"
+            )
     mesh = read_quietly(path, path.name)
     cells: dict[str, list[NDArray[Any]]] = {}
     for block in mesh.cells:
@@ -89,17 +99,3 @@ def read_quietly(path: Path, name: str) -> Any:
     except SystemExit:  # its way to say that it cannot
         why = " ".join(said.getvalue().replace(str(path), name).split())
         raise SceneError(f"meshio cannot read it ({why[:200]})") from None
-
-
-def _require_version(path: Path) -> None:
-    """Raises `SceneError` for Gmsh's older and in-between formats, which no reader here takes."""
-    with open_file(path) as file:
-        head = file.read(200).decode("latin-1").split()
-    version = head[1] if len(head) > 1 and head[0] == "$MeshFormat" else "1"
-    gmsh = bool(head) and head[0] in ("$MeshFormat", "$NOD")
-    plain = version.rstrip("0").rstrip(".") if "." in version else version  # netgen's 2.000000
-    if gmsh and plain not in _READ:
-        raise SceneError(
-            f"Gmsh's format {version} is not supported; save it as 2.2 or 4.1: gmsh FILE -0 "
-            "-format msh41 -o NEW.msh"
-        )

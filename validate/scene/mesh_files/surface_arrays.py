@@ -30,7 +30,10 @@ def arrays(path: Path, edge: float = 0.0, within: float = ENVELOPE) -> dict[str,
     from pytetwild.pytetwild import tetrahedralize
 
     points, triangles = _joined(*_surface(path))
-    loose = _open_edges(triangles)
+    # How many edges do not belong to two triangles.
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(ends, axis=0, return_counts=True)
+    loose = int((counts != 2).sum())
     if loose or not len(triangles):
         raise SceneError(
             f"{loose} open or doubled edges in {len(triangles)} triangles: the surface is not "
@@ -42,13 +45,18 @@ def arrays(path: Path, edge: float = 0.0, within: float = ENVELOPE) -> dict[str,
             points, triangles.astype(np.int32), edge_length_abs=edge or None, epsilon=within,
             num_threads=1, quiet=True,
         )  # fmt: skip
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
     return {
         "points": np.asarray(nodes, dtype=np.float64),
         "cells.tetra": np.asarray(cells, dtype=np.int64),
         "triangles": np.array(len(triangles)),
         "turned": np.array(turned),
         "enclosed": np.array(_signed_volume(points, triangles)),
-        "may_differ": np.array(_area(points, triangles) * within * _diagonal(points)),
+        "may_differ": np.array(
+            (float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2)
+            * within
+            * float(np.linalg.norm(np.ptp(points, axis=0)))
+        ),
     }
 
 
@@ -98,13 +106,6 @@ def _joined(
     return points[first], joined[~flat]
 
 
-def _open_edges(triangles: NDArray[np.int64]) -> int:
-    """How many edges do not belong to two triangles."""
-    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, counts = np.unique(ends, axis=0, return_counts=True)
-    return int((counts != 2).sum())
-
-
 def _oriented(
     points: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], int]:
@@ -113,18 +114,7 @@ def _oriented(
     Neighbours run along their common edge in opposite ways. Of each shell the greater part stays as
     it is, so that the walls of a void still point into it.
     """
-    wrong = _other_way(triangles)
-    if _signed_volume(points, _turned(triangles, wrong)) < 0:
-        wrong = ~wrong
-    return _turned(triangles, wrong), int(wrong.sum())
-
-
-def _turned(triangles: NDArray[np.int64], which: NDArray[np.bool_]) -> NDArray[np.int64]:
-    return np.where(which[:, None], triangles[:, ::-1], triangles)
-
-
-def _other_way(triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which triangles (t,) run against the greater part of their shell."""
+    # Which triangles (t,) run against the greater part of their shell.
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -141,16 +131,14 @@ def _other_way(triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
     first = np.minimum(labels[:n], labels[n:])  # a shell's name
     wrong = labels[:n] != first
     share = np.bincount(first, wrong) / np.maximum(np.bincount(first), 1)
-    return np.asarray(np.where(share[first] > 0.5, ~wrong, wrong))
+    wrong = np.asarray(np.where(share[first] > 0.5, ~wrong, wrong))
+    if _signed_volume(points, _turned(triangles, wrong)) < 0:
+        wrong = ~wrong
+    return _turned(triangles, wrong), int(wrong.sum())
 
 
-def _area(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
-
-
-def _diagonal(points: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
+def _turned(triangles: NDArray[np.int64], which: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.where(which[:, None], triangles[:, ::-1], triangles)
 
 
 def _signed_volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:

@@ -131,22 +131,17 @@ def read_foreign(path: Path, unit: str, part: str | None = None) -> ForeignBody:
     factor = metres(path.name, unit)
     require_readable(path)
     abaqus = path.suffix.lower() == ".inp"
-    found = _abaqus(path, part) if abaqus else _others(path)
+    if abaqus:
+        try:
+            found = abaqus_arrays(path, part)
+        except (SceneError, OSError) as error:
+            raise SceneError(f"{path.name}: {error}") from None
+    else:
+        try:
+            found = decoded("validate.scene.mesh_files.meshio_arrays", path)
+        except RecordingError as error:
+            raise SceneError(str(error)) from None
     return _body(path.name, found, factor, part, turn=not abaqus)
-
-
-def _abaqus(path: Path, part: str | None) -> dict[str, NDArray[Any]]:
-    try:
-        return abaqus_arrays(path, part)
-    except (SceneError, OSError) as error:
-        raise SceneError(f"{path.name}: {error}") from None
-
-
-def _others(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        return decoded("validate.scene.mesh_files.meshio_arrays", path)
-    except RecordingError as error:
-        raise SceneError(str(error)) from None
 
 
 def _body(

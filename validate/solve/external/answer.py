@@ -51,7 +51,7 @@ def _series(path: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     for file in sorted(path.parent.glob("*.vtu")):
         regular(file, max(most, (path.parent / "mesh.vtu").stat().st_size))
     try:
-        found = decoded("validate.scene.mesh_files.vtu_series", path, None, _SECONDS)
+        found = decoded("validate.scene.mesh_files.vtu", path, None, _SECONDS)
     except (RecordingError, UsageError) as error:
         raise NoAnswerError(plain(str(error))) from None
     points = found.pop("points")

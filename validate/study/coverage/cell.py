@@ -19,7 +19,7 @@ from validate.pipeline.run.case_solution import run_on
 from validate.pipeline.run.job import Job
 from validate.pipeline.run.method_run import Followed
 from validate.pipeline.run.runs import Road
-from validate.register.draws import AnyDraw, Draw, Exact
+from validate.register.observation import AnyDraw, Draw, Exact
 from validate.register.registration import Registered
 from validate.study.coverage.bench import ExactReading, Opening, Stated, drawable
 from validate.study.coverage.plan import FILTER_DRAWS, WRONG_DRAWS, DrawCell

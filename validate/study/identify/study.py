@@ -18,9 +18,8 @@ from validate.engine.pool import Pool
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
 from validate.identify.identification import Identification, identify
-from validate.identify.least_squares import Fit
+from validate.identify.least_squares import Fit, Space
 from validate.identify.profile import Side
-from validate.identify.space import Space
 from validate.pipeline.calibration.calibrated import Identify, identified
 from validate.pipeline.calibration.free_parameters import asked
 from validate.pipeline.calibration.problem import Calibrated, Problem

@@ -1,10 +1,13 @@
-"""Force and displacement from stress, strain or stretch, by declared specimen sizes.
+"""Specimen sizes in a header, and force and displacement made with them of stress and strain.
 
 With the length L and the area A of the specimen before the test, and the stretch s = 1 + e of an
-engineering strain e: displacement e L, force (engineering stress) A. A true strain is ln s; a true
-stress is that on the area that is left, A / s where the volume stays, which is assumed and said.
+engineering strain e: displacement e L, force (engineering stress) A. A true strain is ln s; a
+true stress is that on the area that is left, A / s where the volume stays, which is assumed and
+said.
 """
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -23,16 +26,115 @@ from validate.recording.tables.columns import (
     unnamed_column,
 )
 from validate.recording.tables.direction import Kind, excursion
-from validate.recording.tables.geometry import loaded_area
-from validate.recording.tables.table import Column, Table
+from validate.recording.tables.table import Column, Table, number, split_unit
 from validate.recording.tables.vocabulary import (
     ENGINEERING,
+    OTHER_PARTS,
+    SIZES,
     TRUE,
     holds,
     of_the_deformed,
     role_of_name,
 )
-from validate.units import si_factor, split
+from validate.units import is_unit, si_factor, split
+
+# (name in the record, quantity, words of the header's key, words that make it something else)
+_NO_TEST_SPEED = OTHER_PARTS + " jog return preload vorkraft data datenrate abtastrate"
+LENGTH = "length_m"
+GEOMETRY: tuple[tuple[str, str, str, str], ...] = (
+    ("diameter_m", "length", SIZES["diameter"], OTHER_PARTS),
+    ("height_m", "length", SIZES["height"], OTHER_PARTS),
+    ("width_m", "length", SIZES["width"], OTHER_PARTS),
+    ("thickness_m", "length", SIZES["thickness"], OTHER_PARTS),
+    (LENGTH, "length", SIZES["length"], OTHER_PARTS),
+    ("area_m2", "area", SIZES["area"], OTHER_PARTS),
+    ("speed_m_per_s", "speed", SIZES["speed"], _NO_TEST_SPEED),
+)
+_GLUED = re.compile(r"(?P<number>[-+]?[0-9.,' ]*[0-9][.,]?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
+
+
+def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
+    """SI numbers by name (`diameter_m`, `height_m`, ..., `speed_m_per_s`) of the header block.
+
+    Only values with a unit, glued to them or in the key, are used. A strip has several lengths (of
+    itself, between grips, of a gauge): where they differ each is `length_m/KEY`, and none is meant.
+    Raises `RecordingError` when two other lines, or key and value, contradict each other, and for
+    sizes that are not positive.
+    """
+    found: dict[str, tuple[float, str]] = {}
+    lengths: dict[str, float] = {}
+    for key, text in header.items():
+        for name, quantity, given, taken in GEOMETRY:
+            value = _value(key, text, quantity, given, taken, decimal)
+            if value is None:
+                continue
+            if name == LENGTH:
+                lengths[f"{LENGTH}/{key}"] = value
+            before, by = found.setdefault(name, (value, key))
+            if name != LENGTH and not math.isclose(before, value, rel_tol=1e-6):
+                raise RecordingError(
+                    f"header: '{by}' gives {name} = {before:.6g}, '{key}' {value:.6g}; keep one"
+                )
+    told = {name: value for name, (value, _) in found.items()}
+    if not all(math.isclose(told[LENGTH], value, rel_tol=1e-6) for value in lengths.values()):
+        del told[LENGTH]
+        told |= lengths
+    return told
+
+
+def loaded_area(specimen: Mapping[str, float], test: str = "") -> float | None:
+    """Return the area (m2) under nominal stress: given, of a disc, or of a rectangle; None: not
+    known.
+
+    A strip that is pulled has width and thickness. Which two of three sides a pressed block stands
+    on is known only beside its height: a thickness may be the height, too.
+    """
+    if "area_m2" in specimen:
+        return specimen["area_m2"]
+    if "diameter_m" in specimen:
+        return math.pi * specimen["diameter_m"] ** 2 / 4
+    if test == "tension":
+        sides = [specimen[k] for k in ("width_m", "thickness_m") if k in specimen]
+        return sides[0] * sides[1] if len(sides) == 2 else None
+    sides = [specimen[k] for k in ("width_m", "thickness_m", "length_m") if k in specimen]
+    return sides[0] * sides[1] if len(sides) == 2 and "height_m" in specimen else None
+
+
+def _value(
+    key: str, text: str, quantity: str, given: str, taken: str, decimal: str
+) -> float | None:
+    if not holds(key, given) or holds(key, taken):
+        return None
+    parts = _GLUED.fullmatch(text.strip())
+    if parts is None:
+        return None
+    glued = (parts["unit"] or "").strip("()[] ")
+    _, in_key = split_unit(key)
+    if glued and in_key and is_unit(in_key) and glued != in_key:
+        raise RecordingError(f"header: '{key}' is given in {glued}; keep one unit")
+    unit = glued or in_key
+    if unit is None or not is_unit(unit):
+        return None
+    value = _number(key, parts["number"].strip(), decimal) * si_factor(unit, quantity)
+    if value <= 0:
+        raise RecordingError(f"header: '{key}' is {text}, expected a size above 0")
+    return value
+
+
+def _number(key: str, text: str, decimal: str) -> float:
+    """A header number; its decimal sign may differ from the table's where it cannot be grouping."""
+    other = "," if decimal == "." else "."
+    grouping = re.fullmatch(rf"[1-9][0-9]{{0,2}}\{other}[0-9]{{3}}", text)
+    value = None if grouping else number(text, decimal)
+    if value is None and not grouping:
+        value = number(text, other)
+    if value is None:
+        raise RecordingError(
+            f"header: '{key}' is '{text}', not a plain number; write it without thousands "
+            f"separators"
+        )
+    return value
+
 
 MEASURES = ("engineering", "true")
 _FROM = {"displacement": ("strain", "stretch"), "force": ("stress",)}
@@ -109,7 +211,30 @@ def derived(
 ) -> Sized:
     """Displacement or force by a size; raises `MissingColumnError` naming all that is asked."""
     if role == "displacement":
-        return _displacement(table, said, sizes, kind)
+        missing = () if sizes.length else (_LENGTH,)
+        try:
+            source = _elongation(table, said)
+        except RecordingError as error:
+            raise MissingColumnError(str(error), missing) from error
+        measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
+        asked += missing
+        unnamed = unnamed_column("displacement", table)
+        _refuse_unsaid(
+            f"no displacement, but {source.role} '{source.column.label}'{unnamed}", asked
+        )
+        assert sizes.length is not None
+        what = f"{measure} strain" if measure else "(stretch - 1) of"
+        words = f"displacement = {what} '{source.column.label}' x length {sizes.length:.6g} m"
+        shown = _shown_by_stretch(source) if source.role == "stretch" else None
+        if kind and shown and kind.name != shown.name:
+            raise RecordingError(
+                f"a {kind.name} test ({kind.why}), but {shown.why}; give --map test={shown.name}, "
+                "or "
+                f"if it is not a stretch, --map 'strain={source.column.label}:%' (or :1)"
+            )
+        elongation = _relative(source, measure, kind or shown)
+        made = _made(source, "displacement", elongation * sizes.length, sizes.length)
+        return Sized(made, f"{words} ({sizes.words['length']})", shown)
     missing = () if sizes.area else (_AREA,)
     try:
         stress = _source("stress", table, said)
@@ -126,26 +251,6 @@ def derived(
         words += " over the stretch (constant volume assumed)"
     words = f"force = {words} x area {sizes.area:.6g} m2 ({sizes.words['area']})"
     return Sized(_made(stress, "force", nominal * sizes.area, sizes.area), words)
-
-
-def _displacement(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None) -> Sized:
-    missing = () if sizes.length else (_LENGTH,)
-    try:
-        source = _elongation(table, said)
-    except RecordingError as error:
-        raise MissingColumnError(str(error), missing) from error
-    measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
-    asked += missing
-    unnamed = unnamed_column("displacement", table)
-    _refuse_unsaid(f"no displacement, but {source.role} '{source.column.label}'{unnamed}", asked)
-    assert sizes.length is not None
-    what = f"{measure} strain" if measure else "(stretch - 1) of"
-    words = f"displacement = {what} '{source.column.label}' x length {sizes.length:.6g} m"
-    shown = _shown_by_stretch(source) if source.role == "stretch" else None
-    _refuse_other(kind, shown, source)
-    elongation = _relative(source, measure, kind or shown)
-    made = _made(source, "displacement", elongation * sizes.length, sizes.length)
-    return Sized(made, f"{words} ({sizes.words['length']})", shown)
 
 
 def require_left(sized: Sized, closing: Floats, length: float) -> None:
@@ -209,7 +314,10 @@ def _measure(pick: Pick, sizes: Sizes) -> tuple[str, list[str]]:
 
 def _stretch(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | None) -> Floats:
     """Stretch (n,) for a true stress: by strain or stretch, else by displacement over length."""
-    if not ({"strain", "stretch"} & set(said) or _strained(table)):
+    if not (
+        {"strain", "stretch"} & set(said)
+        or any(_candidates(role, table) for role in ("strain", "stretch"))
+    ):
         moved = needed_pick("displacement", table, said.get("displacement"))
         if sizes.length is None:
             raise MissingColumnError("true stress and the current area", (_LENGTH,))
@@ -219,10 +327,6 @@ def _stretch(table: Table, said: Mapping[str, Said], sizes: Sizes, kind: Kind | 
     measure, asked = ("", []) if source.role == "stretch" else _measure(source, sizes)
     _refuse_unsaid("true stress", asked)
     return np.asarray(1 + _signed(_relative(source, measure, kind or shown), kind or shown, source))
-
-
-def _strained(table: Table) -> bool:
-    return any(_candidates(role, table) for role in ("strain", "stretch"))
 
 
 def _relative(source: Pick, measure: str, kind: Kind | None) -> Floats:
@@ -261,14 +365,6 @@ def _shown_by_stretch(source: Pick) -> Kind | None:
         Kind("tension", f"{name} goes above 1") if way > 0
         else Kind("compression", f"{name} goes below 1")
     )  # fmt: skip
-
-
-def _refuse_other(kind: Kind | None, shown: Kind | None, source: Pick) -> None:
-    if kind and shown and kind.name != shown.name:
-        raise RecordingError(
-            f"a {kind.name} test ({kind.why}), but {shown.why}; give --map test={shown.name}, or "
-            f"if it is not a stretch, --map 'strain={source.column.label}:%' (or :1)"
-        )
 
 
 def _refuse_unsaid(what: str, asked: list[str]) -> None:
