@@ -150,16 +150,13 @@ class Figure:
                 "give both or neither"
             )
         if self.tolerance is not None:
-            self._require_narrow(self.tolerance)
-
-    def _require_narrow(self, tolerance: float) -> None:
-        scale = self.scale or abs(self.theirs or 0.0)
-        if not tolerance <= _WIDEST * scale * (1 + 1e-9):
-            raise ComparisonError(
-                f"figure '{self.name}': a tolerance of {tolerance:g} {self.unit} is wider than "
-                f"a tenth of the scale of its reference, {scale:g} {self.unit}; it must be at "
-                f"most {_WIDEST * scale:g}, or the figure could not fail"
-            )
+            scale = self.scale or abs(self.theirs or 0.0)
+            if not self.tolerance <= _WIDEST * scale * (1 + 1e-9):
+                raise ComparisonError(
+                    f"figure '{self.name}': a tolerance of {self.tolerance:g} {self.unit} is wider "
+                    f"than a tenth of the scale of its reference, {scale:g} {self.unit}; it must "
+                    f"be at most {_WIDEST * scale:g}, or the figure could not fail"
+                )
 
     def beside(self, values: Values) -> Published:
         """Return the figure with our value; one that cannot be computed says what it lacks."""

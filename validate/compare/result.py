@@ -1,4 +1,7 @@
-"""Result of a comparison: all data of a report and of the exit code."""
+"""Result of a comparison, and the validation domain of its runs.
+
+Validation domain of a run: strain, strain rate and size of its body.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.compare.overall_verdict import Expected, MovedVerdict, Overall, judge_all, moved
 from validate.compare.published import Published
@@ -18,6 +24,8 @@ from validate.compare.view import View
 from validate.display import brief
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Stream
+from validate.scene.mesh import Mesh
+from validate.solve.types import Run
 
 if TYPE_CHECKING:
     from validate.compare.effects import Effect
@@ -236,3 +244,69 @@ class Result:
     def as_expected(self) -> bool:
         """Whether every verdict is the declared one; without declarations, whether it passed."""
         return bool(self.checks) and not self.moved if self.expected else self.passed
+
+
+_SHARE = 0.99  # of the cells stays below the strain that is told: corners are singular
+_FRAMES = 50  # frames that are looked at
+
+
+@dataclass(frozen=True)
+class Domain:
+    """One run: principal logarithmic strain (its largest size) that 99 % of the cells stay below,
+    the fastest that it grew (1/s), the smallest and largest side (m) of the box about the body.
+
+    None where the run does not say: a material point has no size, one instant or rows without
+    times no rate.
+    """
+
+    recording: str
+    specimen: str
+    strain: float | None
+    rate: float | None
+    sides: tuple[float, float] | None
+
+
+def domains(
+    method: MethodResult, recordings: tuple[str, ...], specimens: tuple[str, ...]
+) -> tuple[Domain, ...]:
+    """Of every recording that a method was run on."""
+    mesh = method.scene.mesh
+    sides = np.ptp(mesh.nodes, axis=0) if len(mesh.nodes) else None
+    found = []
+    each = zip(method.runs, method.registered, recordings, specimens, strict=False)
+    for run, seen, recording, specimen in each:
+        t, strain = _strains(mesh, run)
+        rate = _largest(np.abs(np.diff(strain)) / np.diff(t)) if seen.timed else None
+        box = None if sides is None else (float(sides.min()), float(sides.max()))
+        found.append(Domain(recording, specimen, _largest(strain), rate, box))
+    return tuple(found)
+
+
+def _largest(values: Floats) -> float | None:
+    return float(values.max()) if len(values) and np.isfinite(values).all() else None
+
+
+def _strains(mesh: Mesh, run: Run) -> tuple[Floats, Floats]:
+    """Times (k,) s and the strains (k,) then; empty where the run keeps neither field nor
+    stretch."""
+    if "stretch" in run.traces:
+        return run.t, np.abs(np.log(np.maximum(run.traces["stretch"].y, np.finfo(float).tiny)))
+    if not len(mesh.cells) or not len(run.u):
+        return np.zeros(0), np.zeros(0)
+    kept = np.unique(np.linspace(0, len(run.u) - 1, _FRAMES).astype(int))
+    strains = [float(np.quantile(hencky(mesh, run.u[i]), _SHARE)) for i in kept]
+    return run.t[run.at[kept]], np.array(strains)
+
+
+def hencky(mesh: Mesh, u: Floats) -> Floats:
+    """Largest principal logarithmic strain (e,) of every cell, by size, under u (n, d) m.
+
+    Of the affine map that fits the cell's vertices best. Infinite for a cell turned inside out.
+    """
+    X, x = mesh.nodes[mesh.corners], (mesh.nodes + u)[mesh.corners]
+    X, x = X - X.mean(axis=1, keepdims=True), x - x.mean(axis=1, keepdims=True)
+    onto = np.einsum("eki,ekj->eij", x, X)
+    F = onto @ np.linalg.inv(np.einsum("eki,ekj->eij", X, X))
+    stretches = np.linalg.svd(F, compute_uv=False)
+    strain = np.abs(np.log(np.maximum(stretches, np.finfo(float).tiny))).max(axis=1)
+    return np.where(np.linalg.det(F) > 0, strain, np.inf)

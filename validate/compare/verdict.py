@@ -300,8 +300,13 @@ def judge(
     named = {"measurement": float(u_D)} | dict(numerical.parts) | {
         name: float(part[w]) for name, part in parts.items()
     }  # fmt: skip
+    # The largest |E| over what chance reaches; 0 for an exact zero without any uncertainty
+    zero = reach == 0
+    over = np.where(
+        zero, np.where(found.E == 0, 0.0, np.inf), np.abs(found.E) / np.where(zero, 1.0, reach)
+    )
     interval = _Interval(
-        float(E), float(u_val), _ratio(found.E, reach), float((np.abs(found.E) - reach).max()),
+        float(E), float(u_val), float(over.max()), float((np.abs(found.E) - reach).max()),
         accept.required, residual.scale, named, numerical, residual.unit,
         _where(found.E, reach, w) if statistic == "every" else "",
     )  # fmt: skip
@@ -413,13 +418,6 @@ def _by_row(change: Floats, found: PointErrors) -> Floats:
     if len(found.E) == len(change):
         return np.asarray(np.linalg.norm(change, axis=1))
     return np.full(len(found.E), rms(change))
-
-
-def _ratio(E: Floats, reach: Floats) -> float:
-    """The largest |E| over what chance reaches; 0 for an exact zero without any uncertainty."""
-    zero = reach == 0
-    over = np.where(zero, np.where(E == 0, 0.0, np.inf), np.abs(E) / np.where(zero, 1.0, reach))
-    return float(over.max())
 
 
 def _where(E: Floats, reach: Floats, at: int) -> str:

@@ -12,8 +12,7 @@ from urllib.parse import urlsplit
 import pooch
 import requests
 
-from validate.datasets.home import cache_folder, whole
-from validate.datasets.registry import DataFile, DataSet
+from validate.datasets.home import DataFile, DataSet, cache_folder, whole
 from validate.errors import RecordingError
 
 # --- Rows of numbers that others keep inside a program, written as the CSV file that is
@@ -98,17 +97,13 @@ def _one(address: str, file: DataFile, place: Path, bar: "_Bar") -> None:
         registered = None if file.rows else f"sha256:{file.sha256}"
         came = Path(pooch.retrieve(address, registered, "file", aside, downloader=loader))
         if file.rows:
-            _write_rows(came, file)
+            # The registered file in the place of its source; `ValueError` where it is another one
+            text = csv_of(came.read_text("utf-8"), file.rows, file.header)
+            came.write_bytes(text.encode())
+            if not whole(came, file):
+                raise ValueError(f"the rows of {file.rows} are not the registered ones")
         place.parent.mkdir(parents=True, exist_ok=True)
         came.replace(place)
-
-
-def _write_rows(source: Path, file: DataFile) -> None:
-    """The registered file in the place of its source; `ValueError` where it is another one."""
-    text = csv_of(source.read_text("utf-8"), file.rows, file.header)
-    source.write_bytes(text.encode())
-    if not whole(source, file):
-        raise ValueError(f"the rows of {file.rows} are not the registered ones")
 
 
 @contextmanager

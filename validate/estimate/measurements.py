@@ -143,9 +143,12 @@ def timetable(measurements: Measurements, dt: float) -> Timetable:
     steps, off = _nearest(t, dt)
     if off.max() > OFF_STEP:
         i = int(off.argmax())
+        # The largest step up to `dt` on which all times land, as advice
+        step = _landed(t, dt)
+        landing = "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
         raise ComparisonError(
             f"measurement at t = {t[i]:g} s lies {off[i]:.2g} steps of {dt:g} s off its nearest "
-            f"step; {_landing(t, dt)}"
+            f"step; {landing}"
         )
     if len(np.unique(steps)) < len(steps):
         raise ComparisonError(
@@ -163,12 +166,6 @@ def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
     ratio = t / dt
     steps = np.rint(ratio).astype(np.int64)
     return steps, np.abs(ratio - steps)
-
-
-def _landing(t: Floats, dt: float) -> str:
-    """The largest step up to `dt` on which all times land, as advice."""
-    step = _landed(t, dt)
-    return "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
 
 
 def _landed(t: Floats, dt: float) -> float | None:

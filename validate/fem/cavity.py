@@ -162,19 +162,15 @@ def volume_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_arra
     In 2-D it is (N, N) without a unit, N = 2 n.
     """
     if positions.shape[1] == 2:
-        return _flat_hessian(surface, positions)
+        count = surface.facets.shape[1]
+        rule = facet_rule(2, count)
+        M = np.einsum("q,qa,qb->ab", rule.weights, rule.N, rule.dN[..., 0])
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+        block = np.einsum("ab,ij->aibj", (M - M.T) / 2, turn)
+        blocks = np.broadcast_to(block, (len(surface.facets), *block.shape))
+        return _assembled(surface, blocks, positions)
     x = positions[surface.facets] - positions[surface.nodes].mean(axis=0)
     blocks = 2 * np.einsum("abc,fcij->faibj", _antisymmetric(x.shape[1]), _cross_matrix(x))
-    return _assembled(surface, blocks, positions)
-
-
-def _flat_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_array:
-    count = surface.facets.shape[1]
-    rule = facet_rule(2, count)
-    M = np.einsum("q,qa,qb->ab", rule.weights, rule.N, rule.dN[..., 0])
-    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
-    block = np.einsum("ab,ij->aibj", (M - M.T) / 2, turn)
-    blocks = np.broadcast_to(block, (len(surface.facets), *block.shape))
     return _assembled(surface, blocks, positions)
 
 

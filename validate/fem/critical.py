@@ -108,13 +108,8 @@ def lanczos_step(
             f"{products} products, margin {margin:g}: expected at least {_FEWEST} products "
             "(fewer overestimate the step) and a margin in 0..0.5"
         )
-    top, open_part, done = _largest(apply, 1 / np.sqrt(masses), products)
-    limit = 2 / float(np.sqrt(top))
-    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
-
-
-def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float, int]:
-    """Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done."""
+    # Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done
+    scale = 1 / np.sqrt(masses)
     m = len(scale)
     q = np.random.default_rng(0).standard_normal(m)
     basis = np.zeros((min(products, m) + 1, m))
@@ -132,7 +127,9 @@ def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float,
         basis[k + 1] = w / betas[-1]
     T = np.diag(alphas) + np.diag(betas[:-1], 1) + np.diag(betas[:-1], -1)
     values, vectors = np.linalg.eigh(T)
-    return float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
+    top, open_part, done = float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
+    limit = 2 / float(np.sqrt(top))
+    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
 
 
 def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:

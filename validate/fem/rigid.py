@@ -17,7 +17,15 @@ def require_held(scene: Scene, held: Ints, more: Floats | None = None, hint: str
     and the rows `more` (m, N) leave free."""
     mesh = scene.mesh
     modes, words = rigid_motions(mesh)
-    rows = [modes[held], modes[_bedded(scene)]]
+    # Unknowns that foundations bind to the ground
+    bedded = [
+        int(node) * mesh.dimension + c
+        for f in scene.foundations
+        if f.stiffness > 0
+        for node in nodes_of(mesh, f.facets)
+        for c in f.components
+    ]
+    rows = [modes[held], modes[bedded]]
     if more is not None:
         rows.append(more @ modes)
     every = np.vstack([*rows, np.zeros((1, len(words)))])
@@ -46,15 +54,3 @@ def rigid_motions(mesh: Mesh) -> tuple[Floats, tuple[str, ...]]:
     turns = ["z"] if d == 2 else list("xyz")
     words = (*(f"along {a}" for a in "xyz"[:d]), *(f"about {a}" for a in turns))
     return modes.reshape(n * d, -1), words
-
-
-def _bedded(scene: Scene) -> list[int]:
-    """Unknowns that foundations bind to the ground."""
-    mesh = scene.mesh
-    return [
-        int(node) * mesh.dimension + c
-        for f in scene.foundations
-        if f.stiffness > 0
-        for node in nodes_of(mesh, f.facets)
-        for c in f.components
-    ]

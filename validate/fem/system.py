@@ -21,8 +21,7 @@ from validate.fem.assembly.assemble import lumped, mass, stiffness, stiffness_da
 from validate.fem.assembly.assemble import mass as mass_matrix
 from validate.fem.assembly.loads import hung_masses, load_columns
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
-from validate.fem.linear_solvers.factor import Factor, factorise, require_assembly
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise, require_assembly
 from validate.fem.rigid import require_held
 from validate.scene.mesh import Mesh
 from validate.scene.places import Place, nodes_of
@@ -171,7 +170,14 @@ def responses(system: System) -> Responses:
     shapes = np.concatenate([mesh.nodes[None], fields])
     forms = [volume_form(c, shapes) for c in system.cavities]
     volumes = np.array(forms).reshape(-1, *(3 * [len(shapes)]))  # also without cavities
-    return Responses(system.scene, fields, _reactions(system, columns, loads), volumes)
+    # Force of each drive on the body along it: residual K u - f of every column
+    drives = len(system.scene.drives)
+    residuals = [system.K @ u for u in columns]
+    for i, load in enumerate(loads):
+        residuals[drives + i] = residuals[drives + i] - load
+    copies = system.scene.copies
+    reactions = np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
+    return Responses(system.scene, fields, reactions, volumes)
 
 
 def _driven_field(system: System, factor: Factor | Fronts, move: Floats) -> Floats:
@@ -184,16 +190,6 @@ def _loaded_field(system: System, factor: Factor | Fronts, load: Floats) -> Floa
     u = np.zeros_like(load)
     u[system.free] = factor.solve(load[system.free])
     return u
-
-
-def _reactions(system: System, columns: list[Floats], loads: list[Floats]) -> Floats:
-    """Force of each drive on the body along it: residual K u - f of every column."""
-    drives = len(system.scene.drives)
-    residuals = [system.K @ u for u in columns]
-    for i, load in enumerate(loads):
-        residuals[drives + i] = residuals[drives + i] - load
-    copies = system.scene.copies
-    return np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
 
 
 def _driven(scene: Scene, drive: Drive) -> Ints:

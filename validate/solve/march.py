@@ -101,7 +101,16 @@ def march(
     traces |= given_traces(stepper.scene, inputs[:done])
     for name, unit in stepper.units.items():
         traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
-    traces |= _totals(stepper.scene, traces)
+    # `<set>.force.<axis>` N of sets that follow tracked points: the sum over the points
+    scene = stepper.scene
+    totals = {}
+    for part in scene.tracked:
+        for c, axis in enumerate(_AXES[: part.places.shape[1]]):
+            of = [traces.get(f"{name}.force") for name in part.inputs[c :: part.places.shape[1]]]
+            forces = [trace.y for trace in of if trace is not None]
+            if forces:
+                totals[f"{part.name}.force.{axis}"] = Trace(np.sum(forces, axis=0), "N")
+    traces |= totals
     traces |= probe_traces(stepper.scene, np.array(walk.probes))
     traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
     seconds = None if smooths else np.array(walk.seconds)[:done]
@@ -109,16 +118,16 @@ def march(
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
-    x = None if points is None else _stacked(walk.points, done, points, u)
+    # (nt, p, d), of no steps too
+    x = (
+        None
+        if points is None
+        else np.array(walk.points).reshape(done, points.weights.shape[0], u.shape[2])
+    )
     return Run(
         method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said),
         points=x,
     )  # fmt: skip
-
-
-def _stacked(found: list[Floats], done: int, points: Rows, u: Floats) -> Floats:
-    """(nt, p, d), of no steps too."""
-    return np.array(found).reshape(done, points.weights.shape[0], u.shape[2])
 
 
 @dataclass(frozen=True)
@@ -235,18 +244,6 @@ def given_traces(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     for mover, y in zip(scene.movers[::-1], columns[::-1], strict=False):
         traces[f"{mover.name}.displacement"] = Trace(y, "m")
     return traces
-
-
-def _totals(scene: Scene, traces: Mapping[str, Trace]) -> dict[str, Trace]:
-    """`<set>.force.<axis>` N of sets that follow tracked points: the sum over the points."""
-    totals = {}
-    for part in scene.tracked:
-        for c, axis in enumerate(_AXES[: part.places.shape[1]]):
-            of = [traces.get(f"{name}.force") for name in part.inputs[c :: part.places.shape[1]]]
-            forces = [trace.y for trace in of if trace is not None]
-            if forces:
-                totals[f"{part.name}.force.{axis}"] = Trace(np.sum(forces, axis=0), "N")
-    return totals
 
 
 def _probe_rows(stepper: Stepper) -> Rows | None:

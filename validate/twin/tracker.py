@@ -93,7 +93,15 @@ class Camera:
         noise = self.sd * seeds["markers"].standard_normal(x.shape)
         noise[0] /= np.sqrt(self.still)
         x = (x + noise) @ self.rotation.T + np.array(self.shift)
-        x += self._strayed(x.shape, seeds["odd"])
+        # How far off (k, p, 3) m looks are; the first one is not
+        rng = seeds["odd"]
+        off = np.zeros(x.shape)
+        if self.outliers:
+            odd = rng.random(x.shape[:2]) < self.outliers
+            odd[0] = False
+            way = rng.standard_normal((int(odd.sum()), 3))
+            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
+        x += off
         unseen = seeds["missing"].random(x.shape[:2]) < self.missing
         unseen[0] = False
         x[unseen] = np.nan
@@ -108,16 +116,6 @@ class Camera:
         flat = points.u.reshape(len(points.t), -1)
         seen = np.stack([np.interp(t, points.t, column) for column in flat.T], axis=1)
         return seen.reshape(len(pick), *points.u.shape[1:])
-
-    def _strayed(self, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
-        """How far off (k, p, 3) m looks are; the first one is not."""
-        off = np.zeros(shape)
-        if self.outliers:
-            odd = rng.random(shape[:2]) < self.outliers
-            odd[0] = False
-            way = rng.standard_normal((int(odd.sum()), 3))
-            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
-        return off
 
 
 def require_noise(variance: float) -> None:
@@ -183,7 +181,13 @@ def record_tracked(
     if clash:
         raise RecordingError(f"markers {clash} are both tracked points and fiducials; rename them")
     lead = 1 if points.t[0] > 0 else 0
-    seen = _with_fiducials(points, fiducials, lead)
+    # The points at rest at t = 0, and the fiducials that never move
+    nt, k, f = len(points.t), len(points.names), len(fiducials)
+    u = np.zeros((nt + lead, k + f, 3))
+    u[lead:, :k] = points.u
+    fixed = np.array(list(fiducials.values())).reshape(f, 3)
+    t = np.concatenate([np.zeros(lead), points.t])
+    seen = Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
     if np.abs(seen.u[0]).max() > _AT_REST:
         raise RecordingError(
             f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
@@ -217,16 +221,6 @@ def record_tracked(
             **clock,
         },
     )
-
-
-def _with_fiducials(points: Points, fiducials: Mapping[str, Floats], lead: int) -> Points:
-    """The points at rest at t = 0, and the fiducials that never move."""
-    nt, k, f = len(points.t), len(points.names), len(fiducials)
-    u = np.zeros((nt + lead, k + f, 3))
-    u[lead:, :k] = points.u
-    fixed = np.array(list(fiducials.values())).reshape(f, 3)
-    t = np.concatenate([np.zeros(lead), points.t])
-    return Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
 
 
 def _led(y: Floats, lead: int, t: Floats, name: str) -> Floats:

@@ -117,7 +117,9 @@ def _amplitude(scanner: Scanner, target: Target, rng: np.random.Generator) -> Fl
     power = 10 ** (texture / 10)
     for outline, level in ((target.second, target.second_level), (target.outline, target.level)):
         if outline is not None:
-            share = coverage(_in_pixels(scanner, outline), shape)
+            if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+                raise SceneError(f"outline {outline.shape}: expected at least 3 points (k, 2) in m")
+            share = coverage(np.asarray(outline / scanner.m_per_px), shape)
             power = power * (1 - share) + 10 ** (level / 10) * share
     return np.asarray(np.sqrt(power))
 
@@ -126,12 +128,6 @@ def _slow(shape: tuple[int, int], size: float, rng: np.random.Generator) -> Floa
     """A smooth random field of sd 1; `size` px."""
     field = gaussian_filter(rng.standard_normal(shape), size, mode="reflect")
     return np.asarray(field / field.std())
-
-
-def _in_pixels(scanner: Scanner, outline: Floats) -> Floats:
-    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-        raise SceneError(f"outline {outline.shape}: expected at least 3 points (k, 2) in m")
-    return np.asarray(outline / scanner.m_per_px)
 
 
 def _losses(scanner: Scanner, target: Target) -> Floats:

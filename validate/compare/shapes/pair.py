@@ -8,8 +8,13 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, checked
-from validate.compare.shapes.boundary import Boundary, deformed_boundary
-from validate.compare.shapes.soundness import Soundness, require_upright, soundness
+from validate.compare.shapes.boundary import (
+    Boundary,
+    Soundness,
+    deformed_boundary,
+    require_upright,
+    soundness,
+)
 from validate.errors import ComparisonError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.assembly.locate import barycentric_rows

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.score import Score
-from validate.compare.shapes.metric import Counted, Metric
+from validate.compare.score import Counted, Metric, Score
 from validate.compare.shapes.pair import Common, Field, FieldPair, count_outside, pair
 from validate.compare.shapes.shape_error import OF_BODIES, SHAPE_METRICS
 from validate.errors import ComparisonError
-from validate.fem.assembly.cells import rule, values_at, volumes_at
+from validate.fem.assembly.assemble import rule, values_at, volumes_at
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 

@@ -17,8 +17,12 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.extended import kernels as kernel
-from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.extended.explicit_filter import (
+    ExplicitFilterStepper,
+    ExplicitStep,
+    beyond,
+    explicit_step,
+)
 from validate.estimate.gating import (
     Care,
     NoiseSettings,

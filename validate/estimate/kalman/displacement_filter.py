@@ -14,15 +14,18 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.gating import Care, gate_numbers, gate_units
-from validate.estimate.kalman.batch import Batch, batch_of, in_amplitudes, stacked_gains
 from validate.estimate.kalman.coordinates import (
+    Batch,
     Coordinates,
     InModes,
     Nodal,
+    batch_of,
     excitation_in,
+    in_amplitudes,
     in_modes,
+    stacked_gains,
 )
-from validate.estimate.kalman.covariance import Claim, Covariance, Dense
+from validate.estimate.kalman.covariance import Claim, Covariance, Dense, walked
 from validate.estimate.kalman.formulas import (
     Gain,
     Innovation,
@@ -31,14 +34,11 @@ from validate.estimate.kalman.formulas import (
     innovation_units,
     nothing,
 )
-from validate.estimate.kalman.gains import Claims, GainSequence
-from validate.estimate.kalman.modal_kernel import walked
-from validate.estimate.kalman.observation_covariance import shared_gains
+from validate.estimate.kalman.gains import Claims, GainSequence, shared_gains
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System
-from validate.solve.dynamic.linear import InertialStepper
-from validate.solve.excitation import Excitation, Inputs
+from validate.solve.dynamic.linear import Excitation, InertialStepper, Inputs
 from validate.solve.types import State
 
 Recursion = Literal["prior", "posterior"]

@@ -33,16 +33,14 @@ from validate.estimate.kalman.displacement_filter import (
     Structure,
     load_shapes,
 )
-from validate.estimate.kalman.gains import GainSequence, schedule
-from validate.estimate.kalman.observation_covariance import shared_gains
+from validate.estimate.kalman.gains import GainSequence, schedule, shared_gains
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.smoother import smooth_setting
 from validate.fem.system import System, once
 from validate.memory import require_memory
 from validate.parameters import quantity
-from validate.solve.dynamic.linear import reactions
+from validate.solve.dynamic.linear import StartName, excitation, reactions
 from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
-from validate.solve.excitation import StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 
 _DENSE = 8  # matrices of all unknowns that the printed recursion holds at once

@@ -60,24 +60,28 @@ class LoadScale:
         H = measurements.free(system.free)
         shape = load_shapes(system, H)[:, 0]
         care = care_of(measurements, self.gate, self.clock, self.dt)
-        core = _core(self, system, shape, H @ shape, measurements.variances(self.R), care)
+        free = system.free
+        m, c, k = (
+            float(shape @ (X[free][:, free] @ shape)) for X in (system.M, system.C, system.K)
+        )
+        ratio = c / (2 * np.sqrt(m * k))
+        if ratio < OVERDAMPED:
+            raise SceneError(
+                f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
+                f"without inertia needs {OVERDAMPED:g}; use ReducedKf"
+            )
+        per_newton = float(shape @ system.loads[free, 0]) / k
+        core = ScaleCore(
+            self,
+            shape,
+            H @ shape,
+            measurements.variances(self.R),
+            float(np.exp(-self.dt * k / c)),
+            per_newton,
+            care,
+        )
         table = timetable(measurements, self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
-
-
-def _core(
-    settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats, care: Care | None
-) -> "ScaleCore":
-    free = system.free
-    m, c, k = (float(s @ (X[free][:, free] @ s)) for X in (system.M, system.C, system.K))
-    ratio = c / (2 * np.sqrt(m * k))
-    if ratio < OVERDAMPED:
-        raise SceneError(
-            f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
-            f"without inertia needs {OVERDAMPED:g}; use ReducedKf"
-        )
-    per_newton = float(s @ system.loads[free, 0]) / k
-    return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton, care)
 
 
 @dataclass(frozen=True)

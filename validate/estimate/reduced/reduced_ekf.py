@@ -23,8 +23,12 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.extended.explicit_filter import (
+    ExplicitFilterStepper,
+    ExplicitStep,
+    beyond,
+    explicit_step,
+)
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Recursion
 from validate.estimate.kalman.formulas import Gain, Innovation, innovation
@@ -286,21 +290,16 @@ class ShapesCore:
     ) -> tuple[ShapesMemory, Innovation]:
         shown = self.rows @ memory.u[self.sensed]
         if self.care is not None:
-            return self._heeded(self.care, memory, number, z, shown)
+            assert memory.claim is not None
+            moved = shown - self.rows @ memory.before[self.sensed]
+            claim = self.recursion.predict(memory.claim, number - memory.at)
+            gain, claim, found, _ = self.care.update(self.recursion, claim, z, shown, moved)
+            if gain is None:
+                return replace(memory, taken=None), found
+            return self._moved(memory, gain, found, number, claim), found
         gain = self.updates[number].gain
         found = innovation(z, shown, gain)
         return self._moved(memory, gain, found, number, None), found
-
-    def _heeded(
-        self, care: Care, memory: ShapesMemory, number: int, z: Floats, shown: Floats
-    ) -> tuple[ShapesMemory, Innovation]:
-        assert memory.claim is not None
-        moved = shown - self.rows @ memory.before[self.sensed]
-        claim = self.recursion.predict(memory.claim, number - memory.at)
-        gain, claim, found, _ = care.update(self.recursion, claim, z, shown, moved)
-        if gain is None:
-            return replace(memory, taken=None), found
-        return self._moved(memory, gain, found, number, claim), found
 
     def _moved(
         self, memory: ShapesMemory, gain: Gain, found: Innovation, number: int, claim: Claim | None

@@ -1,7 +1,7 @@
 """Strain and stress of every cell, averaged over its points, for display.
 
 Mixed and averaged volume changes are those of the points here, so that pressures of a mean
-dilatation element are not the ones that it was solved with (`fem.assembly.mean_dilatation` has
+dilatation element are not the ones that it was solved with (`fem.assembly.assemble` has
 those).
 """
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.assembly.assemble import stiffness_points
+from validate.fem.laws.energies import green_strain
 from validate.fem.laws.law import law_of
-from validate.fem.laws.tensors import green_strain
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 

@@ -40,18 +40,8 @@ def hung_masses(scene: Scene) -> Floats:
 
 def _pushed(mesh: Mesh, load: Pressure) -> Floats:
     """Forces (n, 3) N of one Pa: -integral of N_a n dA over the undeformed faces, n outward."""
-    facets = _outward(mesh, load)
-    rule = facet_rule(3, facets.shape[1])
-    J = rule.jacobians(mesh.nodes[facets])
-    normal = np.cross(J[..., 0], J[..., 1])
-    found = np.zeros_like(mesh.nodes)
-    np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
-    return found
-
-
-def _outward(mesh: Mesh, load: Pressure) -> Ints:
-    """The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
-    facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body."""
+    # The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
+    # facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body
     if mesh.dimension != 3:
         raise SceneError(f"pressure '{load.name}': supported for 3-D meshes, not for {mesh.kind}")
     outside = {tuple(row): i for i, row in enumerate(np.sort(mesh.surface, axis=1).tolist())}
@@ -62,7 +52,13 @@ def _outward(mesh: Mesh, load: Pressure) -> Ints:
             f"pressure '{load.name}': {at.count(-1)} of {len(at)} faces lie inside the body; "
             "choose faces of its surface"
         )
-    return np.asarray(mesh.surface[at])
+    facets = np.asarray(mesh.surface[at])
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    normal = np.cross(J[..., 0], J[..., 1])
+    found = np.zeros_like(mesh.nodes)
+    np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
+    return found
 
 
 def _nodal(mesh: Mesh, load: Load) -> Floats:

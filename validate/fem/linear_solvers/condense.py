@@ -17,8 +17,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.cavity import CavitySurface
-from validate.fem.linear_solvers.factor import Factor
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.memory import require_memory

@@ -20,8 +20,14 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import DampingTerms, MassName, System
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, Rung, SwingingBody
-from validate.solve.dynamic.linear import Moving, MovingStepper, reactions
+from validate.solve.dynamic.linear import (
+    DriveRates,
+    Moving,
+    MovingStepper,
+    StartName,
+    excitation,
+    reactions,
+)
 from validate.solve.dynamic.newmark_rule import (
     Propagation,
     RuleName,
@@ -29,11 +35,20 @@ from validate.solve.dynamic.newmark_rule import (
     require_start,
     rule_of,
 )
-from validate.solve.excitation import DriveRates, StartName, excitation
 from validate.solve.explicit.linear import highest_frequency
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
-from validate.solve.stepping import LOOSE, Rates, Stepping, implicit_maps, newmark_maps
+from validate.solve.study_entries import (
+    LOOSE,
+    Asked,
+    Rates,
+    Rival,
+    Rung,
+    Stepping,
+    SwingingBody,
+    implicit_maps,
+    newmark_maps,
+)
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 # --- Paper 002's Newmark update as it is printed, and the step up to which it is stable.

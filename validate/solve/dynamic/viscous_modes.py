@@ -2,8 +2,9 @@
 
 M u'' + C u' + K (u - u_0) + sum of K_iso q_i = 0 and q_i' + q_i/tau_i = g_i u', with the tangent K
 at the equilibrium u_0 under the loads, and K_iso what the isochoric law's relaxing stress adds to
-it (`fem.laws.viscous`). On the lowest modes of K and M that is a linear system of first order,
-stepped by its matrix exponential: no step is too long. The body starts at rest and undeformed.
+it (`fem.laws.viscoelasticity`). On the lowest modes of K and M that is a linear system of first
+order, stepped by its matrix exponential: no step is too long. The body starts at rest and
+undeformed.
 
 Departures: everything of second order about u_0 is left out, so that a beam that swings by a tenth
 of its length shortens by too little; loads are constant from t = 0 on.
@@ -61,7 +62,11 @@ class ViscousModes:
         setup = perf_counter() - start
         q = _walked(found, scene.material.prony, t)
         u = found.equilibrium + np.einsum("ti,ind->tnd", q, found.shapes)
-        return _told(scene, t, inputs, u, setup)
+        traces = {"updates": Trace(np.zeros(len(t)), "1")} | given_traces(scene, inputs)
+        if scene.probes:
+            rows = probe_rows(scene.mesh, scene.probes)
+            traces |= probe_traces(scene, np.array([rows.apply(frame) for frame in u]))
+        return Run("", t, np.arange(len(t)), u, traces, Outcome("finished", len(t)), setup, None)
 
 
 @dataclass(frozen=True)
@@ -144,11 +149,3 @@ def _walked(found: _Vibrations, prony: Prony, t: Floats) -> Floats:
         x = over[dt] @ x
         q[i] = x[:r]
     return q
-
-
-def _told(scene: Scene, t: Floats, inputs: Floats, u: Floats, setup: float) -> Run:
-    traces = {"updates": Trace(np.zeros(len(t)), "1")} | given_traces(scene, inputs)
-    if scene.probes:
-        rows = probe_rows(scene.mesh, scene.probes)
-        traces |= probe_traces(scene, np.array([rows.apply(frame) for frame in u]))
-    return Run("", t, np.arange(len(t)), u, traces, Outcome("finished", len(t)), setup, None)

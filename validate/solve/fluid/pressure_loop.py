@@ -23,7 +23,6 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.fluid.cavities import FLUID, Settling
 from validate.solve.fluid.pressure_curve import (
     RATIOS,
@@ -35,6 +34,7 @@ from validate.solve.fluid.pressure_curve import (
 )
 from validate.solve.handles import Handles, require_handled
 from validate.solve.static.quasi_static import condensed
+from validate.solve.study_entries import Asked, Rival, StillBody
 from validate.solve.types import State, Stepper
 
 UpdateName = Literal["proportional", "retuned", "piecewise", "secant", "newton", "golden"]
@@ -147,17 +147,12 @@ class LoopStepper(Settling):
             case "piecewise":
                 return np.array([self._chord(float(error[0]))])
             case "secant" if before is not None:
-                return self._secant(z, error, gains, before)
+                # Each cavity by the slope it has just shown, by the gain where it showed none
+                moved, gone = z[self.responses.drives + 1 :] - before[0], before[1] - error
+                seen = np.abs(gone) > _FLAT
+                found = np.divide(moved, gone, out=np.diag(gains).copy(), where=seen)
+                return np.asarray(found * error)
         return np.asarray(gains @ error)
-
-    def _secant(
-        self, z: Floats, error: Floats, gains: Floats, before: tuple[Floats, Floats]
-    ) -> Floats:
-        """Each cavity by the slope it has just shown, by the gain where it showed none."""
-        moved, gone = z[self.responses.drives + 1 :] - before[0], before[1] - error
-        seen = np.abs(gone) > _FLAT
-        found = np.divide(moved, gone, out=np.diag(gains).copy(), where=seen)
-        return np.asarray(found * error)
 
     def _chord(self, error: float) -> float:
         """Pa between V/V0 = 1 - error and 1 on the curve of the cavity alone, in pieces of 1 %."""

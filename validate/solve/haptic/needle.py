@@ -199,7 +199,12 @@ class NeedleLoop:
                 "accepts no drives; remove them"
             )
         tool = scene.tools[0]
-        _require_outside(scene, tool)
+        rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
+        if float(rows.outside[0]) < _ON:
+            at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
+            raise SceneError(
+                f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out"
+            )
         facets = facets_of(scene.mesh, tool.facets)
         small = condense(system, np.unique(facets))
         numbers = np.searchsorted(small.nodes, facets)
@@ -210,19 +215,11 @@ class NeedleLoop:
                 f"needle '{tool.name}': all {len(facets)} facets that it may touch are held or "
                 "driven; choose a free face"
             )
-        small.prefetch(_unknowns_of(np.unique(touchable), scene.mesh.dimension))
+        unknowns_of = (
+            np.unique(touchable)[:, None] * scene.mesh.dimension + np.arange(scene.mesh.dimension)
+        ).ravel()
+        small.prefetch(unknowns_of)
         return NeedleStepper(self, small, tool, Surface(touchable, scene.mesh.dimension))
-
-
-def _require_outside(scene: Scene, tool: Needle) -> None:
-    rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
-    if float(rows.outside[0]) < _ON:
-        at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
-        raise SceneError(f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out")
-
-
-def _unknowns_of(nodes: Ints, d: int) -> Ints:
-    return (nodes[:, None] * d + np.arange(d)).ravel()
 
 
 @dataclass(frozen=True)

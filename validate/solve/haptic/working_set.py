@@ -66,7 +66,14 @@ class WorkingSet:
         every = (*self.rows, *rows)
         coupling = np.array([[r.weights @ c[r.unknowns] for r in every] for c in columns])
         coupling = (coupling + coupling.T) / 2
-        _require_independent(coupling)
+        # Every compliance that is left beside the others, as pivots of the scaled matrix
+        own = np.sqrt(np.abs(np.diag(coupling)))
+        sizes = np.linalg.eigvalsh(coupling / np.outer(own, own)) if own.all() else np.zeros(1)
+        if not sizes[0] > _DEPENDENT:
+            raise SceneError(
+                f"a prescribed motion along one of {len(coupling)} axes follows from the others, "
+                f"or is already held: {sizes[0]:.1e} of its compliance remains"
+            )
         return WorkingSet(condensed, every, columns, coupling, bases)
 
     def without(self, index: int) -> "WorkingSet":
@@ -101,17 +108,6 @@ def _column(condensed: Condensed, row: Imposed) -> Floats:
         if weight:
             found += weight * condensed.column(unknown)
     return found
-
-
-def _require_independent(coupling: Floats) -> None:
-    """Every compliance that is left beside the others, as pivots of the scaled matrix."""
-    own = np.sqrt(np.abs(np.diag(coupling)))
-    sizes = np.linalg.eigvalsh(coupling / np.outer(own, own)) if own.all() else np.zeros(1)
-    if not sizes[0] > _DEPENDENT:
-        raise SceneError(
-            f"a prescribed motion along one of {len(coupling)} axes follows from the others, "
-            f"or is already held: {sizes[0]:.1e} of its compliance remains"
-        )
 
 
 def displaced(system: WorkingSet, z: Floats, targets: Sequence[float]) -> tuple[Floats, Floats]:

@@ -21,9 +21,9 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.solve.regions.primary import PrimarySolver
-from validate.solve.regions.solvers import (
+from validate.solve.regions.primary import (
     EXPLICIT,
+    PrimarySolver,
     RegionMatrices,
     RegionSolver,
     SolverName,
@@ -106,7 +106,10 @@ class Coupled:
         """Return the next tick under forces f (m,) N."""
         k, pieces, visible = last.k + 1, list(last.pieces), last.visible.copy()
         for zone, piece in zip(self.zones[1:], pieces[1:], strict=True):
-            visible[zone.own] = self._shown(zone, piece, zone.share(k))
+            u = piece.u[zone.shown]
+            visible[zone.own] = (
+                piece.start + zone.share(k) * (u - piece.start) if self.border == "delayed" else u
+            )
         due = tuple(i for i, zone in enumerate(self.zones) if k % zone.ratio == 0)
         if self.border == "joint" and len(due) > 1:
             self._solve_jointly(due, pieces, visible, f)
@@ -117,10 +120,6 @@ class Coupled:
             if self.zones[i].name in EXPLICIT:
                 pieces[i] = replace(pieces[i], seen=visible)
         return Motion(k, tuple(pieces), visible)
-
-    def _shown(self, zone: Zone, piece: Piece, share: float) -> Floats:
-        u = piece.u[zone.shown]
-        return piece.start + share * (u - piece.start) if self.border == "delayed" else u
 
     def _solve(self, i: int, last: Motion, pieces: list[Piece], visible: Floats, f: Floats) -> None:
         zone, piece = self.zones[i], pieces[i]
@@ -145,7 +144,14 @@ class Coupled:
     ) -> None:
         """All regions that are due as one system, each unknown with its own period."""
         if due not in self.joints:
-            self.joints[due] = self._joint(due)
+            zones = [self.zones[i] for i in due]
+            at = np.concatenate([z.wide for z in zones])
+            periods = [
+                np.full(len(z.wide), np.inf if z.name == "static" else z.ratio * self.dt)
+                for z in zones
+            ]
+            joint = semi_implicit(self.body, at, np.concatenate(periods))
+            self.joints[due] = at, joint, _outside(self.body.K, at)
         at, solver, outside = self.joints[due]
         u = np.concatenate([pieces[i].u for i in due])
         before = np.concatenate([pieces[i].before for i in due])
@@ -153,15 +159,6 @@ class Coupled:
         ends = np.cumsum([len(self.zones[i].wide) for i in due])
         for i, part in zip(due, np.split(new, ends[:-1]), strict=True):
             self._take(i, part, pieces, visible)
-
-    def _joint(self, due: tuple[int, ...]) -> tuple[Ints, RegionSolver, sparse.csr_array]:
-        zones = [self.zones[i] for i in due]
-        at = np.concatenate([z.wide for z in zones])
-        periods = [
-            np.full(len(z.wide), np.inf if z.name == "static" else z.ratio * self.dt) for z in zones
-        ]
-        solver = semi_implicit(self.body, at, np.concatenate(periods))
-        return at, solver, _outside(self.body.K, at)
 
 
 def zone_of(

@@ -1,34 +1,151 @@
-"""Primary region with a law of its own: large strain or viscoelastic.
+"""Solvers of a region, and the primary region with a law of its own (paper 004).
 
 What paper 004 names as future work. The body's own linear stiffness stays everywhere; the cells all
 of whose free nodes are in the primary region add what their law has beyond it, r(u) = f(u) - K u.
 Such cells touch no other region's nodes, so what regions show each other is as in the linear body.
 
-A law at large strain is `fem.large_strain.hyperelastic`, with a Prony series `fem.laws.viscous`. In
-the linear law the isochoric stress relaxes alike: r = sum of h_i, dh_i/dt + h_i/tau_i = g_i K_iso
-du/dt, by the same recursion. K_iso is the stiffness less that of its volume change, 2 K(kappa) -
-K(2 kappa).
+A law at large strain is `fem.large_strain.hyperelastic`, with a Prony series
+`fem.laws.viscoelasticity`. In the linear law the isochoric stress relaxes alike: r = sum of h_i,
+dh_i/dt + h_i/tau_i = g_i K_iso du/dt, by the same recursion. K_iso is the stiffness less that of
+its volume change, 2 K(kappa) - K(2 kappa).
+
+Solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one. All carry the
+displacements u now and u- one period T before. The other regions enter by their displacements on
+the right side (eq 7).
+
+Departures: the definition of eq 3 is lost in the text we have. It is taken as (M/T^2 + C/2T + K) u+
+= f + M/T^2 (2 u - u-) + C/2T u-, which gives the paper's whole-model peaks.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.viscoelasticity import Branches, cell_branches, relaxed
-from validate.fem.linear_solvers.factor import Factor, factorise
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise
 from validate.scene.material import LawName, Material, Prony
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.regions.solvers import RegionMatrices, RegionSolver, SemiImplicit
+
+SolverName = Literal["semi_implicit", "explicit", "euler", "static"]
+EXPLICIT: tuple[SolverName, ...] = ("explicit", "euler")
+_DENSE = 60  # unknowns below which Lanczos needs more vectors than there are
+
+
+@dataclass(frozen=True)
+class RegionMatrices:
+    """K (m, m) N/m over the free unknowns, lumped masses m (m,) kg, damping c (m,) N s/m.
+
+    Unknown i belongs to node `node[i]`, which rests at `places[node[i]]` m.
+    """
+
+    K: sparse.csr_array
+    m: Floats
+    c: Floats
+    node: Ints
+    places: Floats
+
+
+class RegionSolver(Protocol):
+    """`next` gives u+ (w,) from u, u- (w,) and forces (w,) less what the others' displacements
+    bring; trailing columns are independent states."""
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats: ...
+
+
+def across(d: Floats, x: Floats) -> Floats:
+    """d (w,) beside x (w,) or (w, q)."""
+    return d if x.ndim == 1 else d[:, None]
+
+
+@dataclass(frozen=True)
+class SemiImplicit:
+    """Eq 3; `inertia` M/T^2 and `damping` C/2T (w,). Static: both are zero."""
+
+    factor: Factor | Fronts
+    inertia: Floats
+    damping: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        M, C = across(self.inertia, u), across(self.damping, u)
+        return self.factor.solve(f + M * (2 * u - before) + C * before)
+
+
+@dataclass(frozen=True)
+class Explicit:
+    """Eq 5 with its K (w, w), `half` c T / 2 m and `gain` T^2/m (w,)."""
+
+    K: sparse.csr_array
+    half: Floats
+    gain: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        half, gain = across(self.half, u), across(self.gain, u)
+        return np.asarray(u + ((1 - half) * (u - before) + gain * (f - self.K @ u)) / (1 + half))
+
+
+@dataclass(frozen=True)
+class ImplicitExplicit:
+    """Eq 6: the new velocity from old forces, the new place from the new velocity."""
+
+    K: sparse.csr_array
+    half: Floats
+    gain: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        half, gain = across(self.half, u), across(self.gain, u)
+        return np.asarray(u + (1 - 2 * half) * (u - before) + gain * (f - self.K @ u))
+
+
+def semi_implicit(body: RegionMatrices, at: Ints, T: Floats) -> SemiImplicit:
+    """Eq 3 on the unknowns `at` (w,), each with its own period T (w,) s; infinite: static."""
+    inertia, damping = body.m[at] / T**2, body.c[at] / (2 * T)
+    A = sparse.csr_array(body.K[at][:, at] + sparse.diags_array(inertia + damping))
+    return SemiImplicit(factorise(A, body.node[at], body.places), inertia, damping)
+
+
+def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> RegionSolver:
+    """Return the named solver of the unknowns `at` (w,), once every T s."""
+    if name in ("semi_implicit", "static"):
+        return semi_implicit(body, at, np.full(len(at), np.inf if name == "static" else T))
+    kind = Explicit if name == "explicit" else ImplicitExplicit
+    K = sparse.csr_array(body.K[at][:, at])
+    return kind(K, body.c[at] * T / (2 * body.m[at]), T**2 / body.m[at])
+
+
+def critical_period(
+    name: SolverName, body: RegionMatrices, at: Ints, taut: sparse.csr_array | None = None
+) -> float:
+    """Return the longest stable T s of an explicit region whose neighbours stand still; else
+    infinite.
+
+    `taut` (w, w) N/m is what a law adds to K at once. Eq 5: 2/w, whatever the damping. Eq 6:
+    w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.
+    """
+    if name not in EXPLICIT:
+        return np.inf
+    root = sparse.diags_array(1 / np.sqrt(body.m[at]))
+    K = body.K[at][:, at] if taut is None else body.K[at][:, at] + taut
+    A = root @ K @ root
+    if len(at) < _DENSE:
+        square = float(np.linalg.eigvalsh(A.toarray())[-1])
+    else:
+        start = np.random.default_rng(0).standard_normal(len(at))
+        square = float(eigsh(A, k=1, which="LA", v0=start, return_eigenvectors=False)[0])
+    if name == "explicit":
+        return float(2 / np.sqrt(square))
+    c = float((body.c[at] / body.m[at]).max())
+    return float(4 / (np.sqrt(c**2 + 4 * square) + c))
+
 
 _CONTRACTION = 0.2  # of the residual, that keeps a factorisation
 _ROUNDING = 1e-15  # of the cells' unit force

@@ -26,11 +26,17 @@ from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.spring_probe import Hold, SpringProbe
-from validate.solve.regions.body import RegionBody, RegionPlan, Regions, require_one_probe
-from validate.solve.regions.map import PrimarySize, SizeName, ratios
+from validate.solve.regions.body import (
+    PrimarySize,
+    RegionBody,
+    RegionPlan,
+    Regions,
+    SizeName,
+    ratios,
+    require_one_probe,
+)
 from validate.solve.regions.march import BorderName, Motion, carried
-from validate.solve.regions.primary import PrimaryLaw, UnsettledError
-from validate.solve.regions.solvers import EXPLICIT, SolverName
+from validate.solve.regions.primary import EXPLICIT, PrimaryLaw, SolverName, UnsettledError
 from validate.solve.types import Ending, State, Stepper
 
 _AXES = "xyz"
@@ -139,16 +145,14 @@ class AsyncRegions:
         require_one_probe(system)
         tool, body = scene.tools[0], RegionBody.of(system)
         every, words = ratios(self.rates, self.dt)
+        primary = None
+        if self.of_its_own:
+            primary = PrimaryLaw(system.scene, system.free, self.law, self.prony)
         plan = RegionPlan(body, self.dt, self.layers, every, self.solvers, self.border,
-                          self.overlap, {}, self._primary(system))  # fmt: skip
+                          self.overlap, {}, primary)  # fmt: skip
         probe = SpringProbe(body, np.array(tool.axis), self.spring, self.reach, self.pad, self.grip,
                       self.slides)  # fmt: skip
         return RegionStepper(self, system, tool, body, plan, probe, words)
-
-    def _primary(self, system: System) -> PrimaryLaw | None:
-        if not self.of_its_own:
-            return None
-        return PrimaryLaw(system.scene, system.free, self.law, self.prony)
 
 
 @dataclass(frozen=True)

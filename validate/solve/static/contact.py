@@ -16,7 +16,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.large_strain.elastic import Elastic, elastic
+from validate.fem.large_strain.hyperelastic import Elastic, elastic
 from validate.fem.linear_solvers.factor import (
     elimination_order,
     factorise_general,
@@ -133,27 +133,22 @@ class ContactNewton:
         require_handled(scene, self)
         N, free = len(system.moves), system.free
         parts = candidates(system)
-        require_held(
-            scene, system.held, _touched_rows(parts, scene), ", or place it in contact at rest"
-        )
+        # Rows (m, N) of what the nodes that touch at rest are held along
+        x = scene.mesh.nodes[parts.nodes]
+        gaps, normals = parts.look(x, np.zeros_like(x))
+        rows = []
+        for i in np.flatnonzero(gaps < INSIDE * np.ptp(scene.mesh.nodes, axis=0).max()):
+            along = np.eye(x.shape[1]) if parts.friction[i] else normals[[i]]
+            full = np.zeros((len(along), scene.mesh.nodes.size))
+            full[:, parts.unknowns[i]] = along
+            rows.append(full)
+        touched_rows = np.concatenate([*rows, np.zeros((0, scene.mesh.nodes.size))])
+        require_held(scene, system.held, touched_rows, ", or place it in contact at rest")
         node, K = free // scene.mesh.dimension, system.K[free][:, free]
         order = elimination_order(K, node, scene.mesh.nodes)
         rank = np.empty(N, dtype=np.int64)
         rank[free[order]] = np.arange(len(free))
         return ContactStepper(self, system, elastic(system), rank, parts)
-
-
-def _touched_rows(parts: Candidates, scene: Scene) -> Floats:
-    """Rows (m, N) of what the nodes that touch at rest are held along."""
-    x = scene.mesh.nodes[parts.nodes]
-    gaps, normals = parts.look(x, np.zeros_like(x))
-    rows = []
-    for i in np.flatnonzero(gaps < INSIDE * np.ptp(scene.mesh.nodes, axis=0).max()):
-        along = np.eye(x.shape[1]) if parts.friction[i] else normals[[i]]
-        full = np.zeros((len(along), scene.mesh.nodes.size))
-        full[:, parts.unknowns[i]] = along
-        rows.append(full)
-    return np.concatenate([*rows, np.zeros((0, scene.mesh.nodes.size))])
 
 
 @dataclass(frozen=True)
@@ -314,12 +309,11 @@ class ContactStepper:
         acting = self.body.force(now.u) - self._loads(now.inputs)
         forces = copies * (acting @ self.system.moves)
         numbers = {f"{d.name}.force": float(x) for d, x in zip(scene.drives, forces, strict=True)}
-        numbers |= contact_numbers(self.parts, scene, self._now(now))
-        return numbers | {"energy.strain": self.body.energy(now.u)}
-
-    def _now(self, now: InTouch) -> Touched:
         x = self.scene.mesh.nodes + now.u.reshape(self.scene.mesh.nodes.shape)
-        return Touched(x, now.inputs, now.forces, now.status, now.work)
+        numbers |= contact_numbers(
+            self.parts, scene, Touched(x, now.inputs, now.forces, now.status, now.work)
+        )
+        return numbers | {"energy.strain": self.body.energy(now.u)}
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""

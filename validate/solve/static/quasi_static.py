@@ -9,14 +9,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.incompressible import keep_volumes
+from validate.fem.assembly.mixed import keep_volumes
 from validate.fem.system import Responses, System
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.dynamic.linear import InertialStepper, reactions
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.stepping import Rates, Stepping
+from validate.solve.study_entries import Asked, Rates, Rival, Stepping, StillBody
 from validate.solve.types import Ending, State, Stepper
 
 # --- Steppers that superpose response columns: what all linear quasi-static schemes share.

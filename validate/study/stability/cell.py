@@ -23,7 +23,7 @@ from validate.pipeline.run.job import Job
 from validate.scene.scene import Scene
 from validate.solve.explicit.linear import ExplicitLinear, stable_step
 from validate.solve.schemes import steppings_for
-from validate.solve.stepping import Stepping
+from validate.solve.study_entries import Stepping
 from validate.study.stability.plan import StabilityCell
 from validate.study.stability.precision import Drift, Rounding, drift, rounding
 
