@@ -87,10 +87,7 @@ class Published:
             return "moved", (
                 f"our value moved from {self.expected:g} to {ours:g}, beyond {self.drift:g}"
             )
-        return self._beside(ours)
-
-    def _beside(self, ours: float) -> tuple[PublishedVerdict, str]:
-        """A finite value of ours against theirs, where both claim and tolerance compare them."""
+        # A finite value of ours against theirs, where both claim and tolerance compare them
         if self.theirs is None or self.tolerance is None:
             return self.claim, ""
         off = abs(ours - self.theirs)
@@ -163,7 +160,11 @@ class Figure:
         ours, reason, missing = None, "", ""
         try:
             if not self.other:
-                ours = self._ours(values)
+                if isinstance(self.of, str):
+                    owner, _, score = self.of.partition(":")
+                    ours = values[owner][score]
+                elif self.of is not None:
+                    ours = self.of(values)
                 reason = self.reason if isinstance(self.reason, str) else self.reason(values)
         except KeyError as absent:
             missing = f"no score {absent}"
@@ -171,14 +172,6 @@ class Figure:
             self.name, ours, self.theirs, self.tolerance, self.unit, self.claim, reason,
             self.source, self.expected, self.drift, missing, self.window, self.other, self.setting,
         )  # fmt: skip
-
-    def _ours(self, values: Values) -> float | None:
-        if self.of is None:
-            return None
-        if not isinstance(self.of, str):
-            return self.of(values)
-        owner, _, score = self.of.partition(":")
-        return values[owner][score]
 
 
 def setting(

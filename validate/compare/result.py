@@ -80,13 +80,10 @@ def _uses(recording: Recording, registered: Sequence[Registered]) -> Iterator[St
     for topic, stream in recording.streams.items():
         use = _use(topic, stream, roles, found_in)
         why = use or _why_not(stream, recording, roles)
-        yield StreamUse(recording.name, topic, _kind(stream), bool(use), why)
+        kind = next(name for kind, name in _KINDS if isinstance(stream, kind))
+        yield StreamUse(recording.name, topic, kind, bool(use), why)
     for topic, why in recording.unread.items():
         yield StreamUse(recording.name, topic, "not read", False, why)
-
-
-def _kind(stream: Stream) -> str:
-    return next(name for kind, name in _KINDS if isinstance(stream, kind))
 
 
 def _use(topic: str, stream: Stream, roles: Mapping[str, str], found_in: Mapping[str, str]) -> str:
@@ -275,7 +272,15 @@ def domains(
     found = []
     each = zip(method.runs, method.registered, recordings, specimens, strict=False)
     for run, seen, recording, specimen in each:
-        t, strain = _strains(mesh, run)
+        # Times (k,) s and the strains (k,) then; none where a run keeps neither field nor stretch
+        t, strain = np.zeros(0), np.zeros(0)
+        if "stretch" in run.traces:
+            stretch = np.maximum(run.traces["stretch"].y, np.finfo(float).tiny)
+            t, strain = run.t, np.abs(np.log(stretch))
+        elif len(mesh.cells) and len(run.u):
+            kept = np.unique(np.linspace(0, len(run.u) - 1, _FRAMES).astype(int))
+            t = run.t[run.at[kept]]
+            strain = np.array([float(np.quantile(hencky(mesh, run.u[i]), _SHARE)) for i in kept])
         rate = _largest(np.abs(np.diff(strain)) / np.diff(t)) if seen.timed else None
         box = None if sides is None else (float(sides.min()), float(sides.max()))
         found.append(Domain(recording, specimen, _largest(strain), rate, box))
@@ -284,18 +289,6 @@ def domains(
 
 def _largest(values: Floats) -> float | None:
     return float(values.max()) if len(values) and np.isfinite(values).all() else None
-
-
-def _strains(mesh: Mesh, run: Run) -> tuple[Floats, Floats]:
-    """Times (k,) s and the strains (k,) then; empty where the run keeps neither field nor
-    stretch."""
-    if "stretch" in run.traces:
-        return run.t, np.abs(np.log(np.maximum(run.traces["stretch"].y, np.finfo(float).tiny)))
-    if not len(mesh.cells) or not len(run.u):
-        return np.zeros(0), np.zeros(0)
-    kept = np.unique(np.linspace(0, len(run.u) - 1, _FRAMES).astype(int))
-    strains = [float(np.quantile(hencky(mesh, run.u[i]), _SHARE)) for i in kept]
-    return run.t[run.at[kept]], np.array(strains)
 
 
 def hencky(mesh: Mesh, u: Floats) -> Floats:

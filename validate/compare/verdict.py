@@ -291,7 +291,11 @@ def judge(
     """Both answers about one residual; where nothing bounds u_num neither can be given."""
     statistic: Statistic = accept.statistic if residual.count > 1 else "every"
     found = errors_of(residual, statistic)
-    parts = {s.name: _by_row(s.change.values, found) for s in inputs}
+    parts = {}  # what every input does to every error (n,); its rms where that is not known by row
+    for s in inputs:
+        change, n = s.change.values, len(found.E)
+        by_row = n == len(change)
+        parts[s.name] = np.linalg.norm(change, axis=1) if by_row else np.full(n, rms(change))
     u_input = np.sqrt(sum((p**2 for p in parts.values()), start=np.zeros(len(found.E))))
     others = np.hypot(u_input, numerical.u)
     w = found.worst(others)
@@ -411,13 +415,6 @@ def _noise_free(raw: float, noise: float, m: int) -> tuple[float, float]:
     x = m * max(raw / noise, 1.0) ** 2
     low, high = (noise * math.sqrt(float(chndtrinc(x, m, p)) / m) for p in (1 - ALPHA, ALPHA / 2))
     return E, max(E - low, high - E) / 2
-
-
-def _by_row(change: Floats, found: PointErrors) -> Floats:
-    """What an input does to every error (n,); its rms where that is not known row by row."""
-    if len(found.E) == len(change):
-        return np.asarray(np.linalg.norm(change, axis=1))
-    return np.full(len(found.E), rms(change))
 
 
 def _where(E: Floats, reach: Floats, at: int) -> str:

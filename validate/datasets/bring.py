@@ -4,7 +4,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -36,21 +36,13 @@ def csv_of(text: str, function: str, header: str) -> str:
     begin = text.find(f"function {function}(")
     end = text.find("\nend", begin)
     body = text[begin:end] if 0 <= begin < end else ""
-    rows = _series(body) or [tuple(map(float, pair)) for pair in _PAIR.findall(body)]
+    rows: list[tuple[float, ...]] = []
+    for first, *lists in _SERIES.findall(body):
+        columns = [[float(number) for number in re.findall(_NUMBER, text)] for text in lists]
+        rows += [(float(first), *row) for row in zip(*columns, strict=False)]
+    rows = rows or [tuple(map(float, pair)) for pair in _PAIR.findall(body)]
     lines = [header, *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     return "\n".join(lines) + "\n"
-
-
-def _series(body: str) -> list[tuple[float, ...]]:
-    return [
-        (float(first), *row)
-        for first, *lists in _SERIES.findall(body)
-        for row in zip(*map(_listed, lists), strict=False)
-    ]
-
-
-def _listed(text: str) -> Sequence[float]:
-    return [float(number) for number in re.findall(_NUMBER, text)]
 
 
 # -------------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import tomllib
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
@@ -70,11 +69,11 @@ class DataSet:
 @functools.cache
 def data_sets() -> tuple[DataSet, ...]:
     """All that are registered, as the table lists them."""
-    return tuple(_data_set(entry) for entry in tomllib.loads(_TABLE.read_text("utf-8"))["set"])
-
-
-def _data_set(entry: dict[str, Any]) -> DataSet:
-    return DataSet(**entry | {"files": tuple(DataFile(*row) for row in entry["files"])})
+    entries = tomllib.loads(_TABLE.read_text("utf-8"))["set"]
+    return tuple(
+        DataSet(**entry | {"files": tuple(DataFile(*row) for row in entry["files"])})
+        for entry in entries
+    )
 
 
 def named(name: str) -> DataSet:
@@ -102,10 +101,25 @@ def data_path(
     """
     if own:
         sibling = sought(folder, own, beside) if name and Path(own).name == own else None
-        return sibling if sibling and not Path(own).exists() else _own(Path(own), name)
+        given = Path(own)
+        if sibling and not given.exists():
+            return sibling
+        if not (given.is_file() if name else given.is_dir()):
+            raise RecordingError(f"no {'file' if name else 'folder'} {given}")
+        return given
     path = sought(folder, name, beside)
     if path is None:
-        raise RecordingError(_absent(folder, name, by or ("recording" if name else "data")))
+        theirs = named(folder)
+        what = f"{folder}/{name}" if name else f"{folder}/"
+        by = by or ("recording" if name else "data")
+        brings = f"`validate data get {theirs.name}` downloads it"
+        if not any(f.source for f in theirs.files if name in (None, f.name)):
+            brings = f"`validate data get {theirs.name}` describes how to make it"
+        raise RecordingError(
+            f"{what} is missing: {brings} ({theirs.repository} {theirs.commit[:7]}, "
+            f"{theirs.licence}); or pass --set {by}={'FILE' if name else 'FOLDER'}, or set "
+            f"{SHARED} to a folder that holds it"
+        )
     return path
 
 
@@ -142,12 +156,6 @@ def whole(path: Path, file: DataFile) -> bool:
     return sha256(path.read_bytes()).hexdigest() == file.sha256
 
 
-def _own(path: Path, name: str | None) -> Path:
-    if not (path.is_file() if name else path.is_dir()):
-        raise RecordingError(f"no {'file' if name else 'folder'} {path}")
-    return path
-
-
 def _has(place: Path, folder: str, name: str | None) -> bool:
     """A folder counts where it holds anything: which files of it are wanted, its user knows."""
     if place != cache_folder():
@@ -155,16 +163,3 @@ def _has(place: Path, folder: str, name: str | None) -> bool:
         return (path / name).is_file() if name else path.is_dir() and any(path.iterdir())
     files = [f for f in named(folder).files if name in (None, f.name)]
     return bool(files) and all(whole(place / folder / f.name, f) for f in files)
-
-
-def _absent(folder: str, name: str | None, by: str) -> str:
-    theirs = named(folder)
-    what = f"{folder}/{name}" if name else f"{folder}/"
-    own = f"--set {by}={'FILE' if name else 'FOLDER'}"
-    brings = f"`validate data get {theirs.name}` downloads it"
-    if not any(f.source for f in theirs.files if name in (None, f.name)):
-        brings = f"`validate data get {theirs.name}` describes how to make it"
-    return (
-        f"{what} is missing: {brings} ({theirs.repository} {theirs.commit[:7]}, "
-        f"{theirs.licence}); or pass {own}, or set {SHARED} to a folder that holds it"
-    )

@@ -102,7 +102,11 @@ def smoothed(model: Transition, notes: Sequence[Note]) -> Smoothed:
             roots[i + 1] = W = _narrow(W)
         look = notes[i].look
         if look is not None:
-            away, W = _informed(model.H[np.array(look.gain.seen)], look, away, W)
+            # lambda- and W- of the look
+            H, G, root = model.H[np.array(look.gain.seen)], look.gain.G, look.gain.root
+            away = away - H.T @ (G.T @ away + cho_solve((root, False), look.y))
+            seen = solve_triangular(root, H, trans="T")
+            W = np.hstack([W - H.T @ (G.T @ W), seen.T])
         kept[i], across = away, notes[i].across or model
         wide = max(_WIDE, 2 * n if n <= _FEW else 0)
         away, W = across.back(away), across.back(W if W.shape[1] <= wide else _narrow(W))
@@ -115,14 +119,6 @@ def smoothed(model: Transition, notes: Sequence[Note]) -> Smoothed:
             e = e - note.look.gain.G @ note.look.y
         kept[i] = e
     return Smoothed(kept, roots)
-
-
-def _informed(H: Floats, look: Look, away: Floats, W: Floats) -> tuple[Floats, Floats]:
-    """lambda- and W- of a look."""
-    G, root = look.gain.G, look.gain.root
-    away = away - H.T @ (G.T @ away + cho_solve((root, False), look.y))
-    seen = solve_triangular(root, H, trans="T")
-    return away, np.hstack([W - H.T @ (G.T @ W), seen.T])
 
 
 def _narrow(W: Floats) -> Floats:

@@ -77,7 +77,13 @@ def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
     """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
     rule = _rule(surface, positions)
     x = positions[surface.facets]
-    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, _into_solid(rule, x))
+    along = rule.jacobians(x)
+    # Normals (f, q, d) into the solid, as long as the facet is large
+    if x.shape[2] == 2:
+        normals = np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
+    else:
+        normals = -np.cross(along[..., 0], along[..., 1])
+    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, normals)
     load = np.zeros_like(positions)
     np.add.at(load, surface.facets, nodal)
     return load
@@ -130,14 +136,6 @@ def flat_form(facets: Ints, x: Floats) -> Floats:
                 mean[a, b, c] = (T[a, b, c] + T[b, c, a] + T[c, a, b]
                                  + T[b, a, c] + T[a, c, b] + T[c, b, a]) / 36  # fmt: skip
     return mean
-
-
-def _into_solid(rule: Quadrature, x: Floats) -> Floats:
-    """Normals (f, q, d) of facets with nodes x (f, m, d), as long as the facet is large."""
-    along = rule.jacobians(x)
-    if x.shape[2] == 2:
-        return np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
-    return np.asarray(-np.cross(along[..., 0], along[..., 1]))
 
 
 def _rule(surface: CavitySurface, positions: Floats) -> Quadrature:

@@ -140,7 +140,10 @@ def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
 
 def wave_speeds(scene: Scene) -> Floats:
     """Dilatational wave speed sqrt((lambda + 2 mu)/rho) m/s of every cell (e,)."""
-    return np.sqrt(scene.per_cell(_wave_modulus) / scene.per_cell(_density))
+    return np.sqrt(
+        scene.per_cell(lambda m: m.bulk_modulus + 4 * m.shear_modulus / 3)
+        / scene.per_cell(_density)
+    )
 
 
 def cell_altitudes(scene: Scene) -> Floats:
@@ -195,10 +198,6 @@ def _elasticity(lam: Floats, mu: Floats, d: int) -> Floats:
     return np.asarray(
         lam[:, None, None] * np.outer(normal, normal) + mu[:, None, None] * np.diag(weights)
     )
-
-
-def _wave_modulus(m: Material) -> float:
-    return m.bulk_modulus + 4 * m.shear_modulus / 3
 
 
 def _density(m: Material) -> float:

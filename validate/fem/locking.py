@@ -51,8 +51,27 @@ def locking_of(scene: AnyScene) -> tuple[Locking, ...]:
     if isinstance(scene, Meshless) or scene.mesh.order != 1:
         return ()
     cells = f"linear {_SHAPES[scene.mesh.kind][0]}"
-    found = (_volume(scene, cells), _mean(scene, cells), _bending(scene, cells))
-    return tuple(locking for locking in found if locking)
+    nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
+    found = []
+    if scene.plane != "stress" and scene.dilatation == "pointwise" and nu >= LOCKING_FROM:
+        instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
+        cause = f"{cells} lock near incompressibility and are too stiff; compare with {instead}"
+        found.append(Locking(f"nu = {nu:g}", cause))
+    few = round(across, 1) < _MEAN_ACROSS
+    if scene.plane != "stress" and scene.dilatation == "nodal_mean" and nu >= _MEAN_FROM and few:
+        where = f"nu = {nu:g}, {across:.1f} across the body"
+        cause = (
+            f"a mesh of few {cells} with nodal mean dilatation is too stiff where plates hold the "
+            "body; compare with order 2 or a finer mesh"
+        )
+        found.append(Locking(where, cause))
+    sides = np.ptp(scene.mesh.nodes, axis=0)
+    slender = sides.max() >= _SLENDER * sides.min() and round(across, 1) < _ACROSS
+    if slender and _bends(scene, int(sides.argmax())):
+        where = f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long"
+        cause = f"a mesh of few {cells} locks in bending; compare with order 2 or a finer mesh"
+        found.append(Locking(where, cause))
+    return tuple(found)
 
 
 def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
@@ -61,39 +80,15 @@ def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
     for label, scene in scenes:
         for one in locking_of(scene):
             found.setdefault(one.cause, {}).setdefault(one.where, []).append(label)
-    return tuple(
-        f"{cause}: " + ", ".join(f"{where} ({_few(labels)})" for where, labels in places.items())
-        for cause, places in found.items()
-    )
-
-
-def _few(labels: list[str]) -> str:
-    """The first methods by name."""
-    more = len(labels) - _NAMED
-    return "; ".join(labels[:_NAMED]) + (f" and {more} more methods" if more > 0 else "")
-
-
-def _volume(scene: Scene, cells: str) -> Locking | None:
-    nu = float(scene.per_cell(lambda m: m.nu).max())
-    if nu < LOCKING_FROM or scene.dilatation != "pointwise" or scene.plane == "stress":
-        return None
-    instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
-    return Locking(
-        f"nu = {nu:g}",
-        f"{cells} lock near incompressibility and are too stiff; compare with {instead}",
-    )
-
-
-def _mean(scene: Scene, cells: str) -> Locking | None:
-    nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
-    few = round(across, 1) < _MEAN_ACROSS
-    if scene.dilatation != "nodal_mean" or nu < _MEAN_FROM or not few or scene.plane == "stress":
-        return None
-    return Locking(
-        f"nu = {nu:g}, {across:.1f} across the body",
-        f"a mesh of few {cells} with nodal mean dilatation is too stiff where plates hold the "
-        "body; compare with order 2 or a finer mesh",
-    )
+    notes = []
+    for cause, places in found.items():
+        words = []
+        for where, labels in places.items():
+            more = len(labels) - _NAMED
+            rest = f" and {more} more methods" if more > 0 else ""
+            words.append(f"{where} ({'; '.join(labels[:_NAMED])}{rest})")
+        notes.append(f"{cause}: {', '.join(words)}")
+    return tuple(notes)
 
 
 def _across(mesh: Mesh) -> float:
@@ -101,19 +96,6 @@ def _across(mesh: Mesh) -> float:
     sides = np.ptp(mesh.nodes, axis=0)
     boxes = len(mesh.cells) / _SHAPES[mesh.kind][1]
     return float(sides.min() / (np.prod(sides) / boxes) ** (1 / len(sides)))
-
-
-def _bending(scene: Scene, cells: str) -> Locking | None:
-    sides = np.ptp(scene.mesh.nodes, axis=0)
-    across = _across(scene.mesh)
-    if sides.max() < _SLENDER * sides.min() or round(across, 1) >= _ACROSS:
-        return None
-    if not _bends(scene, int(sides.argmax())):
-        return None
-    return Locking(
-        f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long",
-        f"a mesh of few {cells} locks in bending; compare with order 2 or a finer mesh",
-    )
 
 
 def _bends(scene: Scene, along: int) -> bool:

@@ -43,7 +43,19 @@ def deformed_boundary(mesh: Mesh, nodal: Floats) -> Boundary:
 
     Point and piece numbers depend on the mesh alone: two skins of one mesh correspond.
     """
-    facets = _boundary(mesh)
+    # All nodes of the boundary facets, oriented outward
+    if mesh.order == 1 or mesh.bricks:
+        facets = boundary_facets(mesh.cells, mesh.dimension)
+    else:
+        facets = boundary_facets(mesh.corners, mesh.dimension)
+        ends = np.sort(mesh.cells[:, list(EDGES[mesh.dimension])].reshape(-1, 2), axis=1)
+        middle = mesh.cells[:, mesh.dimension + 1 :].ravel()
+        n = len(mesh.nodes)
+        key, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
+        sides = np.array([(0, 1)] if mesh.dimension == 2 else EDGES[2])
+        wanted = np.sort(facets[:, sides], axis=2)
+        found = middle[first[np.searchsorted(key, wanted[..., 0] * n + wanted[..., 1])]]
+        facets = np.hstack([facets, found])
     if facets.shape[1] == 9:
         facets = facets[:, np.array(_QUARTERS)].reshape(-1, 4)
     if facets.shape[1] == 4:
@@ -86,21 +98,6 @@ def normals(boundary: Boundary) -> Floats:
 def _used(points: Floats, pieces: Ints) -> Boundary:
     used, number = np.unique(pieces, return_inverse=True)
     return Boundary(np.asarray(points[used]), number.reshape(pieces.shape))
-
-
-def _boundary(mesh: Mesh) -> Ints:
-    """Boundary facets with all their nodes, oriented outward."""
-    if mesh.order == 1 or mesh.bricks:
-        return boundary_facets(mesh.cells, mesh.dimension)
-    facets = boundary_facets(mesh.corners, mesh.dimension)
-    ends = np.sort(mesh.cells[:, list(EDGES[mesh.dimension])].reshape(-1, 2), axis=1)
-    middle = mesh.cells[:, mesh.dimension + 1 :].ravel()
-    n = len(mesh.nodes)
-    key, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
-    local = ((0, 1),) if mesh.dimension == 2 else EDGES[2]
-    wanted = np.sort(facets[:, list(local)], axis=2)
-    found = middle[first[np.searchsorted(key, wanted[..., 0] * n + wanted[..., 1])]]
-    return np.hstack([facets, found])
 
 
 # --- Where a boundary of flat pieces crosses itself.

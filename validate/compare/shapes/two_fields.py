@@ -255,7 +255,10 @@ def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = N
     Without a scene on the common mesh the energy norms are left out, as they have no moduli.
     """
     scores, refused = [], []
-    for metric in _default(between) if metrics is None else metrics:
+    if metrics is None:
+        bodies = between.common.scene is not None
+        metrics = tuple(m for m in METRICS_OF_FIELDS if bodies or m not in ENERGY_METRICS)
+    for metric in metrics:
         try:
             scores.append(metric.score(between))
         except ComparisonError as error:
@@ -283,9 +286,3 @@ def compare_fields(
             f"{name}: {reason}"
         )
     return found.scores
-
-
-def _default(between: FieldPair) -> tuple[Metric[FieldPair], ...]:
-    if between.common.scene is not None:
-        return METRICS_OF_FIELDS
-    return tuple(m for m in METRICS_OF_FIELDS if m not in ENERGY_METRICS)

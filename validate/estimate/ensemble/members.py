@@ -25,8 +25,7 @@ from scipy import sparse
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError, UsageError
 from validate.estimate.extended.explicit_filter import ExplicitStep
-from validate.fem.assembly.assemble import stiffness, stiffness_damping
-from validate.fem.assembly.surface import foundation_stiffness
+from validate.fem.assembly.assemble import foundation_stiffness, stiffness, stiffness_damping
 from validate.fem.large_strain.explicit import ExplicitBody
 from validate.fem.linear_solvers.factor import factorise
 from validate.fem.system import System
@@ -454,20 +453,16 @@ class ExplicitMembers:
     ) -> Floats:
         N, still = len(self.system.moves), np.zeros(0)
         loads, new = self.doubts.loads(x, begin), np.empty_like(X)
+        matrices = (lambda u, k=k: k @ u for _, k in self.springs)
+        forces = (*(body.force for _, body in self.bodies), *matrices)
         for i, row in enumerate(X):
             u, before = row[:N], row[N:]
-            R = self._force(u, ready[i])
+            R = ready[i][0] * forces[0](u)
+            for s, force in zip(ready[i][1:], forces[1:], strict=True):
+                R += s * force(u)
             new[i, :N] = self.explicit.following(u, before, R, loads[i], still)
             new[i, N:] = u
         return new
-
-    def _force(self, u: Floats, factors: Floats) -> Floats:
-        matrices = (lambda u, k=k: k @ u for _, k in self.springs)
-        forces = (*(body.force for _, body in self.bodies), *matrices)
-        R = factors[0] * forces[0](u)
-        for s, force in zip(factors[1:], forces[1:], strict=True):
-            R += s * force(u)
-        return np.asarray(R)
 
 
 def explicit_members(explicit: ExplicitStep, doubts: Doubts) -> ExplicitMembers:

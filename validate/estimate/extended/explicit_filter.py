@@ -218,7 +218,9 @@ class ExplicitFilterStepper(OneAtATime):
         memory, found, looks = last.memory, None, list[Look | None]()
         for part in range(parts):
             memory = core.predict(memory, *self.explicit.inputs(last.inputs, inputs, part))
-            if failure := self._failure(memory):
+            if not (largest := kernel.farthest(memory.u)) < self.explicit.far:
+                return replace(state, failure=("diverged", self.explicit.lost(largest)))
+            if failure := core.failure(memory):
                 return replace(state, failure=failure)
             number = state.k * parts + part + 1
             z = self.times.at(number)
@@ -255,12 +257,6 @@ class ExplicitFilterStepper(OneAtATime):
             return replace(state, inner=replace(state.inner, memory=memory), numbers=numbers)
 
         return shown
-
-    def _failure(self, memory: Memory) -> tuple[Ending, str] | None:
-        largest = kernel.farthest(memory.u)
-        if not largest < self.explicit.far:
-            return "diverged", self.explicit.lost(largest)
-        return self.core.failure(memory)
 
     def field(self, state: State) -> Floats:
         """Displacements (n, 3) m."""

@@ -139,8 +139,16 @@ class FilterpyFilter:
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         reduced = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
+        make = self.make
+        if isinstance(make, str):
+            if make not in FILTERPY_FILTERS:
+                raise ComparisonError(
+                    f"no external filter '{make}'; expected one of {', '.join(FILTERPY_FILTERS)}, "
+                    "or a function"
+                )
+            make = FILTERPY_FILTERS[make]
         with seeded(self.seed):
-            first = _made(self.make)(reduced.model)
+            first = make(reduced.model)
         require_shapes(first, reduced.model)
         if self.smooth:
             require_exact_covariances(first)
@@ -148,17 +156,6 @@ class FilterpyFilter:
         core = FilterpyCore(reduced, first, self.seed, care)
         table = timetable(measurements, self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
-
-
-def _made(make: Make | str) -> Make:
-    if not isinstance(make, str):
-        return make
-    if make not in FILTERPY_FILTERS:
-        raise ComparisonError(
-            f"no external filter '{make}'; expected one of {', '.join(FILTERPY_FILTERS)}, "
-            "or a function"
-        )
-    return FILTERPY_FILTERS[make]
 
 
 def require_shapes(filter_: Any, model: LinearModel) -> None:

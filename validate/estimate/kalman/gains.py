@@ -100,14 +100,13 @@ def events(
             yield Event(k, last, claim, True)
         else:
             gain, claim = recursion.update(recursion.predict(claim, k - step), seen)
-            settled = last is not None and same and _close(gain.G, last.G, tolerance)
+            settled = False
+            if last is not None and same:
+                change, size = np.abs(gain.G - last.G).max(), np.abs(gain.G).max()
+                settled = float(change) <= tolerance * float(size)
             last, pattern = gain, (k - step, seen)
             yield Event(k, gain, claim, False)
         step = k
-
-
-def _close(new: Floats, old: Floats, tolerance: float) -> bool:
-    return float(np.abs(new - old).max()) <= tolerance * float(np.abs(new).max())
 
 
 def gain_sequence(
@@ -216,19 +215,14 @@ def observed(covariance: Decoupled, steps: int, known: Spaces) -> Observed | Non
     if not (QV.any() or PV0.any()):  # nothing is doubted: there is no gain
         return None
     if space is None or not all(_holds(space.W, f, X, steps) for X in (QV, PV0)):
-        space = known[key] = _space(f, V, QV, PV0, steps)
+        sizes = (float(np.linalg.norm(X)) or 1.0 for X in (QV, PV0))
+        X = np.hstack([X / size for X, size in zip((QV, PV0), sizes, strict=True)])
+        W = _span(X, f, steps, len(f) // 2)
+        wide = (np.eye(len(f)), f) if W is None else _diagonal(W, f)
+        space = known[key] = NarrowSpace(*_diagonal(V, f), *wide)
         QV, PV0 = covariance.Q @ space.V, covariance.P0 @ space.V
     W, V = space.W, space.V
     return Observed(space, W.T @ QV, W.T @ PV0, H @ V, H @ W, covariance.R)
-
-
-def _space(f: Floats, V: Floats, QV: Floats, PV0: Floats, steps: int) -> NarrowSpace:
-    sizes = (float(np.linalg.norm(X)) or 1.0 for X in (QV, PV0))
-    X = np.hstack([X / size for X, size in zip((QV, PV0), sizes, strict=True)])
-    W = _span(X, f, steps, len(f) // 2)
-    if W is None:
-        return NarrowSpace(*_diagonal(V, f), np.eye(len(f)), f)
-    return NarrowSpace(*_diagonal(V, f), *_diagonal(W, f))
 
 
 def _diagonal(V: Floats, f: Floats) -> tuple[Floats, Floats]:

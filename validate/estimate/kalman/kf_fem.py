@@ -110,7 +110,13 @@ class KfFem(DisplacementNoise):
         if self.gains == "every_step":
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
-        claimed, covariance = self._shared(system, measurements, nodal)
+        claimed: Coordinates = nodal
+        try:
+            claimed = modes = in_modes(system, nodal.propagation.rule)
+        except SceneError:  # damping couples the modes
+            covariance = self._dense(system, measurements, nodal)
+        else:
+            covariance = modal_covariance(self, system, measurements, modes)
         if self.care(measurements):
             return stepper_of(self, system, measurements, nodal, covariance, claimed, None)
         gains = shared_gains(system, covariance, timetable(measurements, self.dt), self.settled)
@@ -124,15 +130,6 @@ class KfFem(DisplacementNoise):
         noise = noise_shape(self, system, nodal, H)
         A = nodal.propagation.transition()
         return Dense(A, self.Q * noise, H, R, self.P0 * noise)
-
-    def _shared(
-        self, system: System, measurements: Measurements, nodal: Nodal
-    ) -> tuple[Coordinates, Covariance]:
-        try:
-            modes = in_modes(system, nodal.propagation.rule)
-        except SceneError:  # damping couples the modes
-            return nodal, self._dense(system, measurements, nodal)
-        return modes, modal_covariance(self, system, measurements, modes)
 
 
 def modal_covariance(

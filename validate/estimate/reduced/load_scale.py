@@ -20,7 +20,6 @@ from validate.estimate.kalman.displacement_filter import load_shapes
 from validate.estimate.kalman.formulas import (
     Gaussian,
     Innovation,
-    Update,
     kf_predict,
     kf_update,
     nothing,
@@ -130,17 +129,16 @@ class ScaleCore:
         prior = kf_predict(inner.x, A, self.Q)
         if z is None:
             return Scaled(prior, A), nothing(len(self.seen))
-        update, seen = self._updated(prior, z, inner.x.x[0])
+        R, update = np.diag(self.R), None
+        if self.care is not None:
+            moved = self.seen * (prior.x[0] - inner.x.x[0])
+            update, seen = self.care.linear_update(prior, z, self.H, R, moved)
+        else:
+            update = kf_update(prior, z, self.H, R)
+            seen = update.innovation
         if update is None:
             return Scaled(prior, A), seen
         return Scaled(update.posterior, A, look_of(update.gain, seen)), seen
-
-    def _updated(self, prior: Gaussian, z: Floats, was: float) -> tuple[Update | None, Innovation]:
-        R = np.diag(self.R)
-        if self.care is not None:
-            return self.care.linear_update(prior, z, self.H, R, self.seen * (prior.x[0] - was))
-        update = kf_update(prior, z, self.H, R)
-        return update, update.innovation
 
     def free(self, inner: Scaled) -> Floats:
         return np.asarray(self.shape * inner.x.x[0])

@@ -176,7 +176,18 @@ class ReducedEKF:
         explicit = explicit_step(system, self.dt, self.substeps)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)
-        basis = modes(system, 1) if refusal else self._basis(explicit)
+        if refusal:
+            basis = modes(system, 1)
+        elif self.basis == "pod":
+            basis = pod(explicit, self.shapes, self.snapshot_load)
+        else:
+            basis = modes(system, self.shapes)
+        top = float(np.sqrt(basis.squares.max()))
+        if not refusal and explicit.h * top >= 2:
+            raise UsageError(
+                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {explicit.h:g} s are "
+                f"stable for those below {2 / explicit.h:.4g}; take fewer shapes or smaller steps"
+            )
         model = shapes_covariance(self, explicit, basis, measurements)
         when = {} if refusal else schedule(times)
         recursion = steady(model, when) if self.gains == "steady" and when else model
@@ -188,19 +199,6 @@ class ReducedEKF:
         return ExplicitFilterStepper(
             explicit, core, measurements, times, refusal, care, self.smooth
         )
-
-    def _basis(self, steps: ExplicitStep) -> Basis:
-        if self.basis == "pod":
-            basis = pod(steps, self.shapes, self.snapshot_load)
-        else:
-            basis = modes(steps.system, self.shapes)
-        top = float(np.sqrt(basis.squares.max()))
-        if steps.h * top >= 2:
-            raise UsageError(
-                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {steps.h:g} s are "
-                f"stable for those below {2 / steps.h:.4g}; take fewer shapes or smaller steps"
-            )
-        return basis
 
 
 def shapes_covariance(

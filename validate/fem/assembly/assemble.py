@@ -11,6 +11,8 @@ Pister 1985): theta is the projection of the law's measure of volume change, and
 of the isochoric part plus U(theta). Constants on hex8 (mean dilatation, Nagtegaal, Parks & Rice
 1974), tet10 and tri6; linear fields of the place on hex27 (Boffi, Brezzi & Fortin 2013, 8.6), which
 keep its order up to nu -> 1/2; on tet10 constants leave order 2 there.
+
+Foundations (partial friction) and membranes add a stiffness on facets.
 """
 
 from dataclasses import dataclass, replace
@@ -39,10 +41,10 @@ from skfem.models.elasticity import lame_parameters
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.surface import surface_stiffness
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
-from validate.scene.scene import Scene
+from validate.scene.places import facets_of
+from validate.scene.scene import Foundation, Membrane, Scene
 from validate.scene.shape_functions import (
     CORNERS,
     EDGES,
@@ -51,11 +53,69 @@ from validate.scene.shape_functions import (
     barycentric,
     brick_rule,
     collapsed_points,
+    facet_rule,
     gauss_points,
     simplex_rule,
     simplex_slopes,
     symmetric_points,
 )
+
+
+def surface_stiffness(scene: Scene) -> tuple[sparse.csr_array, ...]:
+    """What the scene's foundations and membranes add to K; empty when it has none."""
+    return (
+        *(foundation_stiffness(scene.mesh, f) for f in scene.foundations),
+        *(membrane_stiffness(scene.mesh, m) for m in scene.membranes),
+    )
+
+
+def foundation_stiffness(mesh: Mesh, foundation: Foundation) -> sparse.csr_array:
+    """K (N, N) N/m of springs to the ground, k integral of N_a N_b dA per held component."""
+    facets = facets_of(mesh, foundation.facets)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=2)
+    mass = np.einsum("q,fq,qa,qb->fab", rule.weights, area, rule.N, rule.N)
+    select = np.zeros((3, 3))
+    select[foundation.components, foundation.components] = foundation.stiffness
+    return _on_facets(mesh, facets, np.einsum("fab,ij->faibj", mass, select))
+
+
+def membrane_stiffness(mesh: Mesh, membrane: Membrane) -> sparse.csr_array:
+    """K (N, N) N/m of a thin elastic sheet on facets, in plane stress, without bending.
+
+    With surface gradients g_a and the tangent projector P, thickness t and plane-stress lambda',
+    K_ab = t integral of lambda' g_a g_b^T + mu (g_b g_a^T + (g_a . g_b) P) dA. The sheet is taut:
+    it carries compression too, where a slack one would wrinkle.
+    """
+    facets = facets_of(mesh, membrane.facets)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    e1, e2 = J[..., 0], J[..., 1]
+    normal = np.cross(e1, e2)
+    area = np.linalg.norm(normal, axis=2)
+    n = normal / area[..., None]
+    dual = np.stack([np.cross(e2, n), np.cross(n, e1)], axis=2) / area[..., None, None]
+    g = np.einsum("qaj,fqji->fqai", rule.dN, dual)
+    P = np.eye(3) - np.einsum("fqi,fqj->fqij", n, n)
+    mu = membrane.material.shear_modulus
+    nu = membrane.material.nu
+    plane = 2 * mu * nu / (1 - nu)  # lambda' = E nu / (1 - nu^2)
+    w = membrane.thickness * rule.weights * area
+    K = plane * np.einsum("fq,fqai,fqbj->faibj", w, g, g)
+    K += mu * np.einsum("fq,fqbi,fqaj->faibj", w, g, g)
+    K += mu * np.einsum("fq,fqak,fqbk,fqij->faibj", w, g, g, P)
+    return _on_facets(mesh, facets, K)
+
+
+def _on_facets(mesh: Mesh, facets: Ints, K: Floats) -> sparse.csr_array:
+    """Element matrices (f, a, i, b, j) summed into (N, N), node-major."""
+    dofs = (3 * facets[:, :, None] + np.arange(3)).reshape(len(facets), -1)
+    size = dofs.shape[1]
+    rows = np.repeat(dofs, size, axis=1).ravel()
+    columns = np.tile(dofs, (1, size)).ravel()
+    shape = (mesh.nodes.size, mesh.nodes.size)
+    return sparse.csr_array((K.ravel(), (rows, columns)), shape=shape)
 
 
 def rule(mesh: Mesh, points: int) -> Quadrature:
@@ -171,7 +231,9 @@ def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
     if any(m.rho is None for m in materials):
         raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
     weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
-    weight, basis = scene.thickness * weight, _basis(scene.mesh)
+    _, element, degree = _ELEMENTS[scene.mesh.kind]
+    weight = scene.thickness * weight
+    basis = Basis(library_mesh(scene.mesh), element(), intorder=degree)
     scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
     if scene.mesh.kind == "hex27":
         theirs = _renumbered(basis.doflocs.T, scene.mesh.nodes)
@@ -201,19 +263,18 @@ def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
 
 def lame_constants(scene: Scene) -> tuple[Floats, Floats]:
     """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2). At nu = 0.5
-    lambda is that of the penalty beside unknown pressures (`fem.assembly.mixed`)."""
-    stress = scene.plane == "stress"
-    return scene.per_cell(_plane_stress if stress else _lambda), scene.per_cell(_mu)
+    lambda is that of the penalty beside unknown pressures (`fem.assembly.volume_constraints`)."""
+    if scene.plane == "stress":
+        lam = scene.per_cell(lambda m: m.E * m.nu / (1 - m.nu**2))
+    else:
+        lam = scene.per_cell(_lambda)
+    return lam, scene.per_cell(_mu)
 
 
 def _lambda(m: Material) -> float:
     if m.incompressible:
         return m.assembled_bulk_modulus - 2 / 3 * m.shear_modulus
     return float(lame_parameters(m.E, m.nu)[0])
-
-
-def _plane_stress(m: Material) -> float:
-    return m.E * m.nu / (1 - m.nu**2)
 
 
 def _mu(m: Material) -> float:
@@ -226,11 +287,6 @@ def library_mesh(mesh: Mesh) -> Any:
     corners = np.ascontiguousarray(mesh.corners[:, order].T)
     vertices = int(mesh.corners.max()) + 1
     return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
-
-
-def _basis(mesh: Mesh) -> Basis:
-    _, element, mass_degree = _ELEMENTS[mesh.kind]
-    return Basis(library_mesh(mesh), element(), intorder=mass_degree)
 
 
 def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:

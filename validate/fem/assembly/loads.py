@@ -7,7 +7,7 @@ from validate.errors import SceneError
 from validate.fem.assembly.assemble import mass
 from validate.scene.mesh import Mesh
 from validate.scene.places import Place, facets_of, kind_of, nodes_of
-from validate.scene.scene import Load, Pressure, Scene, Weight
+from validate.scene.scene import Pressure, Scene, Weight
 from validate.scene.shape_functions import facet_rule
 
 
@@ -26,7 +26,13 @@ def load_columns(scene: Scene) -> Floats:
         if isinstance(load, Pressure):
             columns[:, j] = _pushed(scene.mesh, load).ravel()
             continue
-        columns[:, j] = np.outer(_nodal(scene.mesh, load), load.direction).ravel()
+        # The share (n,) of the input that every node takes
+        if load.spread == "consistent":
+            shares = uniform_shares(scene.mesh, load.facets)
+        else:
+            shares, nodes = np.zeros(len(scene.mesh.nodes)), nodes_of(scene.mesh, load.facets)
+            shares[nodes] = 1.0 if load.spread == "per_node" else 1 / len(nodes)
+        columns[:, j] = np.outer(shares, load.direction).ravel()
     return columns
 
 
@@ -59,15 +65,6 @@ def _pushed(mesh: Mesh, load: Pressure) -> Floats:
     found = np.zeros_like(mesh.nodes)
     np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
     return found
-
-
-def _nodal(mesh: Mesh, load: Load) -> Floats:
-    """The share (n,) of the input that every node takes."""
-    if load.spread == "consistent":
-        return uniform_shares(mesh, load.facets)
-    shares, nodes = np.zeros(len(mesh.nodes)), nodes_of(mesh, load.facets)
-    shares[nodes] = 1.0 if load.spread == "per_node" else 1 / len(nodes)
-    return shares
 
 
 def uniform_shares(mesh: Mesh, place: Place) -> Floats:

@@ -20,8 +20,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import shape_gradients, stiffness_points
-from validate.fem.assembly.surface import foundation_stiffness
+from validate.fem.assembly.assemble import foundation_stiffness, shape_gradients, stiffness_points
 from validate.fem.kernels import explicit as kernels
 from validate.fem.kernels import points as laws
 from validate.fem.kernels.cells import BRICK_ROWS, CORNERS, LANES, POINTS, ROWS
@@ -176,7 +175,13 @@ class ExplicitBody:
                     f"{threads} threads: a viscoelastic body supports one; use threads=1"
                 )
             self._taut = _packed(taut(scene))[0]
-        self._swift = self._in(precision)
+        if precision == "single" and not knows_single(scene):
+            raise SceneError(
+                "single precision supports tet4 of St. Venant-Kirchhoff or neo-Hooke in its "
+                "split form, without a Prony series; take precision='double'"
+            )
+        # The geometry that forces and blocks are reckoned with
+        self._swift = self.geometry if precision == "double" else _in_single(self.geometry)
         self.work = on_lines(np.zeros(kernels.work_size(len(mesh.nodes))))
         self._quick = self.work if precision == "double" else _in_single(self.work)
         self._places = {1: self._quick}
@@ -193,17 +198,6 @@ class ExplicitBody:
             size = kernels.parts_size(self.size // 3)
             self._places[threads] = on_lines(np.zeros((threads, size), self._quick.dtype))
         self._parts = self._places[threads]
-
-    def _in(self, precision: Precision) -> Floats:
-        """The geometry that forces and blocks are reckoned with."""
-        if precision == "double":
-            return self.geometry
-        if not knows_single(self.scene):
-            raise SceneError(
-                "single precision supports tet4 of St. Venant-Kirchhoff or neo-Hooke in its "
-                "split form, without a Prony series; take precision='double'"
-            )
-        return _in_single(self.geometry)
 
     def _spring(self, springs: sparse.csr_array) -> None:
         self.springs, self._own_springs = springs, np.asarray(springs.diagonal())

@@ -35,8 +35,12 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import projections, shape_gradients, stiffness_points
-from validate.fem.assembly.surface import foundation_stiffness
+from validate.fem.assembly.assemble import (
+    foundation_stiffness,
+    projections,
+    shape_gradients,
+    stiffness_points,
+)
 from validate.fem.laws.energies import green_strain, volume_change
 from validate.fem.laws.law import Law, parts_of
 from validate.fem.laws.plane_stress import PlaneStress

@@ -231,9 +231,9 @@ def stiffened(material: Material, factor: float) -> Material:
         scaled_modulus = 9 * kappa * mu / (3 * kappa + mu)
         nu = (3 * kappa - 2 * mu) / (2 * (3 * kappa + mu))
     moduli = [f.name for f in fields(c) if f.metadata["unit"] == "Pa"]
-    scaled = replace(c, **{name: _times(factor, getattr(c, name)) for name in moduli})
+    values: dict[str, Any] = {name: getattr(c, name) for name in moduli}
+    for name, value in values.items():
+        terms = isinstance(value, tuple)
+        values[name] = tuple(factor * v for v in value) if terms else factor * value
+    scaled = replace(c, **values)
     return replace(material, E=scaled_modulus, nu=nu, coefficients=scaled, prony=Prony())
-
-
-def _times(factor: float, value: Any) -> Any:
-    return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value

@@ -155,18 +155,13 @@ class ImplicitStepper:
     def rest(self) -> State:
         u, inputs = np.zeros(len(self.system.moves)), np.zeros(len(self.scene.inputs))
         memory = self.branches.at_rest(self.body.weights.shape) if self.branches else None
-        a = self._released()
+        a = np.zeros(len(u))
+        if self.held is not None:  # of the undeformed body at 0 s: M a = f
+            free = self.system.free
+            f = self.system.loads @ self.held[len(self.scene.drives) :]
+            factor = factorise_indefinite(sparse.csr_array(self.M)[free][:, free], self.order)
+            a[free] = factor.solve(f[free])
         return State(0, Settled(u, u, a, inputs, memory), numbers=self._numbers(u, u, u, inputs))
-
-    def _released(self) -> Floats:
-        """Acceleration (N,) of the undeformed body at 0 s: M a = f."""
-        a, free = np.zeros(len(self.system.moves)), self.system.free
-        if self.held is None:
-            return a
-        f = self.system.loads @ self.held[len(self.scene.drives) :]
-        factor = factorise_indefinite(sparse.csr_array(self.M)[free][:, free], self.order)
-        a[free] = factor.solve(f[free])
-        return a
 
     def step(self, state: State, inputs: Floats) -> State:
         """To the inputs (k + l,) at the end of the step: drives in m, then loads in N."""
@@ -209,8 +204,12 @@ class ImplicitStepper:
                 correction, negative = self._correction(u, pressures, residual, rates, move)
             except SceneError as vanished:
                 return replace(state, failure=("not_converged", str(vanished)))
-            taken = self._upright(u, correction, move)
-            if taken is None:
+            # All of the prescribed motion, the rest halved while it inverts cells
+            for share in 0.5 ** np.arange(_HALVINGS + 1):
+                taken = move + share * (correction - move)
+                if not self.body.inverted(u + taken):
+                    break
+            else:
                 words = f"a Newton correction inverts cells even at 1/{2**_HALVINGS} of its size"
                 return replace(state, failure=("not_converged", words))
             pressures = self.body.extrapolated(u, taken)
@@ -221,18 +220,18 @@ class ImplicitStepper:
         words = f"residual {size:.1e} after {iteration} iterations"
         return replace(state, failure=("not_converged", words))
 
-    def _rates(self, last: Settled) -> _Rates:
-        dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
-        if self.settings.rule == "average":
-            return _Rates(2 / dt, 4 / dt**2, -last.v, -4 / dt * last.v - last.a)
-        return _Rates(1 / dt, 1 / dt**2, zero, -last.v / dt)
-
     def _residual(self, u: Floats, last: Settled, rates: _Rates, f: Floats) -> tuple[Floats, float]:
         """R + C v + M a - f (N,) N, and the size of what acts."""
         d = u - last.u
         R, inertia = self.body.force(u), self.M @ (rates.q * d + rates.a)
         acting = max(float(np.linalg.norm(x)) for x in (R, inertia, f))
         return R + inertia + self.C @ (rates.p * d + rates.v) - f, acting
+
+    def _rates(self, last: Settled) -> _Rates:
+        dt, zero = self.settings.dt, np.zeros(len(self.system.moves))
+        if self.settings.rule == "average":
+            return _Rates(2 / dt, 4 / dt**2, -last.v, -4 / dt * last.v - last.a)
+        return _Rates(1 / dt, 1 / dt**2, zero, -last.v / dt)
 
     def _correction(
         self, u: Floats, pressures: Floats | None, residual: Floats, rates: _Rates, move: Floats
@@ -244,14 +243,6 @@ class ImplicitStepper:
         correction = move.copy()
         correction[free] = -factor.solve((residual + J @ move)[free])
         return correction, factor.negative_pivots
-
-    def _upright(self, u: Floats, correction: Floats, move: Floats) -> Floats | None:
-        """The correction, but for the prescribed motion halved while it inverts cells."""
-        for share in 0.5 ** np.arange(_HALVINGS + 1):
-            taken = move + share * (correction - move)
-            if not self.body.inverted(u + taken):
-                return np.asarray(taken)
-        return None
 
     def _found(
         self, state: State, u: Floats, rates: _Rates, inputs: Floats, iterations: int
@@ -317,21 +308,15 @@ class FromEquilibrium:
         moving = NewtonDynamics(
             self.dt, self.rule, "consistent", self.tolerance, self.max_iterations
         ).prepare(system)
-        u, failure = _rest(system, inputs, self.tolerance)
+        u, failure = np.zeros(len(system.moves)), None
+        if inputs.any():
+            static = StaticNewton("none", tolerance=self.tolerance).prepare(system)
+            state = static.step(static.rest(), inputs)
+            if state.failure:
+                failure = state.failure[0], f"at rest: {state.failure[1]}"
+            else:
+                u = static.field(state).ravel().copy()
         return FromEquilibriumStepper(moving, u, inputs, self.a0 == "equilibrium", failure)
-
-
-def _rest(
-    system: System, inputs: Floats, tolerance: float
-) -> tuple[Floats, tuple[Ending, str] | None]:
-    """Displacements (N,) m of the static equilibrium, or how looking for it ended."""
-    if not inputs.any():
-        return np.zeros(len(system.moves)), None
-    static = StaticNewton("none", tolerance=tolerance).prepare(system)
-    state = static.step(static.rest(), inputs)
-    if state.failure:
-        return np.zeros(len(system.moves)), (state.failure[0], f"at rest: {state.failure[1]}")
-    return static.field(state).ravel().copy(), None
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,10 @@ class Excitation:
         if not self.drives:
             return Inputs(q, q, q, loads)
         if self.rates == "given":
-            speeds = np.array([_speed(d, k * h, h) for d in self.given])
+            # The planned velocities m/s, at a jump those behind it; 1e-6 h is no difference.
+            until = k * h + 1e-6 * h
+            passed = [[v for start, v in d.speeds if start <= until] for d in self.given]
+            speeds = np.array([given[-1] if given else 0.0 for given in passed])
             return Inputs(q, speeds, np.zeros_like(speeds), loads)
         if self.rates == "rule":
             return Inputs(q, *self.rule.rates(q, last.q, last.rate, last.acceleration), loads)
@@ -109,12 +112,6 @@ def _columns(of: Sequence[Inputs]) -> Inputs:
     """Many steps' inputs, a column each."""
     parts = ((i.q, i.rate, i.acceleration, i.loads) for i in of)
     return Inputs(*(np.array(part).T for part in zip(*parts, strict=True)))
-
-
-def _speed(drive: Drive, t: float, h: float) -> float:
-    """The planned velocity m/s at t, at a jump that behind it; instants as near as 1e-6 h count."""
-    passed = [v for start, v in drive.speeds if start <= t + 1e-6 * h]
-    return passed[-1] if passed else 0.0
 
 
 def excitation(

@@ -9,7 +9,7 @@ Departures: a cut-off cluster of equal frequencies is taken whole, so there may 
 asked for. The static correction has no rates: it gives no share of damping and inertia forces.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -227,7 +227,17 @@ class ModalStepper(InertialStepper):
             a = self.forces_on @ old
         q, v, a = self.walk.step(last.q, last.v, a, *self._ends(old, new))
         inner = ModalState(q, v, a, moved, new)
-        return State(k, inner, numbers=self._forces_of_drives(inner))
+        rows, (K, C, M) = self.reactions, self.projected
+        if not rows.names:
+            return State(k, inner, numbers={})
+        moves = self.system.moves
+        driven = rows.numbers(moves @ moved.q, moves @ moved.rate, moves @ moved.acceleration,
+                              moved.loads)  # fmt: skip
+        forces = K @ q + C @ v + M @ a
+        if self.left_out is not None:
+            forces = forces + rows.K[:, self.system.free] @ (self.left_out @ new)
+        shares = rows.named(forces)
+        return State(k, inner, numbers={name: driven[name] + shares[name] for name in driven})
 
     def _ends(self, old: Floats, new: Floats) -> tuple[Floats, Floats]:
         """Modal forces at both ends; for a rule the one force of its balance, given as new."""
@@ -247,18 +257,6 @@ class ModalStepper(InertialStepper):
         u = self.modes.shapes @ modal.q
         u = u if self.left_out is None else u + self.left_out @ modal.signal
         return self.nodal(u, modal.inputs.q)
-
-    def _forces_of_drives(self, modal: ModalState) -> Mapping[str, float]:
-        rows, (K, C, M), of = self.reactions, self.projected, modal.inputs
-        if not rows.names:
-            return {}
-        moves = self.system.moves
-        driven = rows.numbers(moves @ of.q, moves @ of.rate, moves @ of.acceleration, of.loads)
-        forces = K @ modal.q + C @ modal.v + M @ modal.a
-        if self.left_out is not None:
-            forces = forces + rows.K[:, self.system.free] @ (self.left_out @ modal.signal)
-        shares = rows.named(forces)
-        return {name: driven[name] + shares[name] for name in driven}
 
 
 def _of_modes(count: int) -> Callable[[float], Scheme]:

@@ -196,29 +196,24 @@ class NewmarkStepper(MovingStepper):
         last: Moving = state.inner
         u, v, k = last.u, last.v, state.k + 1
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
-        solved = self._solved(u, self.propagation.history(u, v, a) + f)
+        b, solver = self.propagation.history(u, v, a) + f, self.propagation.solver
+        if isinstance(solver, Iterative):
+            solved = solver.solve_from(b, u)
+        else:
+            solved = Solved(solver.solve(b), 0, True)
         u_new = solved.x
         v_new, a_new = self.propagation.rates(u_new, u, v, a)
         if self.misprinted:
             u_new = u_new + self.propagation.rule.h * (v_new - v)
         numbers = self.forces(u_new, v_new, a_new, moved)
         new = Moving(u_new, v_new, a_new, moved)
-        return State(k, new, _failure(k, new, solved), solved.iterations, numbers)
-
-    def _solved(self, u: Floats, b: Floats) -> Solved:
-        solver = self.propagation.solver
-        if isinstance(solver, Iterative):
-            return solver.solve_from(b, u)
-        return Solved(solver.solve(b), 0, True)
-
-
-def _failure(k: int, new: Moving, solved: Solved) -> tuple[Ending, str] | None:
-    if not np.isfinite(new.a.sum()):
-        return "diverged", f"accelerations are not finite at step {k}"
-    if not solved.converged:
-        why = f"{solved.iterations} iterations leave the residual above the tolerance"
-        return "not_converged", f"step {k}: {why}"
-    return None
+        failure: tuple[Ending, str] | None = None
+        if not np.isfinite(new.a.sum()):
+            failure = "diverged", f"accelerations are not finite at step {k}"
+        elif not solved.converged:
+            why = f"{solved.iterations} iterations leave the residual above the tolerance"
+            failure = "not_converged", f"step {k}: {why}"
+        return State(k, new, failure, solved.iterations, numbers)
 
 
 def _with(**settings: Any) -> Callable[[float], Scheme]:

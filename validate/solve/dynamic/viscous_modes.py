@@ -56,7 +56,14 @@ class ViscousModes:
         if scene.regions:
             raise SceneError("ViscousModes needs one material; use NewtonDynamics")
         start = perf_counter()
-        found = _vibrations(scene, inputs[0], self.modes)
+        bare = replace(scene, material=replace(scene.material, prony=Prony()))
+        key, last = tuple(inputs[0].tolist()), _Remembered.last
+        if last and last[0].mesh is bare.mesh and last[:3] == (bare, key, self.modes):
+            found: _Vibrations | Run = last[3]
+        else:
+            found = _about_equilibrium(bare, inputs[0], self.modes)
+            if isinstance(found, _Vibrations):
+                _Remembered.last = (bare, key, self.modes, found)
         if isinstance(found, Run):
             return found
         setup = perf_counter() - start
@@ -88,17 +95,6 @@ class _Remembered:
     body, and only this is the same in all of them."""
 
     last: tuple[Scene, tuple[float, ...], int, _Vibrations] | None = None
-
-
-def _vibrations(scene: Scene, loads: Floats, modes: int) -> _Vibrations | Run:
-    bare = replace(scene, material=replace(scene.material, prony=Prony()))
-    key, last = tuple(loads.tolist()), _Remembered.last
-    if last and last[0].mesh is bare.mesh and last[:3] == (bare, key, modes):
-        return last[3]
-    found = _about_equilibrium(bare, loads, modes)
-    if isinstance(found, _Vibrations):
-        _Remembered.last = (bare, key, modes, found)
-    return found
 
 
 def _about_equilibrium(scene: Scene, loads: Floats, modes: int) -> _Vibrations | Run:

@@ -248,7 +248,15 @@ class CentralStepper:
                 f"the displacements are not finite after it; dt is {ratio:.3g} of the critical step"
             )
             return replace(state, failure=("diverged", words))
-        new = _worked(past, motion, inputs, work, taken)
+        total = past.work + work
+        new = replace(
+            past,
+            motion=motion,
+            inputs=inputs,
+            work=total,
+            taken=past.taken + taken,
+            most=max(past.most, abs(total)),
+        )
         numbers, failure = dict(state.numbers), None
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
@@ -353,18 +361,6 @@ class CentralStepper:
         """Displacements (n, 3) m of all nodes."""
         u: Floats = state.inner.motion["u"]
         return u.reshape(-1, 3)
-
-
-def _worked(past: Past, motion: ExplicitMotion, inputs: Floats, more: float, taken: float) -> Past:
-    work = past.work + more
-    return replace(
-        past,
-        motion=motion,
-        inputs=inputs,
-        work=work,
-        taken=past.taken + taken,
-        most=max(past.most, abs(work)),
-    )
 
 
 def lumped_damping(system: System) -> Floats:

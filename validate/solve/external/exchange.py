@@ -103,7 +103,8 @@ def asked_material(scene: Scene, inertia: bool) -> dict[str, Any]:
     if scene.masses:
         found["hung"] = sum(part.mass for part in scene.masses)
     names = (*kind.coefficients, *(("volumetric",) if kind.volumetric else ()))
-    return found | {name: _plain(getattr(m.coefficients, name)) for name in names}
+    values = {name: getattr(m.coefficients, name) for name in names}
+    return found | {n: list(v) if isinstance(v, tuple) else v for n, v in values.items()}
 
 
 def _density(material: Material) -> float:
@@ -112,10 +113,6 @@ def _density(material: Material) -> float:
             "an external simulator with inertia or weight needs a density; give material.rho"
         )
     return material.rho
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def _parts(system: System, inputs: Floats, before: int) -> dict[str, Any]:
@@ -205,7 +202,11 @@ def _arrays(path: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     except RecordingError as error:
         raise NoAnswerError(plain(str(error))) from None
     wanted = [name for name in ("t", "u", "reactions") if name in found]
-    return {name: _number_array(found[name], name) for name in wanted}
+    for name in wanted:
+        if found[name].dtype.kind not in "fiu":
+            kind = found[name].dtype
+            raise NoAnswerError(f"fields.npz: {name} of type {kind}, expected numbers")
+    return {name: found[name].astype(np.float64) for name in wanted}
 
 
 def _shaped(found: dict[str, NDArray[Any]], file: str, job: ExternalJob) -> dict[str, NDArray[Any]]:
@@ -218,12 +219,6 @@ def _shaped(found: dict[str, NDArray[Any]], file: str, job: ExternalJob) -> dict
         if array.shape != shape or k > len(job.times):
             raise NoAnswerError(f"{file}: {name} of shape {array.shape}, expected {shape}")
     return found
-
-
-def _number_array(array: NDArray[Any], name: str) -> Floats:
-    if array.dtype.kind not in "fiu":
-        raise NoAnswerError(f"fields.npz: {name} of type {array.dtype}, expected numbers")
-    return array.astype(np.float64)
 
 
 def regular(path: Path, most: int) -> Path:
@@ -271,7 +266,14 @@ class ExternalAnswer:
 
 def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
     """Raise `NoAnswerError` with the reason where there is no answer to this job."""
-    said = _document(folder)
+    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
+    try:
+        said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
+    known = (ANSWER_SCHEMA, _FORMER_SCHEMA)
+    if not isinstance(said, dict) or said.get("schema") not in known:
+        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
     name = (
         f"{_text(said, 'name') or 'external simulator'} {_text(said, 'version') or '(no version)'}"
     )
@@ -286,11 +288,19 @@ def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
         raise NoAnswerError("answer.json: mesh_sha256 differs from that of the job's mesh.vtu")
     arrays = fields_of(folder, job)
     u, reactions, step = arrays["u"], arrays.get("reactions"), _times_done(arrays["t"], job, state)
-    finite = np.all([_usable(a) for a in (u, reactions) if a is not None], axis=0)
+    # Of every time (k,): all numbers are finite, and none beyond what can be squared and summed.
+    with np.errstate(invalid="ignore"):
+        sound = [np.abs(a) < _HUGE for a in (u, reactions) if a is not None]
+    finite = np.all([of.all(axis=(1, 2)) for of in sound], axis=0)
     if not finite.all():
         step = int(np.argmin(finite))
         state, why = "diverged", f"no finite field at step {step}" + (f"; {why}" if why else "")
-    setup, seconds = _seconds(said, step)
+    # Set-up and steps, as it says; zero and None where it says nothing usable
+    setup, each = said.get("setup_s"), said.get("step_s")
+    setup = float(setup) if setup is not None and _is_time(setup) else 0.0
+    seconds = None
+    if isinstance(each, list) and all(map(_is_time, each)) and len(each) >= step:
+        seconds = np.array(each[:step], dtype=np.float64)
     reactions = None if reactions is None else reactions[:step]
     findings = (
         *_limits(said), *echoed(job.document["material"], said.get("used")),
@@ -322,19 +332,6 @@ def _same(asked: Any, used: Any) -> bool:
     return a.shape == b.shape and bool(np.allclose(a, b, rtol=_ECHO, atol=0.0))
 
 
-def _document(folder: Path) -> dict[str, Any]:
-    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
-    try:
-        said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
-    except (ValueError, RecursionError) as error:
-        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
-    if not isinstance(said, dict) or said.get("schema") not in (
-        ANSWER_SCHEMA, _FORMER_SCHEMA,
-    ):  # fmt: skip
-        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
-    return said
-
-
 def _no_number(text: str) -> float:
     raise ValueError(f"{text} is not a number in JSON")
 
@@ -355,13 +352,6 @@ def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _usable(values: Floats) -> NDArray[np.bool_]:
-    """Of every time (k,): whether all its numbers are finite, and none beyond what can be squared
-    and summed."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((np.abs(values) < _HUGE).all(axis=(1, 2)))
-
-
 def _times_done(t: Floats, job: ExternalJob, state: str) -> int:
     """How many of the job's times were done: all of them, or the first ones if it gave up."""
     asked = job.times[: len(t)]
@@ -374,15 +364,6 @@ def _times_done(t: Floats, job: ExternalJob, state: str) -> int:
             f"fields.npz: {len(t)} of {len(job.times)} times, although its state is 'finished'"
         )
     return len(t)
-
-
-def _seconds(said: Mapping[str, Any], steps: int) -> tuple[float, Floats | None]:
-    """Set-up and steps, as it says; zero and None where it says nothing usable."""
-    setup, each = said.get("setup_s"), said.get("step_s")
-    ready = float(setup) if setup is not None and _is_time(setup) else 0.0
-    if not isinstance(each, list) or not all(map(_is_time, each)) or len(each) < steps:
-        return ready, None
-    return ready, np.array(each[:steps], dtype=np.float64)
 
 
 def _is_time(value: Any) -> bool:

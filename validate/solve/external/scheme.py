@@ -162,17 +162,17 @@ class ExternalSimulator:
         command = words(self.command)
         with tempfile.TemporaryDirectory(prefix=_FOLDER, ignore_cleanup_errors=True) as place:
             folder = Path(place).resolve()
-            asked = plain_questions(t, inputs) if self.inertia else self._statics(t, inputs)
+            if self.inertia:
+                asked = plain_questions(t, inputs)
+            elif self.levels and inputs.shape[1] == 1:
+                asked = at_levels(t, inputs, self.levels)
+            else:
+                asked = changes(t, inputs)
             job = write_job(folder, scene, asked.t, asked.inputs, self.inertia, self.tolerance)
             most = size_of(folder) + int(self.output * 2**20)
             limits = Limits(self.seconds, int(self.memory * 2**20), most)
             ended = run_program(command, folder, limits)
             return asked.answered(run_of(folder, job, ended))
-
-    def _statics(self, t: Floats, inputs: Floats) -> Asked:
-        if self.levels and inputs.shape[1] == 1:
-            return at_levels(t, inputs, self.levels)
-        return changes(t, inputs)
 
 
 def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
@@ -186,11 +186,16 @@ def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
     if answer.state == "cannot_run":
         return _none(job, "refused", f"cannot run: {answer.why}", ended, answer.findings)
     u, steps = answer.u, len(answer.u)
-    said = (f"external: {answer.name}", *answer.findings, *_overdrawn(answer, ended))
+    said = [f"external: {answer.name}", *answer.findings]
+    # Its own times are believed as far as they fit into the time that it took.
+    told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
+    if told > ended.seconds:
+        said.append(f"reports that it took {told:.3g} s, but ran for {ended.seconds:.3g} s")
     return Run(
         "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
         Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
-        step_times(answer.step_s), seconds=answer.step_s, said=said, memory=ended.memory,
+        step_times(answer.step_s), seconds=answer.step_s, said=tuple(said),
+        memory=ended.memory,
     )  # fmt: skip
 
 
@@ -218,14 +223,6 @@ def _traces(job: ExternalJob, answer: ExternalAnswer) -> dict[str, Trace]:
         seen = np.array([rows.apply(field) for field in answer.u])
         traces |= probe_traces(scene, seen.reshape(steps, len(scene.probes), 3))
     return traces
-
-
-def _overdrawn(answer: ExternalAnswer, ended: Ended) -> tuple[str, ...]:
-    """Its own times are believed as far as they fit into the time that it took."""
-    told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
-    if told <= ended.seconds:
-        return ()
-    return (f"reports that it took {told:.3g} s, but ran for {ended.seconds:.3g} s",)
 
 
 @dataclass(frozen=True)

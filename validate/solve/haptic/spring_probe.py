@@ -60,7 +60,14 @@ class SpringProbe:
         # How hard the probe pulls back out, N
         if self.grip is not None and float(self.force(held, tip, u) @ -self.axis) > self.grip:
             return None
-        return self._moved(held, tip, u) if self.slides else held
+        if not self.slides:
+            return held
+        # The hold at the nearest node, with the force that the spring has
+        node, _, places = self._nearest(tip, u)
+        if node == held.node or not self.spring:
+            return held
+        stretch, pad = self.force(held, tip, u) / self.spring, self._pad(node)
+        return Hold(node, pad, tip - self._hung(node, pad, places) - stretch)
 
     def _nearest(self, tip: Floats, u: Floats) -> tuple[int, float, Floats]:
         """The surface node nearest to the tip, how far it is, and all nodes' places."""
@@ -78,14 +85,6 @@ class SpringProbe:
         """Where the spring hangs (d,) m: the node, moved as the mean of its pad."""
         rest = self.body.places
         return np.asarray(rest[node] + (places - rest)[list(pad)].mean(axis=0))
-
-    def _moved(self, held: Hold, tip: Floats, u: Floats) -> Hold:
-        """The hold at the nearest node, with the force that the spring has."""
-        node, _, places = self._nearest(tip, u)
-        if node == held.node or not self.spring:
-            return held
-        stretch, pad = self.force(held, tip, u) / self.spring, self._pad(node)
-        return Hold(node, pad, tip - self._hung(node, pad, places) - stretch)
 
     def slack_at(self, held: Hold, u: Floats) -> Floats:
         """Where the probe (d,) m would feel nothing."""

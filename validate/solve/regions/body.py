@@ -16,8 +16,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.rigid import require_held
-from validate.fem.system import System, damping_of
+from validate.fem.system import System, damping_of, require_held
 from validate.scene.places import facets_of
 from validate.solve.regions.march import BorderName, Coupled, Zone, zone_of
 from validate.solve.regions.primary import (
@@ -337,17 +336,6 @@ class RegionPlan:
         assert isinstance(found, Regions)
         return found
 
-    def _primary(self, zone: Zone, nodes: Ints) -> Zone:
-        """The primary region, on `nodes` of the mesh, with its law."""
-        if self.law is None:
-            return zone
-        beyond = self.law.beyond(zone.wide, nodes)
-        if beyond is None:
-            return zone
-        return replace(
-            zone, solver=primary_solver(zone.solver, beyond, self.of.body, zone.wide, self.dt)
-        )
-
     def _made(self, layer: Ints, primary: int) -> Regions:
         """The regions after the primary one keep their outer borders where it grows over them."""
         ends = np.maximum(np.cumsum(self.layers), primary + np.arange(len(self.layers))).astype(int)
@@ -360,7 +348,13 @@ class RegionPlan:
             wide = self.of.unknowns(widened(found.of, i, self.of.graph, self.overlap))
             own = self.of.unknowns(np.flatnonzero(found.of == i))
             zones.append(zone_of(self.of.body, wide, own, every[i], names[i], self.dt))
-        zones[0] = self._primary(zones[0], self.of.nodes[found.of == 0])
+        # The primary region has its law where it has a complete cell.
+        first, beyond = zones[0], None
+        if self.law is not None:
+            beyond = self.law.beyond(first.wide, self.of.nodes[found.of == 0])
+        if beyond is not None:
+            solver = primary_solver(first.solver, beyond, self.of.body, first.wide, self.dt)
+            zones[0] = replace(first, solver=solver)
         coupled = Coupled(self.of.body, tuple(zones), self.dt, self.border, {})
         count = int(layer[found.of == 0].max()) + 1
         words = found.words

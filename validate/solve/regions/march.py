@@ -115,22 +115,19 @@ class Coupled:
             self._solve_jointly(due, pieces, visible, f)
         else:
             for i in due:
-                self._solve(i, last, pieces, visible, f)
+                zone, piece = self.zones[i], pieces[i]
+                seen = piece.seen if zone.name in EXPLICIT else visible
+                forces = f[zone.wide] - zone.outside @ seen
+                if isinstance(zone.solver, PrimarySolver):
+                    new, memory = zone.solver.walk(piece.u, piece.before, forces, piece.memory)
+                    pieces[i] = replace(piece, memory=memory)
+                else:
+                    new = zone.solver.next(piece.u, piece.before, forces)
+                self._take(i, new, pieces, visible)
         for i in due:
             if self.zones[i].name in EXPLICIT:
                 pieces[i] = replace(pieces[i], seen=visible)
         return Motion(k, tuple(pieces), visible)
-
-    def _solve(self, i: int, last: Motion, pieces: list[Piece], visible: Floats, f: Floats) -> None:
-        zone, piece = self.zones[i], pieces[i]
-        seen = piece.seen if zone.name in EXPLICIT else visible
-        forces = f[zone.wide] - zone.outside @ seen
-        if isinstance(zone.solver, PrimarySolver):
-            new, memory = zone.solver.walk(piece.u, piece.before, forces, piece.memory)
-            pieces[i] = replace(piece, memory=memory)
-        else:
-            new = zone.solver.next(piece.u, piece.before, forces)
-        self._take(i, new, pieces, visible)
 
     def _take(self, i: int, new: Floats, pieces: list[Piece], visible: Floats) -> None:
         """The region's solution becomes its piece, and is shown where the border says so."""
@@ -190,21 +187,18 @@ def carried(old: Coupled, motion: Motion, new: Coupled) -> Motion:
     for zone, piece in zip(old.zones, motion.pieces, strict=True):
         rate = (piece.u - piece.before)[zone.shown] / zone.ratio
         speed[zone.own] = rate  # m a tick
-    pieces = tuple(_carried(new, i, motion, speed, old) for i in range(len(new.zones)))
-    return Motion(motion.k, pieces, motion.visible)
-
-
-def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) -> Piece:
-    zone = new.zones[i]
-    u, start = motion.visible[zone.wide], motion.visible[zone.own]
-    before = u - zone.ratio * speed[zone.wide]
-    if i < len(old.zones) and old.zones[i].ratio == zone.ratio:
-        kept = np.isin(zone.wide, old.zones[i].wide)
-        from_ = np.searchsorted(old.zones[i].wide, zone.wide[kept])
-        u[kept], before[kept] = motion.pieces[i].u[from_], motion.pieces[i].before[from_]
-        same = np.isin(zone.own, old.zones[i].own)
-        start[same] = motion.pieces[i].start[np.searchsorted(old.zones[i].own, zone.own[same])]
-    return Piece(u, before, start, motion.visible, zone.memory)
+    pieces = []
+    for i, zone in enumerate(new.zones):
+        u, start = motion.visible[zone.wide], motion.visible[zone.own]
+        before = u - zone.ratio * speed[zone.wide]
+        if i < len(old.zones) and old.zones[i].ratio == zone.ratio:
+            kept = np.isin(zone.wide, old.zones[i].wide)
+            from_ = np.searchsorted(old.zones[i].wide, zone.wide[kept])
+            u[kept], before[kept] = motion.pieces[i].u[from_], motion.pieces[i].before[from_]
+            same = np.isin(zone.own, old.zones[i].own)
+            start[same] = motion.pieces[i].start[np.searchsorted(old.zones[i].own, zone.own[same])]
+        pieces.append(Piece(u, before, start, motion.visible, zone.memory))
+    return Motion(motion.k, tuple(pieces), motion.visible)
 
 
 # --- stability ------------------------------------------------------------------------------------

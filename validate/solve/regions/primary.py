@@ -22,7 +22,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
@@ -313,7 +312,9 @@ class PrimaryLaw:
 
     def _of(self, scene: Scene) -> Scene:
         """The scene with the primary region's law."""
-        return _made(scene, lambda m: _material(m, self.law, self.prony))
+        if self.law == "linear":
+            return scene
+        return _made(scene, lambda m: replace(m.of_law(self.law), prony=self.prony))
 
     def beyond(self, wide: Ints, own: Ints) -> Beyond | None:
         """On the unknowns `wide` (w,) of the body, of the mesh's nodes `own` (k,); None where these
@@ -325,7 +326,17 @@ class PrimaryLaw:
         if not inside.any():
             return None
         nodes = np.unique(cells[inside])
-        part = _part(self.scene, inside, nodes)
+        # The scene's cells `inside` (e,) alone, without what acts on them
+        mesh, numbers = self.scene.mesh, np.flatnonzero(inside)
+        regions = tuple(
+            replace(r, cells=np.flatnonzero(np.isin(numbers, r.cells))) for r in self.scene.regions
+        )
+        part = Scene(
+            Mesh(mesh.nodes[nodes], np.searchsorted(nodes, mesh.cells[inside]), mesh.kind),
+            self.scene.material, regions=tuple(r for r in regions if len(r.cells)),
+            plane=self.scene.plane, thickness=self.scene.thickness,
+            dilatation=self.scene.dilatation,
+        )  # fmt: skip
         put = _put(nodes, d, self.free[wide])
         if self.law == "linear":
             twice = _made(part, lambda m: _stiffer(m, 2.0))
@@ -334,20 +345,6 @@ class PrimaryLaw:
         large = self._of(part)
         K = sparse.csr_array(put @ stiffness(part) @ put.T)
         return LargeStrainRegion(Body(relaxed(large)), cell_branches(large), put, K)
-
-
-def _part(scene: Scene, inside: NDArray[np.bool_], nodes: Ints) -> Scene:
-    """The scene's cells `inside` (e,) alone, without what acts on them."""
-    cells = np.searchsorted(nodes, scene.mesh.cells[inside])
-    numbers = np.flatnonzero(inside)
-    regions = tuple(
-        replace(r, cells=np.flatnonzero(np.isin(numbers, r.cells))) for r in scene.regions
-    )
-    return Scene(
-        Mesh(scene.mesh.nodes[nodes], cells, scene.mesh.kind), scene.material,
-        regions=tuple(r for r in regions if len(r.cells)), plane=scene.plane,
-        thickness=scene.thickness, dilatation=scene.dilatation,
-    )  # fmt: skip
 
 
 def _put(nodes: Ints, d: int, unknowns: Ints) -> sparse.csr_array:
@@ -363,10 +360,6 @@ def _put(nodes: Ints, d: int, unknowns: Ints) -> sparse.csr_array:
 def _made(scene: Scene, of: Callable[[Material], Material]) -> Scene:
     regions = tuple(replace(r, material=of(r.material)) for r in scene.regions)
     return replace(scene, material=of(scene.material), regions=regions)
-
-
-def _material(m: Material, law: LawName, prony: Prony) -> Material:
-    return m if law == "linear" else replace(m.of_law(law), prony=prony)
 
 
 def _stiffer(m: Material, times: float) -> Material:
@@ -420,18 +413,14 @@ class PrimarySolver:
             size, acting = float(np.linalg.norm(residual)), sum(map(np.linalg.norm, parts))
             if size <= _TOLERANCE * acting + self.law.rounding:
                 return new
-            factor = self._factor(law, new, anew=size > _CONTRACTION * last)
-            new, last = self._corrected(new, factor.solve(residual), law), size
+            # The last factorisation, as long as it shrinks the residual (Shamanskii 1967)
+            if size > _CONTRACTION * last or not self.kept:
+                J = sparse.csr_array(self.A + law.tangent(new))
+                self.kept[:] = [factorise(J, self.node, self.places)]
+            new, last = self._corrected(new, self.kept[0].solve(residual), law), size
         raise UnsettledError(
             f"no equilibrium of the primary region after {_MOST} Newton iterations"
         )
-
-    def _factor(self, law: Response, u: Floats, *, anew: bool) -> Factor | Fronts:
-        """The last factorisation, as long as it shrinks the residual (Shamanskii 1967)."""
-        if anew or not self.kept:
-            J = sparse.csr_array(self.A + law.tangent(u))
-            self.kept[:] = [factorise(J, self.node, self.places)]
-        return self.kept[0]
 
     def _corrected(self, u: Floats, step: Floats, law: Response) -> Floats:
         for halved in range(_HALVINGS + 1):

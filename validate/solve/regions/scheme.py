@@ -232,20 +232,17 @@ class RegionStepper:
             moved = np.linalg.norm(self.body.spread(last.motion.visible), axis=1)
             deformation = float(moved[held.node])
         around = self.plan.around(held.pad)
-        size = self._size(around.spacing)
-        layers = size.layers(deformation, moved, around.layer) if self.settings.layers else 0
+        s = self.settings
+        least = s.layers[0] if s.layers else 1
+        most = max(least, s.most)  # a fixed one never reads it
+        size = PrimarySize(s.adapt, least, most, s.slope, s.moved, around.spacing)
+        layers = size.layers(deformation, moved, around.layer) if s.layers else 0
         regions = self.plan.regions(held.pad, layers)
         if last.regions is None or last.motion is None:
             return regions, regions.coupled.rest()
         if regions is last.regions:
             return regions, last.motion
         return regions, carried(last.regions.coupled, last.motion, regions.coupled)
-
-    def _size(self, length: float) -> PrimarySize:
-        s = self.settings
-        least = s.layers[0] if s.layers else 1
-        most = max(least, s.most)  # a fixed one never reads it
-        return PrimarySize(s.adapt, least, most, s.slope, s.moved, length)
 
     def _told(self, k: int, tick: RegionTick, hand: Floats, *, changed: bool) -> State:
         coupled = tick.regions.coupled if tick.regions else None

@@ -35,8 +35,7 @@ from validate.errors import SceneError
 from validate.fem.cavity import pressure_load, volume_hessian, volume_of
 from validate.fem.large_strain.hyperelastic import BEYOND_LAW, Body
 from validate.fem.linear_solvers.factor import Factor, elimination_order, factorise_indefinite
-from validate.fem.rigid import require_held
-from validate.fem.system import System
+from validate.fem.system import System, require_held
 from validate.parameters import quantity
 from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
@@ -256,7 +255,18 @@ class StaticNewton:
         if not (scene.cavities or scene.inputs):
             raise SceneError("scene without drive, load and cavity: nothing moves; add one")
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
-        rest = _rest(problem)
+        # The body at rest; `balance` refuses one that can move rigidly
+        volumes, u = len(problem.rest_volumes), np.zeros(len(system.moves))
+        balance = problem.balance(
+            u, np.zeros(volumes), np.zeros(len(scene.inputs)), np.ones(volumes)
+        )
+        tangent = problem.tangent(balance)
+        if tangent.factor.negative_pivots:
+            raise SceneError(
+                f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an "
+                "element is inverted; refine the mesh"
+            )
+        rest = Found(balance, tangent, factorisations=1)
         return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
 
 
@@ -285,20 +295,6 @@ class _Memory:
 
     def __init__(self, last: Found) -> None:
         self.last = last
-
-
-def _rest(problem: Equilibrium) -> Found:
-    """The body at rest; `SceneError` where it can move rigidly."""
-    cavities, inputs = len(problem.rest_volumes), np.zeros(len(problem.system.scene.inputs))
-    u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
-    balance = problem.balance(u, np.zeros(cavities), inputs, ones)
-    tangent = problem.tangent(balance)
-    if tangent.factor.negative_pivots:
-        raise SceneError(
-            f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an element "
-            "is inverted; refine the mesh"
-        )
-    return Found(balance, tangent, factorisations=1)
 
 
 @dataclass(frozen=True)
@@ -343,19 +339,19 @@ class NewtonStepper:
         A failure keeps the last load that was reached and says what stopped the body there.
         """
         target = np.full(len(state.inner.pressures), self.settings.volume_ratio)
-        good = self._known(state.inner, target)
+        at: Loaded = state.inner
+        if self.memory.last.balance.u is at.u:
+            good = replace(self.memory.last, iterations=0, factorisations=0)
+        else:
+            balance = self.problem.balance(
+                at.u, at.pressures, at.inputs, target, None, at.multipliers
+            )
+            good = Found(balance, self.problem.tangent(balance), factorisations=1)
         kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
         if kept and (inputs == state.inner.inputs).all():
             numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
             return replace(state, k=state.k + 1, updates=0, numbers=numbers)
         return self._walked(state.k, good, np.array(inputs, dtype=np.float64), target)
-
-    def _known(self, at: Loaded, target: Floats) -> Found:
-        """The equilibrium of a state: remembered, or its forces and tangent made again."""
-        if self.memory.last.balance.u is at.u:
-            return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(at.u, at.pressures, at.inputs, target, None, at.multipliers)
-        return Found(balance, self.problem.tangent(balance), factorisations=1)
 
     def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:
         """Load steps to `inputs`; each failure halves them, to 2^-max_cuts of the way at least,
@@ -367,7 +363,9 @@ class NewtonStepper:
             load = inputs if share == 1 else begin + share * (inputs - begin)
             found = self._load_step(good, load, ratios + share * (target - ratios))
             if isinstance(found, Found):
-                good, done = _added(good, found), share
+                work = good.iterations + found.iterations
+                made = good.factorisations + found.factorisations
+                good, done = replace(found, iterations=work, factorisations=made), share
                 size *= 2 if found.iterations <= _FEW else 1
             elif size > 2.0**-self.settings.max_cuts:
                 size /= 2
@@ -480,15 +478,6 @@ class NewtonStepper:
         """Displacements (n, d) m of all nodes."""
         u: Floats = state.inner.u
         return u.reshape(self.scene.mesh.nodes.shape)
-
-
-def _added(before: Found, found: Found) -> Found:
-    """`found` with the work of the load steps before it."""
-    return replace(
-        found,
-        iterations=before.iterations + found.iterations,
-        factorisations=before.factorisations + found.factorisations,
-    )
 
 
 def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:

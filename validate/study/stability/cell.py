@@ -14,7 +14,7 @@ from scipy.linalg import eigh, eigvalsh
 from validate.arrays import Floats
 from validate.engine.worker_cache import Kept
 from validate.errors import ComparisonError, ValidateError
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.locking import locking_of
 from validate.fem.system import System, build, mass_of
 from validate.pipeline.ladder.default import body_of
