@@ -87,20 +87,7 @@ def residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
         for seen in registered.compared:
             if seen.name in (selection.of or (seen.name,)):
                 found += [_of(d, selection, seen.role) for d in seen.deviations(run, selection)]
-        # The fluid is incompressible: its reference volume is the one at rest, exactly.
-        for name, trace in run.traces.items():
-            if not name.endswith(".volume_ratio"):
-                continue
-            ratio = selection.read(run.t, trace.y, run.t)
-            d = Deviation(
-                "volume.relative_error", (ratio - 1)[:, None], "1", 0.0, 0.0,
-                "cavity volume over its rest volume minus one; reference: incompressible fluid",
-            )  # fmt: skip
-            if len(ratio) == 1:
-                d = replace(d, simulated=float(ratio[0]), measured=1.0)
-            else:
-                d = replace(d, t=run.t if selection.t is None else selection.t)
-            found.append(_of(d, selection, "validates"))
+        found += [_of(d, selection, "validates") for d in _volumes(run, selection)]
     return tuple(found)
 
 
@@ -165,3 +152,20 @@ def _of(d: Deviation, selection: Selection, role: Role) -> Residual:
         d.quantity, selection.label, d.values, d.sd, d.systematic, d.unit, d.definition,
         d.simulated, d.measured, role, d.freedom, d.scale, d.reference, d.t, d.axes,
     )  # fmt: skip
+
+
+def _volumes(run: Run, selection: Selection) -> list[Deviation]:
+    """The fluid is incompressible: its reference volume is the one at rest, exactly."""
+    found = []
+    for name, trace in run.traces.items():
+        if name.endswith(".volume_ratio"):
+            ratio = selection.read(run.t, trace.y, run.t)
+            d = Deviation(
+                "volume.relative_error", (ratio - 1)[:, None], "1", 0.0, 0.0,
+                "cavity volume over its rest volume minus one; reference: incompressible fluid",
+            )  # fmt: skip
+            if len(ratio) == 1:
+                found.append(replace(d, simulated=float(ratio[0]), measured=1.0))
+            else:
+                found.append(replace(d, t=run.t if selection.t is None else selection.t))
+    return found
