@@ -1,7 +1,7 @@
 """Kalman filter formulas: linear, extended, unscented and ensemble.
 
 Pure functions of states x (n,), covariances P (n, n) and measurements z (m,), NaN = missing, all of
-one system of units; `filterpy_oracle.oracle_table` shows that they equal filterpy's to rounding.
+one system of units; `filterpy.oracle.oracle_table` shows that they equal filterpy's to rounding.
 Updates are in Joseph's form, which stays symmetric and positive for any gain.
 
 Unscented and ensemble Kalman filters of any small model, as pure functions.
