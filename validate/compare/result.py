@@ -24,8 +24,6 @@ from validate.compare.view import View
 from validate.display import brief
 from validate.parameters import Changed, Parameter
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Stream
-from validate.scene.mesh import Mesh
-from validate.solve.types import Run
 
 if TYPE_CHECKING:
     from validate.compare.effects import Effect
@@ -33,6 +31,7 @@ if TYPE_CHECKING:
     from validate.identify.budget import IdentifiedValue
     from validate.recording.types import Recording
     from validate.register.registration import Registered
+    from validate.scene.mesh import Mesh
     from validate.scene.meshless import AnyScene
     from validate.solve.types import Run
 
