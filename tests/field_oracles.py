@@ -6,7 +6,7 @@ from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats
 from validate.compare.shapes.pair import FieldPair
-from validate.fem.assembly.cells import rule, volumes_at
+from validate.fem.assembly.assemble import rule, volumes_at
 from validate.fem.system import System
 from validate.scene.mesh import Mesh
 

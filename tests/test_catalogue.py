@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from validate.catalogue import Card, card, experiment_files, root_of, shipped
-from validate.datasets.registry import data_sets
+from validate.datasets.home import data_sets
 from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file

@@ -11,6 +11,7 @@ from validate import memory
 from validate.errors import SceneError
 from validate.fem.linear_solvers import factor as fill
 from validate.fem.linear_solvers.factor import (
+    Fronts,
     elimination_order,
     factor_bytes,
     factorise,
@@ -18,7 +19,6 @@ from validate.fem.linear_solvers.factor import (
     require_solvable,
     solvable_bytes,
 )
-from validate.fem.linear_solvers.frontal import Fronts
 from validate.fem.system import build
 from validate.memory import MemoryShortError, free_memory, require_memory
 from validate.pipeline.experiment.experiment import Experiment

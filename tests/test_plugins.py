@@ -30,7 +30,7 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.external.program import SIMULATORS, simulator_of, words
 from validate.solve.static.newton import StaticNewton
-from validate.solve.stepping import Stepping
+from validate.solve.study_entries import Stepping
 from validate.testing import refusal
 from validate.testing.schemes import block
 

@@ -16,7 +16,7 @@ FORMER = {
     "compare.overall": "compare.overall_verdict",
     "compare.shape_error": "compare.shapes.shape_error",
     "compare.two_fields": "compare.shapes.two_fields",
-    "estimate.batch": "estimate.kalman.batch",
+    "estimate.batch": "estimate.kalman.coordinates",
     "estimate.ensemble_kf": "estimate.ensemble.ensemble_kf",
     "estimate.filterpy_guest": "estimate.filterpy.filters",
     "estimate.kf_fem": "estimate.kalman.kf_fem",
@@ -98,10 +98,8 @@ FORMER = {
 FORMER_MEMBERS: Mapping[str, Mapping[str, str]] = {
     "estimate": {"FilterpyGuest": "FilterpyFilter"},
     "estimate.filterpy.filters": {"FilterpyGuest": "FilterpyFilter"},
-    "solve.external.answer": {"GuestAnswer": "ExternalAnswer"},
-    "solve.external.job": {"GuestJob": "ExternalJob"},
-    "solve.external.release": {"GuestLetGo": "ExternalLetGo"},
-    "solve.external.scheme": {"Guest": "ExternalSimulator"},
+    "solve.external.exchange": {"GuestAnswer": "ExternalAnswer", "GuestJob": "ExternalJob"},
+    "solve.external.scheme": {"Guest": "ExternalSimulator", "GuestLetGo": "ExternalLetGo"},
     "solve.external.suite": {"check_guest": "check_simulator"},
 }
 

@@ -7,7 +7,7 @@ from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
-from validate.solve.regions.map import layers_from, node_graph, split
+from validate.solve.regions.body import layers_from, node_graph, split
 
 _WIDE = 12  # cells of Fig. 2's square: its rows of the list are 13 nodes apart
 _NEAR = 2  # layers of the red region there: 3 by 3 nodes

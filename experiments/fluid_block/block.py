@@ -20,8 +20,7 @@ from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.scene.scene import Drive, Pin, Scene, Support
-from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
-from validate.solve.fluid.pulse import MMHG, PulsePressure
+from validate.solve.fluid.cavities import MMHG, ElasticPressure, ExactPressure, PulsePressure
 from validate.solve.march import march
 from validate.twin.sensors import signal, streams
 

@@ -4,13 +4,12 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.fem.linear_solvers.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import Condensed, Swapped, condense
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree
 from validate.scene.places import nodes_of
-from validate.solve.fluid.swap import Swapped
 
 from .block import slab
 

@@ -11,9 +11,14 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import Responses
 from validate.pipeline.experiment.tree import Tree
-from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
+from validate.solve.fluid.cavities import (
+    LINEAR_TO,
+    MMHG,
+    ElasticPressure,
+    ExactPressure,
+    PulsePressure,
+)
 from validate.solve.fluid.pressure_curve import slopes, still
-from validate.solve.fluid.pulse import LINEAR_TO, MMHG, PulsePressure
 from validate.solve.types import State
 
 from .block import FluidLaws

@@ -14,8 +14,8 @@ from validate.recording.types import Recording
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.candidates import StillBody
 from validate.solve.schemes import candidates
+from validate.solve.study_entries import StillBody
 
 GRIDS = {7: (6, 7, 10), 9: (8, 9, 14), 11: (10, 12, 18)}  # cells along x, y, z by level
 _DEEPEST = 0.009  # m, the last load of the experiment

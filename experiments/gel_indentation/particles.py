@@ -17,8 +17,7 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Entry, NumberTable
-from validate.datasets.home import data_path
-from validate.datasets.registry import named
+from validate.datasets.home import data_path, named
 from validate.errors import RecordingError, UsageError
 from validate.files import read_bytes, read_text
 from validate.recording.readers import recognised

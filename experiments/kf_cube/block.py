@@ -24,8 +24,8 @@ from validate.scene.geometries.box import centroids
 from validate.scene.material import Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Scene
+from validate.solve.dynamic.linear import StartName
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.excitation import StartName
 from validate.solve.march import output_frames
 from validate.twin.time_stepping import SteppedTwin
 from validate.twin.tracker import Camera, Origin, Reading

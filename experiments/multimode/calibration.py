@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.compare.verdict import Accept
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree

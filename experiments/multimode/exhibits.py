@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.pipeline.experiment.experiment import Progress, Told
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases, Followed

@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.shapes.pair import Common
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, Told

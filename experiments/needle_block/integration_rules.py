@@ -11,7 +11,7 @@ from validate.fem.system import build as build_system
 from validate.solve.amplification import amplification
 from validate.solve.dynamic.newmark_rule import Rule, rule_of
 from validate.solve.march import march
-from validate.solve.stepping import newmark_maps, spectral_radii
+from validate.solve.study_entries import newmark_maps, spectral_radii
 
 from ..bending_rod.body import bending_rod, gravity_inputs
 from .benchmark import IMPLICIT

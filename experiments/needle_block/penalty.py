@@ -18,9 +18,8 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.shapes.pair import Common, Field, pair
 from validate.compare.shapes.two_fields import relative_l2_norm
 from validate.fem.assembly.assemble import stiffness_points
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly.volume_constraints import Normals, mixed_static, volume_penalty
 from validate.fem.critical import lanczos_step
-from validate.fem.large_strain.volume_penalty import Normals, volume_penalty
 from validate.fem.system import System, build
 from validate.scene.material import Material
 from validate.scene.scene import Scene

@@ -20,8 +20,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Mass, Probe, Scene, Support, Weight
 from validate.solve.dynamic.release import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
-from validate.solve.external.release import ExternalLetGo
-from validate.solve.external.scheme import ExternalSimulator
+from validate.solve.external.scheme import ExternalLetGo, ExternalSimulator
 from validate.solve.static.newton import StaticNewton
 
 from .beam import build, heeded, place, sets

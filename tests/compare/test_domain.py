@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.compare.domain import domains, hencky
+from validate.compare.result import domains, hencky
 from validate.scene.geometries.box import grid
 from validate.scene.mesh import Mesh, quadratic
 

@@ -6,7 +6,16 @@ from phantoms import grid_mesh
 
 from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.arrays import Floats
-from validate.compare.shapes.boundary import Boundary, deformed_boundary, enclosed, outline_boundary
+from validate.compare.shapes.boundary import (
+    Boundary,
+    Soundness,
+    crossings,
+    deformed_boundary,
+    enclosed,
+    inverted_cells,
+    outline_boundary,
+    require_comparable,
+)
 from validate.compare.shapes.pair import Field, pair
 from validate.compare.shapes.shape_error import (
     Boundaries,
@@ -20,12 +29,6 @@ from validate.compare.shapes.shape_error import (
     shell_error,
     surface_error,
     symmetric_difference,
-)
-from validate.compare.shapes.soundness import (
-    Soundness,
-    crossings,
-    inverted_cells,
-    require_comparable,
 )
 from validate.compare.shapes.two_fields import compare_fields, compared
 from validate.errors import ComparisonError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.compare.exhibit import NumberTable, Series
-from validate.compare.track import TrackError, track_error, track_scores
+from validate.compare.force_error import TrackError, track_error, track_scores
 from validate.errors import ComparisonError
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.compare.force_error import FORCE_METRICS
-from validate.compare.shapes.metric import Metric
+from validate.compare.score import Metric
 from validate.compare.shapes.pair import Common, Field, FieldPair, pair
 from validate.compare.shapes.shape_error import BOUNDARY_METRICS
 from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compare_fields, compared

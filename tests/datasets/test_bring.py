@@ -12,10 +12,9 @@ import pytest
 from command_line import here, refused
 
 from validate.commands import data as command
-from validate.datasets import home, registry
+from validate.datasets import home
 from validate.datasets.bring import bring, csv_of
-from validate.datasets.home import cache_folder
-from validate.datasets.registry import DataFile, DataSet
+from validate.datasets.home import DataFile, DataSet, cache_folder
 from validate.errors import RecordingError
 
 LOG, NOTE = b"0.0,1.0\n" * 40_000, b"as you like"
@@ -59,7 +58,7 @@ def server(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Server]:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv(home.SHARED, str(tmp_path / "shared"))
     with Server() as found:
-        monkeypatch.setattr(registry, "RAW", found.base)
+        monkeypatch.setattr(home, "RAW", found.base)
         serving = Thread(target=found.serve_forever, kwargs={"poll_interval": 0.01})
         serving.start()
         found.holds("raw/log.csv", LOG)
@@ -79,7 +78,7 @@ def file(name: str, content: bytes) -> DataFile:
 def logs(monkeypatch: pytest.MonkeyPatch) -> DataSet:
     files = (file("LICENSE", NOTE), file("first/log.csv", LOG))
     made = DataSet("logs", "force/logs", "logs", "lab/logs", "0123456", "MIT", "Lab (2026).", files)
-    for module in (registry, command):
+    for module in (home, command):
         monkeypatch.setattr(module, "data_sets", lambda: (made,))
     monkeypatch.setattr(home, "named", lambda _: made)
     return made
@@ -164,7 +163,7 @@ def test_without_a_network_the_command_says_so_in_one_line(
 ) -> None:
     with Server() as gone:
         nowhere = gone.base
-    monkeypatch.setattr(registry, "RAW", nowhere)
+    monkeypatch.setattr(home, "RAW", nowhere)
     line = refused("data", "get", "logs")
     assert "127.0.0.1" in line
     assert "cannot be reached; check the network and run the command again" in line
@@ -251,11 +250,11 @@ def test_what_was_made_by_hand_is_not_brought(
 ) -> None:
     by_hand = replace(logs.files[0], source="")
     made = replace(logs, files=(by_hand,), made="the rows of data.jl")
-    monkeypatch.setattr(registry, "data_sets", lambda: (made,))
+    monkeypatch.setattr(home, "data_sets", lambda: (made,))
     line = refused("data", "get", "logs")
     assert "logs cannot be downloaded: the rows of data.jl" in line
     some = replace(logs, files=(by_hand, logs.files[1]), made="the rows of data.jl")
-    monkeypatch.setattr(registry, "data_sets", lambda: (some,))
+    monkeypatch.setattr(home, "data_sets", lambda: (some,))
     code, out, _ = here("data", "get", "logs")
     assert code == 0
     assert "1 files are not downloadable: the rows of data.jl" in out

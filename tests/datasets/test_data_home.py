@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from validate.datasets import home
-from validate.datasets.home import data_path, whole
-from validate.datasets.registry import DataFile, DataSet, data_sets, named
+from validate.datasets.home import DataFile, DataSet, data_path, data_sets, named, whole
 from validate.errors import RecordingError, UsageError
 
 FOLDER, FILE = "markers/silicone-beam", "beam_gravity_V2_b.c3d"

@@ -10,6 +10,7 @@ import pytest
 
 from validate.errors import ComparisonError
 from validate.estimate.filterpy import oracle as filterpy_oracle
+from validate.estimate.filterpy.classes import drawing
 from validate.estimate.filterpy.filters import (
     FILTERPY_FILTERS,
     FilterpyFilter,
@@ -17,17 +18,16 @@ from validate.estimate.filterpy.filters import (
     kalman,
     require_shapes,
 )
-from validate.estimate.filterpy.linear_model import LinearModel
-from validate.estimate.filterpy.names import drawing
 from validate.estimate.filterpy.oracle import OracleRow, oracle_table
-from validate.estimate.kalman.formulas import Gaussian
-from validate.estimate.reduced.reduced_kf import ReducedKf
-from validate.estimate.reduced.sampled_kalman import (
+from validate.estimate.kalman.formulas import (
+    Gaussian,
     SigmaPoints,
     enkf_update,
     ensemble_gaussian,
     ukf_predict,
 )
+from validate.estimate.reduced.linear_system import LinearModel
+from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.testing.pulled_cube import case
 
 # private: _apart: replaced, to bring a case about.

@@ -9,14 +9,12 @@ from scipy.linalg import expm, solve_discrete_are
 
 from validate.errors import SceneError
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
-from validate.estimate.kalman.covariance import Decoupled
+from validate.estimate.kalman.covariance import Decoupled, advance, mirrored
 from validate.estimate.kalman.displacement_filter import Estimate, Structure
 from validate.estimate.kalman.formulas import Gaussian, best_gain, kf_predict, kf_update
-from validate.estimate.kalman.gains import Claims, gain_sequence, schedule
+from validate.estimate.kalman.gains import Claims, Spaces, gain_sequence, observed, schedule
 from validate.estimate.kalman.kf_fem import KfFem, in_modes, modal_covariance
-from validate.estimate.kalman.modal_kernel import advance, mirrored
 from validate.estimate.kalman.modal_kf import ModalKf
-from validate.estimate.kalman.observation_covariance import Spaces, observed
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore

@@ -18,12 +18,17 @@ from validate.estimate.consistency import nis_consistency
 from validate.estimate.ensemble import members
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf, along_mesh, gaspari_cohn, reached
 from validate.estimate.ensemble.member_filter import MemberModel, MemberStepper
-from validate.estimate.ensemble.parameters import doubts, parts
+from validate.estimate.ensemble.members import doubts, parts
 from validate.estimate.ensemble.roukf import Roukf, reduced_update, spread, unit_points
-from validate.estimate.filterpy.names import UnscentedKalmanFilter
-from validate.estimate.kalman.formulas import Gaussian, kf_predict, kf_update
+from validate.estimate.filterpy.classes import UnscentedKalmanFilter
+from validate.estimate.kalman.formulas import (
+    Gaussian,
+    Reach,
+    ensemble_update,
+    kf_predict,
+    kf_update,
+)
 from validate.estimate.measurements import Measurements
-from validate.estimate.reduced.sampled_kalman import Reach, ensemble_update
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.critical import critical_step
 from validate.fem.system import System, build

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.extended.explicit_step import explicit_step
+from validate.estimate.extended.explicit_filter import explicit_step
 from validate.estimate.measurements import Measurements
 from validate.estimate.reduced import reduced_ekf
 from validate.estimate.reduced.reduced_ekf import ReducedEKF, modes, pod, shapes_covariance

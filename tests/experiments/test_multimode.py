@@ -8,7 +8,7 @@ import pytest
 from beside import beside
 
 from validate.errors import RecordingError, UsageError
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.pipeline import load as load_experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree

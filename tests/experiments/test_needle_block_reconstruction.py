@@ -9,14 +9,13 @@ from experiments.bending_rod.body import bending_rod, gravity_inputs
 from experiments.needle_block.body import MP2, SPEED, STEP, needle_block, needle_depth
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.linear_solvers.gauss_seidel import sweeps, sweeps_loops
 from validate.fem.system import System, build
 from validate.scene.scene import Drive, PlaneState, Support
 from validate.solve.dynamic.linear import elastic_forces
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.march import march
-from validate.solve.static.linear_solvers import GaussSeidel
+from validate.solve.static.linear_solvers import GaussSeidel, sweeps, sweeps_loops
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run, Scheme
 

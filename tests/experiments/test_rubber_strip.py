@@ -9,7 +9,7 @@ from beside import beside, experiment
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.parameters import with_given
 from validate.pipeline import load as load_experiment
 from validate.pipeline.experiment.options import Options

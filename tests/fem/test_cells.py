@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from field_oracles import nodal_volumes
 
-from validate.fem.assembly.assemble import mass
-from validate.fem.assembly.cells import jacobians, nodal_rule, rule, values_at, volumes_at
+from validate.fem.assembly.assemble import jacobians, mass, nodal_rule, rule, values_at, volumes_at
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic

@@ -13,8 +13,7 @@ from scipy.sparse.linalg import splu
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.linear_solvers import factor
-from validate.fem.linear_solvers.factor import Factor, factorise, nested_dissection
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise, nested_dissection
 from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support

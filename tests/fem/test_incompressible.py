@@ -7,10 +7,8 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import mean_divergence
-from validate.fem.assembly.cells import rule, values_at, volumes_at
-from validate.fem.assembly.incompressible import keep_volumes
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly.assemble import mean_divergence, rule, values_at, volumes_at
+from validate.fem.assembly.volume_constraints import keep_volumes, mixed_static
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid

@@ -10,7 +10,7 @@ from law_samples import NAMES, sample
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.laws.law import law_of
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.scene.laws import LAWS, Coefficients, VolumetricName, ogden_terms
 from validate.scene.material import LawName, Material
 from validate.scene.meshless import MaterialPoint, StretchMode

@@ -9,8 +9,8 @@ import pytest
 from experiments.bending_rod.body import GRAVITY, bending_rod
 from experiments.needle_block.body import MP2, needle_block
 from validate.errors import SceneError
-from validate.fem.assembly import mixed
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly import volume_constraints as mixed
+from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.locking import locking_notes
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid

@@ -10,9 +10,14 @@ from test_hyperelastic import turn
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import stiffness, stiffness_points
-from validate.fem.assembly.cells import rule, values_at, volumes_at
-from validate.fem.assembly.mean_dilatation import projections
+from validate.fem.assembly.assemble import (
+    projections,
+    rule,
+    stiffness,
+    stiffness_points,
+    values_at,
+    volumes_at,
+)
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import law_of
 from validate.fem.system import build

@@ -6,7 +6,7 @@ from law_samples import NAMES, sample
 
 from validate.errors import SceneError
 from validate.fem.laws.law import law_of
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.scene.material import LawName, Material
 from validate.scene.meshless import MaterialPoint, StretchMode
 from validate.scene.rubber import mooney_rivlin, ogden

@@ -5,8 +5,7 @@ import pytest
 from phantoms import grid_mesh
 
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import stiffness
-from validate.fem.assembly.surface import foundation_stiffness, membrane_stiffness
+from validate.fem.assembly.assemble import foundation_stiffness, membrane_stiffness, stiffness
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Foundation, Membrane, Scene

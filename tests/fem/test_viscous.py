@@ -9,7 +9,7 @@ from law_samples import SPLIT, sample
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.laws.law import law_of, parts_of, stiffened
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.fem.laws.viscoelasticity import Lagged, branches_of, second_stress
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material, Prony

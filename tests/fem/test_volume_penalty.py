@@ -9,7 +9,7 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import divergence, stiffness
-from validate.fem.large_strain.volume_penalty import Normals, volume_penalty
+from validate.fem.assembly.volume_constraints import Normals, volume_penalty
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material

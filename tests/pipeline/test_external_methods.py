@@ -16,8 +16,7 @@ from validate.pipeline.experiment.external import external_methods, with_simulat
 from validate.pipeline.experiment.options import Options, configure
 from validate.pipeline.run.named_run import run_name
 from validate.pipeline.run.pipeline import compare
-from validate.solve.external.release import ExternalLetGo
-from validate.solve.external.scheme import ExternalSimulator
+from validate.solve.external.scheme import ExternalLetGo, ExternalSimulator
 
 FAKE = """
 import json, sys

@@ -8,10 +8,10 @@ from validate.pipeline.ladder.references import (
     still_best,
     swinging_pair,
 )
-from validate.solve.candidates import StillBody, SwingingBody
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.schemes import candidates
 from validate.solve.static.quasi_static import QuasiStatic
+from validate.solve.study_entries import StillBody, SwingingBody
 
 STEPS = (0.02, 0.01)
 EXACT = {"quasi-static", "10 modes", "40 modes"}  # none of these has an error of the step

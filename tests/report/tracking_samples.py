@@ -6,10 +6,10 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.force_error import track_error, track_scores
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import run_scores, scores_of
-from validate.compare.track import track_error, track_scores
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.register.markers.markers import observe_markers

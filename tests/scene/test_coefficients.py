@@ -5,7 +5,7 @@ import pytest
 from law_samples import NAMES, sample
 
 from validate.errors import SceneError
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.parameters import describe, with_values
 from validate.scene.geometries.box import box
 from validate.scene.laws import LAWS, Coefficients, lost_stability

@@ -17,7 +17,7 @@ from validate.solve.dynamic.linear import Moving
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import rule_of
 from validate.solve.explicit.linear import ExplicitLinear, stable_step
-from validate.solve.stepping import explicit_maps, newmark_maps, spectral_radii
+from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 from validate.solve.types import Stepper
 
 SCHEMES = [

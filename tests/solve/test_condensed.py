@@ -11,10 +11,17 @@ from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.linear_solvers.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import (
+    Condensed,
+    Swapped,
+    WorkingSet,
+    along,
+    between,
+    condense,
+    displaced,
+    mixed,
+)
 from validate.fem.system import System, build
-from validate.solve.fluid.swap import Swapped, mixed
-from validate.solve.haptic.working_set import WorkingSet, along, between, displaced
 
 
 def system(nu: float = 0.485) -> System:

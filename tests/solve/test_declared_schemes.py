@@ -13,11 +13,19 @@ from validate.fem.system import System
 from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.ladder.default import trial_of
 from validate.solve import schemes
-from validate.solve.candidates import RUNGS, Asked, Rival, StillBody, SwingingBody
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.handles import LINEAR_DYNAMICS, Handles
 from validate.solve.schemes import candidates, steppings, steppings_for
-from validate.solve.stepping import Rates, Stepping, implicit_maps
+from validate.solve.study_entries import (
+    RUNGS,
+    Asked,
+    Rates,
+    Rival,
+    Stepping,
+    StillBody,
+    SwingingBody,
+    implicit_maps,
+)
 from validate.solve.types import Scheme, Stepper
 from validate.study.choose.climb import Climb
 from validate.study.choose.study import choose, wanted

@@ -21,11 +21,9 @@ from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh_files.vtu import write_vtu
 from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
-from validate.solve.external import answer as fields_module
-from validate.solve.external import job, limits
+from validate.solve.external import exchange, limits
 from validate.solve.external import program as ran
-from validate.solve.external.answer import NoAnswerError, echoed
-from validate.solve.external.job import write_job
+from validate.solve.external.exchange import NoAnswerError, echoed, write_job
 from validate.solve.external.program import Ended
 from validate.solve.external.scheme import ExternalSimulator, run_of
 from validate.solve.march import run_scheme
@@ -386,9 +384,9 @@ def test_it_stands_in_an_experiment_and_is_set_as_others_are() -> None:
 
 
 def test_a_simulator_that_weighs_the_body_needs_a_density() -> None:
-    assert job._density(Material(1.0, 0.3, rho=1000.0)) == 1000.0
+    assert exchange._density(Material(1.0, 0.3, rho=1000.0)) == 1000.0
     with pytest.raises(SceneError, match=r"needs a density; give material.rho"):
-        job._density(Material(1.0, 0.3))
+        exchange._density(Material(1.0, 0.3))
 
 
 def test_files_that_go_while_they_are_counted_are_not_counted(
@@ -430,4 +428,4 @@ def test_an_answer_that_unpacks_to_more_than_the_job_has_is_not_unpacked(tmp_pat
     mesh = SimpleNamespace(nodes=np.zeros((4, 3)))
     asked = SimpleNamespace(scene=SimpleNamespace(mesh=mesh), times=np.zeros(2))
     with pytest.raises(NoAnswerError, match=r"fields.npz: 8000\d\d\d bytes unpacked, the limit is"):
-        fields_module._arrays(tmp_path / "fields.npz", asked)  # type: ignore[arg-type]
+        exchange._arrays(tmp_path / "fields.npz", asked)  # type: ignore[arg-type]

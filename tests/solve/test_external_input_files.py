@@ -23,8 +23,7 @@ from validate.scene.laws import Coefficients
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Scene, Support, Weight
-from validate.solve.external.answer import read_answer
-from validate.solve.external.job import ExternalJob, write_job
+from validate.solve.external.exchange import ExternalJob, read_answer, write_job
 
 SIZE, COUPLED = (0.02, 0.02, 0.04), Coefficients(volumetric="coupled")
 TET = Scene(

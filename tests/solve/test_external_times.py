@@ -12,7 +12,7 @@ from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Prony
 from validate.scene.places import OnPlane
 from validate.scene.scene import Mass, Scene, Support, Weight
-from validate.solve.external.job import write_job
+from validate.solve.external.exchange import write_job
 from validate.solve.external.scheme import Asked, at_levels, at_rest, changes
 from validate.solve.types import Ending, Outcome, Run, Trace
 

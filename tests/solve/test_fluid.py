@@ -13,10 +13,9 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.fluid.cavities import ExactPressure, NoFluid, PulsePressure
 from validate.solve.fluid.pressure_curve import pressure_at_volume, tuned_gain
 from validate.solve.fluid.pressure_loop import PressureLoop
-from validate.solve.fluid.pulse import PulsePressure
 from validate.solve.schemes import schemes_that
 from validate.solve.types import Scheme
 

@@ -11,7 +11,7 @@ from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Scene, Support, Weight
-from validate.solve.dynamic.equilibrium_start import FromEquilibrium
+from validate.solve.dynamic.implicit import FromEquilibrium
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import run_scheme
 from validate.solve.static.newton import StaticNewton

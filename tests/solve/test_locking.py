@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.locking import locking_notes
+from validate.fem.locking import locking_factor, locking_notes
 from validate.scene.geometries.box import box, centroids, grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Probe, Scene, Support
-from validate.solve.locking import locking_factor
 
 MESH = box((0.1, 0.1, 0.1), (3, 3, 3))
 PULL = Load("pull", "z1", (0.0, 0.0, 1.0))

@@ -13,10 +13,10 @@ from validate.fem.system import System, build, responses
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene
+from validate.solve.dynamic.linear import excitation
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
-from validate.solve.excitation import excitation
 from validate.solve.march import march
 from validate.solve.static.linear_solvers import SolverName, solver_of
 from validate.solve.static.quasi_static import QuasiStatic

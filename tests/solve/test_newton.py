@@ -22,7 +22,6 @@ from validate.solve.static.newton import NewtonStepper, StaticNewton
 from validate.solve.types import State
 
 # private: _corrected: replaced, to bring a case about.
-# private: _rest: called alone, case by case.
 
 ELEMENTS: list[tuple[int, Dilatation]] = [(1, "pointwise"), (1, "nodal_mean"), (2, "pointwise")]
 elements = pytest.mark.parametrize(("order", "dilatation"), ELEMENTS)
@@ -312,14 +311,14 @@ def test_phantom_scene_of_both_laws_prepares() -> None:
         assert pressed(stepper, 0.002).failure is None
 
 
-def test_a_stiffness_that_is_not_positive_at_rest_is_refused() -> None:
+def test_a_stiffness_that_is_not_positive_at_rest_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     found = SimpleNamespace(factor=SimpleNamespace(negative_pivots=3))
-    problem = SimpleNamespace(
-        rest_volumes=(), system=SimpleNamespace(scene=SimpleNamespace(inputs=()), moves=()),
-        balance=lambda *_: None, tangent=lambda _: found,
-    )  # fmt: skip
+    problem = SimpleNamespace(rest_volumes=(), balance=lambda *_: None, tangent=lambda _: found)
+    monkeypatch.setattr(newton, "equilibrium", lambda *_: problem)
     with pytest.raises(SceneError, match="3 negative pivots"):
-        newton._rest(problem)  # type: ignore[arg-type]
+        prepared(cube("svk", n=2))
 
 
 def test_a_tangent_that_vanishes_ends_a_step_by_its_words(

@@ -11,8 +11,7 @@ from validate.fem.system import build
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.solve.march import march
-from validate.solve.static.equilibrium import equilibrium
-from validate.solve.static.newton import NewtonStepper, StaticNewton
+from validate.solve.static.newton import NewtonStepper, StaticNewton, equilibrium
 
 STILL = np.zeros(1)  # the drive
 

@@ -12,7 +12,7 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 import validate.fem.system as matrices_module
 import validate.fem.system as system_module
 import validate.solve.explicit.central as central_module
-import validate.solve.static.equilibrium as equilibrium_module
+import validate.solve.static.newton as equilibrium_module
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.geometries.box import box

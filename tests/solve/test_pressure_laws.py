@@ -11,7 +11,7 @@ from phantoms import phantom_responses
 
 from validate.errors import SceneError
 from validate.fem.system import Responses
-from validate.solve.fluid.cavities import ElasticPressure, ExactPressure
+from validate.solve.fluid.cavities import MMHG, ElasticPressure, ExactPressure, PulsePressure
 from validate.solve.fluid.pressure_curve import RATIOS, cubic, pressure_at_volume, still, tuned_gain
 from validate.solve.fluid.pressure_loop import (
     PressureLoop,
@@ -19,7 +19,6 @@ from validate.solve.fluid.pressure_loop import (
     gain_matrix,
     spectral_radius,
 )
-from validate.solve.fluid.pulse import MMHG, PulsePressure
 
 UPDATES: tuple[UpdateName, ...] = (
     "proportional", "retuned", "piecewise", "secant", "newton", "golden",

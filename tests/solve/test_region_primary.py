@@ -16,7 +16,7 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.material import Prony
 from validate.scene.scene import Scene
-from validate.solve.regions.map import PrimarySize
+from validate.solve.regions.body import PrimarySize
 from validate.solve.regions.primary import PrimarySolver, UnsettledError
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import State

@@ -14,8 +14,7 @@ from validate.errors import SceneError
 from validate.fem.system import build
 from validate.scene.scene import Scene
 from validate.solve.march import run_scheme
-from validate.solve.regions.body import RegionBody
-from validate.solve.regions.map import PrimarySize, layers_from, ratios, split
+from validate.solve.regions.body import PrimarySize, RegionBody, layers_from, ratios, split
 from validate.solve.regions.march import Motion, Piece, Zone, carried, spectral_radius
 from validate.solve.regions.scheme import AsyncRegions, RegionStepper
 from validate.solve.types import State

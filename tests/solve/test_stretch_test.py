@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.meshless import MaterialPoint

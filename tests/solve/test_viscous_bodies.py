@@ -14,7 +14,7 @@ from validate.fem.assembly.assemble import stiffness
 from validate.fem.critical import critical_step
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import stiffened
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.fem.laws.viscoelasticity import cell_branches
 from validate.fem.system import System, build
 from validate.scene.geometries.box import grid

@@ -8,8 +8,8 @@ import pytest
 
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.ladder.ladder import Rival
-from validate.solve.candidates import StillBody
 from validate.solve.schemes import candidates
+from validate.solve.study_entries import StillBody
 from validate.study.choose.facts import ShownEffects, effect_words, stored_effects, with_effects
 
 

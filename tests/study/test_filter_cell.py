@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from study_samples import experiment_file
 
-from validate.compare.track import rmse, track_error
+from validate.compare.force_error import rmse, track_error
 from validate.engine.cell import Plan, Record, Where
 from validate.engine.execution import finish
 from validate.engine.store import read_records
 from validate.engine.worker_cache import fingerprint
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.kalman.batch import Batch
+from validate.estimate.kalman.coordinates import Batch
 from validate.estimate.kalman.displacement_filter import DisplacementStepper
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file

@@ -6,8 +6,7 @@ from typing import Any
 
 from validate.commands.display import relative, say, table
 from validate.commands.progress import progress
-from validate.datasets.home import cache_folder, searched, whole
-from validate.datasets.registry import DataSet, data_sets, named
+from validate.datasets.home import DataSet, cache_folder, data_sets, named, searched, whole
 from validate.errors import RecordingError
 
 

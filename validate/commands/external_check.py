@@ -16,7 +16,7 @@ from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.pipeline.bodies.own_body import meshed, own_body
 from validate.pipeline.experiment.find import find
-from validate.solve.external.job import write_job
+from validate.solve.external.exchange import write_job
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.external.suite import OffBy, check_simulator
 

@@ -8,8 +8,7 @@ from pathlib import Path
 from validate.catalogue import Card, card, experiment_files, name_of, shipped
 from validate.commands.display import relative, say
 from validate.commands.screen import rows
-from validate.datasets.home import searched, whole
-from validate.datasets.registry import data_sets
+from validate.datasets.home import data_sets, searched, whole
 
 
 def show(named: tuple[Path, ...], as_json: bool) -> None:

@@ -13,6 +13,7 @@ _HOMES = {
         "convergence",
     ),
     "score": (
+        "Metric",
         "Score",
         "scores_of",
     ),
@@ -34,7 +35,6 @@ _HOMES = {
         "Effect",
         "Sensor",
     ),
-    "shapes.metric": ("Metric",),
     "shapes.two_fields": ("compare_fields",),
     "force_error": (
         "force_pair",

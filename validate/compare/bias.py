@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from validate.arrays import Floats, rms
+from validate.arrays import rms
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError
 from validate.estimate.consistency import chi_square_quantile
@@ -56,16 +56,13 @@ class Size:
 def kind_of(quantity: str, unit: str) -> str:
     """Return the measured quantity in a word; "" where none fits."""
     words = re.split(r"[._]", quantity)
-    if named := [word for word in words if word in _BY_WORD and _fits(word, unit)]:
+    # An extensometer may be called stretch, and measure metres.
+    named = [w for w in words if w in _BY_WORD and (unit == "1" or w not in ("stretch", "strain"))]
+    if named:
         return named[0]
     if unit == "m" and words[0] in _PLACES:
         return "position"
     return _BY_UNIT.get(unit, "")
-
-
-def _fits(word: str, unit: str) -> bool:
-    """An extensometer may be called stretch, and measure metres."""
-    return unit == "1" or word not in ("stretch", "strain")
 
 
 def size_of(residual: Residual) -> Size | None:
@@ -74,7 +71,9 @@ def size_of(residual: Residual) -> Size | None:
     Of many points: simulated = b measured, b the least-squares factor of the simulated values on
     the measured ones through zero, <s, m>/<m, m>, with the noise's share c sd^2 out of <m, m>.
     """
-    m = _measured(residual)
+    m = residual.reference
+    if m is None and residual.measured is not None:
+        m = np.array([[residual.measured]])
     if m is None:
         return None
     d, (k, c) = residual.values, residual.values.shape
@@ -86,12 +85,6 @@ def size_of(residual: Residual) -> Size | None:
     along = (float((d * m).sum() / k) + noise) / measured
     own = residual.sd * np.sqrt(c / (residual.freedom or k * c))
     return Size(measured, measured + along, float(np.hypot(own, residual.systematic)))
-
-
-def _measured(residual: Residual) -> Floats | None:
-    if residual.reference is not None:
-        return residual.reference
-    return None if residual.measured is None else np.array([[residual.measured]])
 
 
 # -------------------------------------------------------------------------------------------------
@@ -138,42 +131,32 @@ def statement(points: Sequence[Predicted]) -> Statement:
     names = dict.fromkeys(p.specimen for p in points)
     groups = [np.array([p.log_ratio for p in points if p.specimen == name]) for name in names]
     means = np.array([g.mean() for g in groups])
-    squared = _variance(groups, means)
-    if squared is None:
+    # Of one point: that between the specimens' means, and that within, which means hide.
+    if len(groups) > 1:
+        within = float(np.mean([g.var() for g in groups]))
+        squared = float(means.var(ddof=1)) + within
+    elif len(groups[0]) > 1:
+        squared = float(groups[0].var(ddof=1))
+    else:
         return Statement(Estimated(float(np.exp(means.mean()))), None, own, 1, 1)
-    low, high = _scatter_ends(squared, len(groups) - 1)
+    low = high = None
+    freedom = len(groups) - 1
+    if freedom >= 1:
+        ends = (float(chi_square_quantile(p, freedom)) for p in (_TAIL, 1 - _TAIL))
+        low, high = (squared * freedom / end for end in ends)
     scatter = Estimated(_without(squared, own), low and _without(low, own),
                         high and _without(high, own))  # fmt: skip
     shift = float(means.mean()) + (scatter.value**2 - own**2) / 2
-    return Statement(_bias(shift, means), scatter, own, len(points), len(groups))
-
-
-def _variance(groups: Sequence[Floats], means: Floats) -> float | None:
-    """Of one point: that between the specimens' means, and that within, which means hide."""
-    within = float(np.mean([g.var() for g in groups]))
-    if len(groups) > 1:
-        return float(means.var(ddof=1)) + within
-    return float(groups[0].var(ddof=1)) if len(groups[0]) > 1 else None
-
-
-def _scatter_ends(squared: float, freedom: int) -> tuple[float | None, float | None]:
-    if freedom < 1:
-        return None, None
-    low, high = (float(chi_square_quantile(p, freedom)) for p in (_TAIL, 1 - _TAIL))
-    return squared * freedom / low, squared * freedom / high
+    bias, value = Estimated(float(np.exp(shift))), float(np.exp(shift))
+    if len(means) >= 2:
+        off = float(stdtrit(len(means) - 1, _TAIL) * means.std(ddof=1) / np.sqrt(len(means)))
+        bias = Estimated(value, value * float(np.exp(-off)), value * float(np.exp(off)))
+    return Statement(bias, scatter, own, len(points), len(groups))
 
 
 def _without(squared: float, own: float) -> float:
     """The models' part of a scatter; 0 where the measurements' own explains all of it."""
     return float(np.sqrt(max(squared - own**2, 0.0)))
-
-
-def _bias(shift: float, means: Floats) -> Estimated:
-    value = float(np.exp(shift))
-    if len(means) < 2:
-        return Estimated(value)
-    off = float(stdtrit(len(means) - 1, _TAIL) * means.std(ddof=1) / np.sqrt(len(means)))
-    return Estimated(value, value * float(np.exp(-off)), value * float(np.exp(off)))
 
 
 def area_metric(error: float, simulated: float, measured: float) -> float:

@@ -150,10 +150,19 @@ def convergence(
     if len(np.unique(sizes)) == 2:
         error = _rms(_fit(share, values, np.ones(len(share)), (formal,), like).error, like)
         return GridConvergence("two sizes", *found, None, FAR, FAR * error / 2, distance)
-    fit = free = _best([_free(share, values, w, formal, like) for w in _weights(share)])
+    fits = []
+    for w in _weights(share):
+        orders = (_order(share, values, w, formal),)
+        fits.append(_fit(share, values, w, orders, like, known=False))
+    fit = free = _best(fits)
     trusted = _LEAST <= free.order <= _MOST * formal
     if not trusted or free.order > formal:
-        terms = [(formal,)] if trusted else _terms(free.order, formal, len(share))
+        # Orders of the expansions to choose from, where the observed one is not trusted
+        terms: list[tuple[float, ...]] = [(formal,)]
+        if not trusted:
+            terms = [(formal / 2,), (formal,)]
+            if free.order < _LEAST and len(share) > 3:
+                terms.append((formal / 2, formal))
         fit = _best([_fit(share, values, w, t, like) for w in _weights(share) for t in terms])
     spread = max(_rms(a - b, like) for a in values for b in values) / (len(share) - 1)
     safety = NEAR if trusted else FAR
@@ -168,7 +177,10 @@ def convergence(
         band = safety * (error + fit.sd + off)
     conduct: Conduct = "no order"
     if trusted:
-        conduct = "oscillating" if _opposed(share, values) else "monotone"
+        # It oscillates where the step to the finest answer goes back on the one before.
+        coarse, middle, fine = values[np.argsort(-share)][-3:]
+        opposed = float(np.vdot(middle - coarse, fine - middle)) < 0
+        conduct = "oscillating" if opposed else "monotone"
     order = free.order if trusted else None
     return GridConvergence(conduct, *found, order, safety, band / 2, distance)
 
@@ -190,17 +202,6 @@ def _weights(share: Floats) -> tuple[Floats, Floats]:
 
 def _best(fits: Sequence[_Fit]) -> _Fit:
     return min(fits, key=lambda fit: fit.sd)
-
-
-def _free(share: Floats, values: Floats, weights: Floats, formal: float, like: Floats) -> _Fit:
-    order = _order(share, values, weights, formal)
-    return _fit(share, values, weights, (order,), like, known=False)
-
-
-def _terms(order: float, formal: float, sizes: int) -> list[tuple[float, ...]]:
-    """Orders of the expansions to choose from, where the observed one is not trusted."""
-    found: list[tuple[float, ...]] = [(formal / 2,), (formal,)]
-    return [*found, (formal / 2, formal)] if order < _LEAST and sizes > 3 else found
 
 
 def _fit(
@@ -228,12 +229,6 @@ def _fit(
 def _rms(values: Floats, like: Floats) -> float:
     """Rms length of the rows of flat answers (..., m) that have the shape of `like` (k, c)."""
     return rms(values.reshape(-1, like.shape[-1])) if like.ndim > 1 else rms(values.ravel())
-
-
-def _opposed(share: Floats, values: Floats) -> bool:
-    """Whether the step to the finest answer goes back on the one before."""
-    coarse, middle, fine = values[np.argsort(-share)][-3:]
-    return float(np.vdot(middle - coarse, fine - middle)) < 0
 
 
 def _order(share: Floats, values: Floats, weights: Floats, formal: float) -> float:

@@ -54,12 +54,9 @@ def joint_draws(draws: int, inputs: int, seed: int = 1) -> Floats:
     rng = np.random.default_rng(seed)
     strata = REACH * ((2 * np.arange(draws) + 1) / draws - 1)
     tables = [rng.permuted(np.tile(strata, (inputs, 1)), axis=1).T for _ in range(_TABLES)]
-    return min(tables, key=_correlated)
-
-
-def _correlated(table: Floats) -> float:
-    products = table.T @ table
-    return float(np.abs(products - np.diag(np.diag(products))).max())
+    products = [table.T @ table for table in tables]
+    correlated = [float(np.abs(p - np.diag(np.diag(p))).max()) for p in products]
+    return tables[int(np.argmin(correlated))]
 
 
 def joint(base: Residual, parts: Sequence[Sensitivity], drawn: Sequence[Residual]) -> Joint:

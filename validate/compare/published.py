@@ -87,10 +87,7 @@ class Published:
             return "moved", (
                 f"our value moved from {self.expected:g} to {ours:g}, beyond {self.drift:g}"
             )
-        return self._beside(ours)
-
-    def _beside(self, ours: float) -> tuple[PublishedVerdict, str]:
-        """A finite value of ours against theirs, where both claim and tolerance compare them."""
+        # A finite value of ours against theirs, where both claim and tolerance compare them
         if self.theirs is None or self.tolerance is None:
             return self.claim, ""
         off = abs(ours - self.theirs)
@@ -150,23 +147,24 @@ class Figure:
                 "give both or neither"
             )
         if self.tolerance is not None:
-            self._require_narrow(self.tolerance)
-
-    def _require_narrow(self, tolerance: float) -> None:
-        scale = self.scale or abs(self.theirs or 0.0)
-        if not tolerance <= _WIDEST * scale * (1 + 1e-9):
-            raise ComparisonError(
-                f"figure '{self.name}': a tolerance of {tolerance:g} {self.unit} is wider than "
-                f"a tenth of the scale of its reference, {scale:g} {self.unit}; it must be at "
-                f"most {_WIDEST * scale:g}, or the figure could not fail"
-            )
+            scale = self.scale or abs(self.theirs or 0.0)
+            if not self.tolerance <= _WIDEST * scale * (1 + 1e-9):
+                raise ComparisonError(
+                    f"figure '{self.name}': a tolerance of {self.tolerance:g} {self.unit} is wider "
+                    f"than a tenth of the scale of its reference, {scale:g} {self.unit}; it must "
+                    f"be at most {_WIDEST * scale:g}, or the figure could not fail"
+                )
 
     def beside(self, values: Values) -> Published:
         """Return the figure with our value; one that cannot be computed says what it lacks."""
         ours, reason, missing = None, "", ""
         try:
             if not self.other:
-                ours = self._ours(values)
+                if isinstance(self.of, str):
+                    owner, _, score = self.of.partition(":")
+                    ours = values[owner][score]
+                elif self.of is not None:
+                    ours = self.of(values)
                 reason = self.reason if isinstance(self.reason, str) else self.reason(values)
         except KeyError as absent:
             missing = f"no score {absent}"
@@ -174,14 +172,6 @@ class Figure:
             self.name, ours, self.theirs, self.tolerance, self.unit, self.claim, reason,
             self.source, self.expected, self.drift, missing, self.window, self.other, self.setting,
         )  # fmt: skip
-
-    def _ours(self, values: Values) -> float | None:
-        if self.of is None:
-            return None
-        if not isinstance(self.of, str):
-            return self.of(values)
-        owner, _, score = self.of.partition(":")
-        return values[owner][score]
 
 
 def setting(

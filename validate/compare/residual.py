@@ -130,7 +130,12 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
         other = merged.get(residual.name)
         if other is not None:
             values = np.vstack([other.values, residual.values])
-            freedom = _joined_freedom(other, residual)
+            freedom = None
+            if other.freedom is not None or residual.freedom is not None:
+                # A residual that declares none has as many as it has numbers.
+                freedom = sum(
+                    r.values.size if r.freedom is None else r.freedom for r in (other, residual)
+                )
             truths = [r.reference for r in (other, residual) if r.reference is not None]
             times = [r.t for r in (other, residual) if r.t is not None]
             residual = replace(
@@ -140,13 +145,6 @@ def stacked(found: Iterable[Residual]) -> dict[str, Residual]:
             )  # fmt: skip
         merged[residual.name] = residual
     return merged
-
-
-def _joined_freedom(one: Residual, other: Residual) -> int | None:
-    """Return the sum of both; a residual that declares none has as many as it has numbers."""
-    if one.freedom is None and other.freedom is None:
-        return None
-    return sum(r.values.size if r.freedom is None else r.freedom for r in (one, other))
 
 
 def _of(d: Deviation, selection: Selection, role: Role) -> Residual:

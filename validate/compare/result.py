@@ -1,4 +1,7 @@
-"""Result of a comparison: all data of a report and of the exit code."""
+"""Result of a comparison, and the validation domain of its runs.
+
+Validation domain of a run: strain, strain rate and size of its body.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
 from validate.compare.overall_verdict import Expected, MovedVerdict, Overall, judge_all, moved
 from validate.compare.published import Published
@@ -25,6 +31,7 @@ if TYPE_CHECKING:
     from validate.identify.budget import IdentifiedValue
     from validate.recording.types import Recording
     from validate.register.registration import Registered
+    from validate.scene.mesh import Mesh
     from validate.scene.meshless import AnyScene
     from validate.solve.types import Run
 
@@ -72,13 +79,10 @@ def _uses(recording: Recording, registered: Sequence[Registered]) -> Iterator[St
     for topic, stream in recording.streams.items():
         use = _use(topic, stream, roles, found_in)
         why = use or _why_not(stream, recording, roles)
-        yield StreamUse(recording.name, topic, _kind(stream), bool(use), why)
+        kind = next(name for kind, name in _KINDS if isinstance(stream, kind))
+        yield StreamUse(recording.name, topic, kind, bool(use), why)
     for topic, why in recording.unread.items():
         yield StreamUse(recording.name, topic, "not read", False, why)
-
-
-def _kind(stream: Stream) -> str:
-    return next(name for kind, name in _KINDS if isinstance(stream, kind))
 
 
 def _use(topic: str, stream: Stream, roles: Mapping[str, str], found_in: Mapping[str, str]) -> str:
@@ -236,3 +240,65 @@ class Result:
     def as_expected(self) -> bool:
         """Whether every verdict is the declared one; without declarations, whether it passed."""
         return bool(self.checks) and not self.moved if self.expected else self.passed
+
+
+_SHARE = 0.99  # of the cells stays below the strain that is told: corners are singular
+_FRAMES = 50  # frames that are looked at
+
+
+@dataclass(frozen=True)
+class Domain:
+    """One run: principal logarithmic strain (its largest size) that 99 % of the cells stay below,
+    the fastest that it grew (1/s), the smallest and largest side (m) of the box about the body.
+
+    None where the run does not say: a material point has no size, one instant or rows without
+    times no rate.
+    """
+
+    recording: str
+    specimen: str
+    strain: float | None
+    rate: float | None
+    sides: tuple[float, float] | None
+
+
+def domains(
+    method: MethodResult, recordings: tuple[str, ...], specimens: tuple[str, ...]
+) -> tuple[Domain, ...]:
+    """Of every recording that a method was run on."""
+    mesh = method.scene.mesh
+    sides = np.ptp(mesh.nodes, axis=0) if len(mesh.nodes) else None
+    found = []
+    each = zip(method.runs, method.registered, recordings, specimens, strict=False)
+    for run, seen, recording, specimen in each:
+        # Times (k,) s and the strains (k,) then; none where a run keeps neither field nor stretch
+        t, strain = np.zeros(0), np.zeros(0)
+        if "stretch" in run.traces:
+            stretch = np.maximum(run.traces["stretch"].y, np.finfo(float).tiny)
+            t, strain = run.t, np.abs(np.log(stretch))
+        elif len(mesh.cells) and len(run.u):
+            kept = np.unique(np.linspace(0, len(run.u) - 1, _FRAMES).astype(int))
+            t = run.t[run.at[kept]]
+            strain = np.array([float(np.quantile(hencky(mesh, run.u[i]), _SHARE)) for i in kept])
+        rate = _largest(np.abs(np.diff(strain)) / np.diff(t)) if seen.timed else None
+        box = None if sides is None else (float(sides.min()), float(sides.max()))
+        found.append(Domain(recording, specimen, _largest(strain), rate, box))
+    return tuple(found)
+
+
+def _largest(values: Floats) -> float | None:
+    return float(values.max()) if len(values) and np.isfinite(values).all() else None
+
+
+def hencky(mesh: Mesh, u: Floats) -> Floats:
+    """Largest principal logarithmic strain (e,) of every cell, by size, under u (n, d) m.
+
+    Of the affine map that fits the cell's vertices best. Infinite for a cell turned inside out.
+    """
+    X, x = mesh.nodes[mesh.corners], (mesh.nodes + u)[mesh.corners]
+    X, x = X - X.mean(axis=1, keepdims=True), x - x.mean(axis=1, keepdims=True)
+    onto = np.einsum("eki,ekj->eij", x, X)
+    F = onto @ np.linalg.inv(np.einsum("eki,ekj->eij", X, X))
+    stretches = np.linalg.svd(F, compute_uv=False)
+    strain = np.abs(np.log(np.maximum(stretches, np.finfo(float).tiny))).max(axis=1)
+    return np.where(np.linalg.det(F) > 0, strain, np.inf)

@@ -1,10 +1,13 @@
-"""Scores: statistics of a residual with unit, count and definition; RMSEs are never averaged."""
+"""Scores and metrics: statistics with unit, count and definition.
+
+Type of a metric: name, formula, unit, inputs and definition.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -54,7 +57,17 @@ METRICS: tuple[tuple[str, Callable[[Floats], float], str], ...] = (
 def scores_of(residual: Residual, against: str) -> tuple[Score, ...]:
     """Scores named `<quantity>.<statistic>@<load>`; a scalar gives error, simulated, measured."""
     if residual.count == 1 and residual.values.shape[1] == 1:
-        return _scalar_scores(residual, against)
+        q, load = residual.quantity, residual.load
+        rows = [
+            (f"{q}@{load}", float(residual.values[0, 0]), "simulated minus measured"),
+            (f"{q}.simulated@{load}", residual.simulated, "simulated"),
+            (f"{q}.measured@{load}", residual.measured, "measured (or reference)"),
+        ]
+        return tuple(
+            Score(name, value, residual.unit, 1, against, f"{residual.definition}; {words}")
+            for name, value, words in rows
+            if value is not None
+        )
     return tuple(
         Score(
             f"{residual.quantity}.{name}@{residual.load}",
@@ -65,20 +78,6 @@ def scores_of(residual: Residual, against: str) -> tuple[Score, ...]:
             f"{residual.definition}; {words}",
         )
         for name, statistic, words in METRICS
-    )
-
-
-def _scalar_scores(residual: Residual, against: str) -> tuple[Score, ...]:
-    q, load = residual.quantity, residual.load
-    rows = [
-        (f"{q}@{load}", float(residual.values[0, 0]), "simulated minus measured"),
-        (f"{q}.simulated@{load}", residual.simulated, "simulated"),
-        (f"{q}.measured@{load}", residual.measured, "measured (or reference)"),
-    ]
-    return tuple(
-        Score(name, value, residual.unit, 1, against, f"{residual.definition}; {words}")
-        for name, value, words in rows
-        if value is not None
     )
 
 
@@ -98,3 +97,59 @@ def run_scores(run: Run) -> tuple[Score, ...]:
         words = "most pressure updates of one step"
         rows.append(("updates.max", float(updates.max()), "1", len(updates), words))
     return tuple(Score(name, v, unit, n, "none", words) for name, v, unit, n, words in rows)
+
+
+class Compared(Protocol):
+    """What a metric is taken of: a run beside its reference."""
+
+    @property
+    def against(self) -> str:
+        """Name of the reference."""
+        ...
+
+    @property
+    def where(self) -> str:
+        """On what the two are compared, in words."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, object]:
+        """What stands for the names in braces of a metric's unit."""
+        ...
+
+
+C_contra = TypeVar("C_contra", bound=Compared, contravariant=True)
+
+
+@dataclass(frozen=True)
+class Counted(Generic[C_contra]):
+    """`number` of things of a kind `of` that a metric rests on."""
+
+    of: str
+    number: Callable[[C_contra], int]
+
+
+@dataclass(frozen=True)
+class Metric(Generic[C_contra]):
+    """`value(compared)` in `unit`, as "m", or "m^{dimension}" filled in by what is compared.
+
+    `symmetric`: the same when run and reference change places. `value` raises `ComparisonError`
+    where the metric does not exist (0/0, a crossing boundary), with the reason.
+    """
+
+    name: str
+    value: Callable[[C_contra], float]
+    unit: str
+    definition: str
+    counted: Counted[C_contra]
+    symmetric: bool = False
+
+    def unit_of(self, compared: C_contra) -> str:
+        return self.unit.format(**compared.units)
+
+    def score(self, compared: C_contra, prefix: str = "") -> Score:
+        """Return the score `<prefix><name>` against the reference."""
+        words = f"{self.definition}; {compared.where}; counted: {self.counted.of}"
+        value, count = self.value(compared), self.counted.number(compared)
+        unit = self.unit_of(compared)
+        return Score(prefix + self.name, value, unit, count, compared.against, words)

@@ -291,7 +291,11 @@ def judge(
     """Both answers about one residual; where nothing bounds u_num neither can be given."""
     statistic: Statistic = accept.statistic if residual.count > 1 else "every"
     found = errors_of(residual, statistic)
-    parts = {s.name: _by_row(s.change.values, found) for s in inputs}
+    parts = {}  # what every input does to every error (n,); its rms where that is not known by row
+    for s in inputs:
+        change, n = s.change.values, len(found.E)
+        by_row = n == len(change)
+        parts[s.name] = np.linalg.norm(change, axis=1) if by_row else np.full(n, rms(change))
     u_input = np.sqrt(sum((p**2 for p in parts.values()), start=np.zeros(len(found.E))))
     others = np.hypot(u_input, numerical.u)
     w = found.worst(others)
@@ -300,8 +304,13 @@ def judge(
     named = {"measurement": float(u_D)} | dict(numerical.parts) | {
         name: float(part[w]) for name, part in parts.items()
     }  # fmt: skip
+    # The largest |E| over what chance reaches; 0 for an exact zero without any uncertainty
+    zero = reach == 0
+    over = np.where(
+        zero, np.where(found.E == 0, 0.0, np.inf), np.abs(found.E) / np.where(zero, 1.0, reach)
+    )
     interval = _Interval(
-        float(E), float(u_val), _ratio(found.E, reach), float((np.abs(found.E) - reach).max()),
+        float(E), float(u_val), float(over.max()), float((np.abs(found.E) - reach).max()),
         accept.required, residual.scale, named, numerical, residual.unit,
         _where(found.E, reach, w) if statistic == "every" else "",
     )  # fmt: skip
@@ -406,20 +415,6 @@ def _noise_free(raw: float, noise: float, m: int) -> tuple[float, float]:
     x = m * max(raw / noise, 1.0) ** 2
     low, high = (noise * math.sqrt(float(chndtrinc(x, m, p)) / m) for p in (1 - ALPHA, ALPHA / 2))
     return E, max(E - low, high - E) / 2
-
-
-def _by_row(change: Floats, found: PointErrors) -> Floats:
-    """What an input does to every error (n,); its rms where that is not known row by row."""
-    if len(found.E) == len(change):
-        return np.asarray(np.linalg.norm(change, axis=1))
-    return np.full(len(found.E), rms(change))
-
-
-def _ratio(E: Floats, reach: Floats) -> float:
-    """The largest |E| over what chance reaches; 0 for an exact zero without any uncertainty."""
-    zero = reach == 0
-    over = np.where(zero, np.where(E == 0, 0.0, np.inf), np.abs(E) / np.where(zero, 1.0, reach))
-    return float(over.max())
 
 
 def _where(E: Floats, reach: Floats, at: int) -> str:

@@ -3,9 +3,17 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "registry": ("DataFile", "DataSet", "data_sets", "named"),
     "bring": ("bring",),
-    "home": ("cache_folder", "data_path", "searched", "sought"),
+    "home": (
+        "DataFile",
+        "DataSet",
+        "cache_folder",
+        "data_path",
+        "data_sets",
+        "named",
+        "searched",
+        "sought",
+    ),
 }
 
 __all__ = names(_HOMES)

@@ -4,7 +4,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -12,8 +12,7 @@ from urllib.parse import urlsplit
 import pooch
 import requests
 
-from validate.datasets.home import cache_folder, whole
-from validate.datasets.registry import DataFile, DataSet
+from validate.datasets.home import DataFile, DataSet, cache_folder, whole
 from validate.errors import RecordingError
 
 # --- Rows of numbers that others keep inside a program, written as the CSV file that is
@@ -37,21 +36,13 @@ def csv_of(text: str, function: str, header: str) -> str:
     begin = text.find(f"function {function}(")
     end = text.find("\nend", begin)
     body = text[begin:end] if 0 <= begin < end else ""
-    rows = _series(body) or [tuple(map(float, pair)) for pair in _PAIR.findall(body)]
+    rows: list[tuple[float, ...]] = []
+    for first, *lists in _SERIES.findall(body):
+        columns = [[float(number) for number in re.findall(_NUMBER, text)] for text in lists]
+        rows += [(float(first), *row) for row in zip(*columns, strict=False)]
+    rows = rows or [tuple(map(float, pair)) for pair in _PAIR.findall(body)]
     lines = [header, *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     return "\n".join(lines) + "\n"
-
-
-def _series(body: str) -> list[tuple[float, ...]]:
-    return [
-        (float(first), *row)
-        for first, *lists in _SERIES.findall(body)
-        for row in zip(*map(_listed, lists), strict=False)
-    ]
-
-
-def _listed(text: str) -> Sequence[float]:
-    return [float(number) for number in re.findall(_NUMBER, text)]
 
 
 # -------------------------------------------------------------------------------------------------
@@ -98,17 +89,13 @@ def _one(address: str, file: DataFile, place: Path, bar: "_Bar") -> None:
         registered = None if file.rows else f"sha256:{file.sha256}"
         came = Path(pooch.retrieve(address, registered, "file", aside, downloader=loader))
         if file.rows:
-            _write_rows(came, file)
+            # The registered file in the place of its source; `ValueError` where it is another one
+            text = csv_of(came.read_text("utf-8"), file.rows, file.header)
+            came.write_bytes(text.encode())
+            if not whole(came, file):
+                raise ValueError(f"the rows of {file.rows} are not the registered ones")
         place.parent.mkdir(parents=True, exist_ok=True)
         came.replace(place)
-
-
-def _write_rows(source: Path, file: DataFile) -> None:
-    """The registered file in the place of its source; `ValueError` where it is another one."""
-    text = csv_of(source.read_text("utf-8"), file.rows, file.header)
-    source.write_bytes(text.encode())
-    if not whole(source, file):
-        raise ValueError(f"the rows of {file.rows} are not the registered ones")
 
 
 @contextmanager

@@ -1,12 +1,90 @@
-"""Local folder of a data set: shared folder, neighbour of the project, or cache."""
+"""Registry of third-party data sets and their local folders.
 
+Registry of data sets: addresses by commit, licences, citations, hashes. It holds no data.
+"""
+
+import functools
 import os
+import tomllib
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from validate.datasets.registry import DataFile, named
-from validate.errors import RecordingError
+from validate.errors import RecordingError, UsageError
+from validate.parameters import nearest_names
 from validate.places import cache
+
+RAW = "https://raw.githubusercontent.com"
+_TABLE = Path(__file__).with_name("registry.toml")
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """One file: `name` below its set's folder, `source` below its repository at the commit, or of
+    another one as in "/owner/name/commit/path".
+
+    An empty source: the file was made from what lies there and cannot be brought. With `rows` it is
+    made here: of that function's numbers in the source, below `header`.
+    """
+
+    name: str
+    source: str
+    sha256: str
+    size: int  # bytes
+    rows: str = ""
+    header: str = ""
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Recordings of one origin; `made` says what its files without a source were made from."""
+
+    name: str
+    folder: str
+    title: str
+    repository: str
+    commit: str
+    licence: str
+    citation: str
+    files: tuple[DataFile, ...]
+    made: str = ""
+
+    @property
+    def page(self) -> str:
+        """Where people look at it."""
+        return f"https://github.com/{self.repository}/tree/{self.commit}"
+
+    @property
+    def brought(self) -> tuple[DataFile, ...]:
+        """The files that are brought, or made of what is."""
+        return tuple(file for file in self.files if file.source)
+
+    def address(self, file: DataFile) -> str:
+        """Of a file's source at its commit."""
+        if file.source.startswith("/"):
+            return f"{RAW}{file.source}"
+        return f"{RAW}/{self.repository}/{self.commit}/{file.source}"
+
+
+@functools.cache
+def data_sets() -> tuple[DataSet, ...]:
+    """All that are registered, as the table lists them."""
+    entries = tomllib.loads(_TABLE.read_text("utf-8"))["set"]
+    return tuple(
+        DataSet(**entry | {"files": tuple(DataFile(*row) for row in entry["files"])})
+        for entry in entries
+    )
+
+
+def named(name: str) -> DataSet:
+    """The data set of that name or folder; `UsageError` naming the nearest where there is none."""
+    plain = name.strip("/").replace("_", "-")
+    for found in data_sets():
+        if plain in (found.name, found.folder):
+            return found
+    known = {found.name for found in data_sets()}
+    raise UsageError(f"unknown data set '{name}'; {nearest_names(plain, known)}")
+
 
 SHARED = "VALIDATE_SHARED_DATA"
 
@@ -23,10 +101,25 @@ def data_path(
     """
     if own:
         sibling = sought(folder, own, beside) if name and Path(own).name == own else None
-        return sibling if sibling and not Path(own).exists() else _own(Path(own), name)
+        given = Path(own)
+        if sibling and not given.exists():
+            return sibling
+        if not (given.is_file() if name else given.is_dir()):
+            raise RecordingError(f"no {'file' if name else 'folder'} {given}")
+        return given
     path = sought(folder, name, beside)
     if path is None:
-        raise RecordingError(_absent(folder, name, by or ("recording" if name else "data")))
+        theirs = named(folder)
+        what = f"{folder}/{name}" if name else f"{folder}/"
+        by = by or ("recording" if name else "data")
+        brings = f"`validate data get {theirs.name}` downloads it"
+        if not any(f.source for f in theirs.files if name in (None, f.name)):
+            brings = f"`validate data get {theirs.name}` describes how to make it"
+        raise RecordingError(
+            f"{what} is missing: {brings} ({theirs.repository} {theirs.commit[:7]}, "
+            f"{theirs.licence}); or pass --set {by}={'FILE' if name else 'FOLDER'}, or set "
+            f"{SHARED} to a folder that holds it"
+        )
     return path
 
 
@@ -63,12 +156,6 @@ def whole(path: Path, file: DataFile) -> bool:
     return sha256(path.read_bytes()).hexdigest() == file.sha256
 
 
-def _own(path: Path, name: str | None) -> Path:
-    if not (path.is_file() if name else path.is_dir()):
-        raise RecordingError(f"no {'file' if name else 'folder'} {path}")
-    return path
-
-
 def _has(place: Path, folder: str, name: str | None) -> bool:
     """A folder counts where it holds anything: which files of it are wanted, its user knows."""
     if place != cache_folder():
@@ -76,16 +163,3 @@ def _has(place: Path, folder: str, name: str | None) -> bool:
         return (path / name).is_file() if name else path.is_dir() and any(path.iterdir())
     files = [f for f in named(folder).files if name in (None, f.name)]
     return bool(files) and all(whole(place / folder / f.name, f) for f in files)
-
-
-def _absent(folder: str, name: str | None, by: str) -> str:
-    theirs = named(folder)
-    what = f"{folder}/{name}" if name else f"{folder}/"
-    own = f"--set {by}={'FILE' if name else 'FOLDER'}"
-    brings = f"`validate data get {theirs.name}` downloads it"
-    if not any(f.source for f in theirs.files if name in (None, f.name)):
-        brings = f"`validate data get {theirs.name}` describes how to make it"
-    return (
-        f"{what} is missing: {brings} ({theirs.repository} {theirs.commit[:7]}, "
-        f"{theirs.licence}); or pass {own}, or set {SHARED} to a folder that holds it"
-    )

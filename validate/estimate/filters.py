@@ -11,7 +11,7 @@ from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.estimate.gating import NoiseSettings
-from validate.estimate.kalman.batch import Batch
+from validate.estimate.kalman.coordinates import Batch
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import Measurements

@@ -125,7 +125,9 @@ class Care:
             if len(i) == 0:
                 continue
             tested += 1
-            squared = _squared((z - predicted)[i], S_yy[np.ix_(i, i)])
+            y = (z - predicted)[i]
+            S = S_yy[np.ix_(i, i)]
+            squared = float(y @ cho_solve((cholesky((S + S.T) / 2), False), y))
             if squared > self.limits[len(i) - 1]:
                 kept[i], far[j] = np.nan, np.sqrt(squared)
         return kept, Gated(far, tested, int((far > 0).sum()))
@@ -165,10 +167,6 @@ def gated_out(
     their sd stays zero."""
     y = np.where(np.isfinite(offered), offered - predicted, 0.0)
     return replace(found, y=y, gated=gated)
-
-
-def _squared(y: Floats, S: Floats) -> float:
-    return float(y @ cho_solve((cholesky((S + S.T) / 2), False), y))
 
 
 def care_of(

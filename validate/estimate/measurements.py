@@ -143,9 +143,12 @@ def timetable(measurements: Measurements, dt: float) -> Timetable:
     steps, off = _nearest(t, dt)
     if off.max() > OFF_STEP:
         i = int(off.argmax())
+        # The largest step up to `dt` on which all times land, as advice
+        step = _landed(t, dt)
+        landing = "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
         raise ComparisonError(
             f"measurement at t = {t[i]:g} s lies {off[i]:.2g} steps of {dt:g} s off its nearest "
-            f"step; {_landing(t, dt)}"
+            f"step; {landing}"
         )
     if len(np.unique(steps)) < len(steps):
         raise ComparisonError(
@@ -163,12 +166,6 @@ def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:
     ratio = t / dt
     steps = np.rint(ratio).astype(np.int64)
     return steps, np.abs(ratio - steps)
-
-
-def _landing(t: Floats, dt: float) -> str:
-    """The largest step up to `dt` on which all times land, as advice."""
-    step = _landed(t, dt)
-    return "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
 
 
 def _landed(t: Floats, dt: float) -> float | None:
@@ -189,7 +186,11 @@ def measurements(registered: Registered, mesh: Mesh) -> Measurements:
     """
     markers, outlines = registered.of(MarkerObservation), registered.of(OutlineObservation)
     found = [_of_markers(m, registered, mesh) for m in markers[:1]]
-    found += [_of_outline(o, registered) for o in outlines]
+    for outline in outlines:
+        along = outline.along_normals(NORMALS)
+        names = tuple(f"{outline.name}.{i}" for i in range(NORMALS))
+        t, z, sd = on_steps(outline.t, along.z, np.full(NORMALS, along.sd), registered.t)
+        found.append(Measurements(t, along.H, z, sd, names, outline.sd_t))
     if not found:
         raise ComparisonError(
             "the recording has no markers and no outlines, so the filter has no measurements"
@@ -211,13 +212,6 @@ def together(every: Sequence[Measurements]) -> Measurements:
     sd = np.concatenate([m.sd for m in every])
     names = tuple(name for m in every for name in m.names)
     return Measurements(t, H, z, sd, names, max(m.sd_t for m in every))
-
-
-def _of_outline(outline: OutlineObservation, registered: Registered) -> Measurements:
-    found = outline.along_normals(NORMALS)
-    names = tuple(f"{outline.name}.{i}" for i in range(NORMALS))
-    t, z, sd = on_steps(outline.t, found.z, np.full(NORMALS, found.sd), registered.t)
-    return Measurements(t, found.H, z, sd, names, outline.sd_t)
 
 
 def _of_markers(seen: MarkerObservation, registered: Registered, mesh: Mesh) -> Measurements:

@@ -102,22 +102,23 @@ def smoothed(model: Transition, notes: Sequence[Note]) -> Smoothed:
             roots[i + 1] = W = _narrow(W)
         look = notes[i].look
         if look is not None:
-            away, W = _informed(model.H[np.array(look.gain.seen)], look, away, W)
+            # lambda- and W- of the look
+            H, G, root = model.H[np.array(look.gain.seen)], look.gain.G, look.gain.root
+            away = away - H.T @ (G.T @ away + cho_solve((root, False), look.y))
+            seen = solve_triangular(root, H, trans="T")
+            W = np.hstack([W - H.T @ (G.T @ W), seen.T])
         kept[i], across = away, notes[i].across or model
-        away, W = across.back(away), across.back(W if W.shape[1] <= _wide(n) else _narrow(W))
-    return Smoothed(_forward(model, notes, away, kept), roots)
-
-
-def _informed(H: Floats, look: Look, away: Floats, W: Floats) -> tuple[Floats, Floats]:
-    """lambda- and W- of a look."""
-    G, root = look.gain.G, look.gain.root
-    away = away - H.T @ (G.T @ away + cho_solve((root, False), look.y))
-    seen = solve_triangular(root, H, trans="T")
-    return away, np.hstack([W - H.T @ (G.T @ W), seen.T])
-
-
-def _wide(n: int) -> int:
-    return max(_WIDE, 2 * n if n <= _FEW else 0)
+        wide = max(_WIDE, 2 * n if n <= _FEW else 0)
+        away, W = across.back(away), across.back(W if W.shape[1] <= wide else _narrow(W))
+    # Corrections (steps, n), in the place of `kept`
+    e = -model.P0 @ away
+    for i, note in enumerate(notes):
+        across = note.across or model
+        e = across.ahead(e) - across.Q @ kept[i]
+        if note.look is not None:
+            e = e - note.look.gain.G @ note.look.y
+        kept[i] = e
+    return Smoothed(kept, roots)
 
 
 def _narrow(W: Floats) -> Floats:
@@ -128,18 +129,6 @@ def _narrow(W: Floats) -> Floats:
     U, s, _ = np.linalg.svd(W, full_matrices=False)
     kept = s > _LEFT * s.max(initial=0.0)
     return np.asarray(U[:, kept] * s[kept])
-
-
-def _forward(model: Transition, notes: Sequence[Note], away: Floats, kept: Floats) -> Floats:
-    """Corrections (steps, n), in the place of `kept`."""
-    e = -model.P0 @ away
-    for i, note in enumerate(notes):
-        across = note.across or model
-        e = across.ahead(e) - across.Q @ kept[i]
-        if note.look is not None:
-            e = e - note.look.gain.G @ note.look.y
-        kept[i] = e
-    return kept
 
 
 def require_exact(smooth: bool, gains: str) -> None:

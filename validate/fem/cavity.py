@@ -77,7 +77,13 @@ def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
     """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
     rule = _rule(surface, positions)
     x = positions[surface.facets]
-    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, _into_solid(rule, x))
+    along = rule.jacobians(x)
+    # Normals (f, q, d) into the solid, as long as the facet is large
+    if x.shape[2] == 2:
+        normals = np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
+    else:
+        normals = -np.cross(along[..., 0], along[..., 1])
+    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, normals)
     load = np.zeros_like(positions)
     np.add.at(load, surface.facets, nodal)
     return load
@@ -132,14 +138,6 @@ def flat_form(facets: Ints, x: Floats) -> Floats:
     return mean
 
 
-def _into_solid(rule: Quadrature, x: Floats) -> Floats:
-    """Normals (f, q, d) of facets with nodes x (f, m, d), as long as the facet is large."""
-    along = rule.jacobians(x)
-    if x.shape[2] == 2:
-        return np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
-    return np.asarray(-np.cross(along[..., 0], along[..., 1]))
-
-
 def _rule(surface: CavitySurface, positions: Floats) -> Quadrature:
     """Exact for the volume and its load; flat facets need their middle alone."""
     d, nodes = positions.shape[1], surface.facets.shape[1]
@@ -162,19 +160,15 @@ def volume_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_arra
     In 2-D it is (N, N) without a unit, N = 2 n.
     """
     if positions.shape[1] == 2:
-        return _flat_hessian(surface, positions)
+        count = surface.facets.shape[1]
+        rule = facet_rule(2, count)
+        M = np.einsum("q,qa,qb->ab", rule.weights, rule.N, rule.dN[..., 0])
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+        block = np.einsum("ab,ij->aibj", (M - M.T) / 2, turn)
+        blocks = np.broadcast_to(block, (len(surface.facets), *block.shape))
+        return _assembled(surface, blocks, positions)
     x = positions[surface.facets] - positions[surface.nodes].mean(axis=0)
     blocks = 2 * np.einsum("abc,fcij->faibj", _antisymmetric(x.shape[1]), _cross_matrix(x))
-    return _assembled(surface, blocks, positions)
-
-
-def _flat_hessian(surface: CavitySurface, positions: Floats) -> sparse.csr_array:
-    count = surface.facets.shape[1]
-    rule = facet_rule(2, count)
-    M = np.einsum("q,qa,qb->ab", rule.weights, rule.N, rule.dN[..., 0])
-    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
-    block = np.einsum("ab,ij->aibj", (M - M.T) / 2, turn)
-    blocks = np.broadcast_to(block, (len(surface.facets), *block.shape))
     return _assembled(surface, blocks, positions)
 
 

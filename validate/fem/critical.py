@@ -108,13 +108,8 @@ def lanczos_step(
             f"{products} products, margin {margin:g}: expected at least {_FEWEST} products "
             "(fewer overestimate the step) and a margin in 0..0.5"
         )
-    top, open_part, done = _largest(apply, 1 / np.sqrt(masses), products)
-    limit = 2 / float(np.sqrt(top))
-    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
-
-
-def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float, int]:
-    """Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done."""
+    # Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done
+    scale = 1 / np.sqrt(masses)
     m = len(scale)
     q = np.random.default_rng(0).standard_normal(m)
     basis = np.zeros((min(products, m) + 1, m))
@@ -132,7 +127,9 @@ def _largest(apply: MatVec, scale: Floats, products: int) -> tuple[float, float,
         basis[k + 1] = w / betas[-1]
     T = np.diag(alphas) + np.diag(betas[:-1], 1) + np.diag(betas[:-1], -1)
     values, vectors = np.linalg.eigh(T)
-    return float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
+    top, open_part, done = float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
+    limit = 2 / float(np.sqrt(top))
+    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
 
 
 def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
@@ -143,7 +140,10 @@ def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:
 
 def wave_speeds(scene: Scene) -> Floats:
     """Dilatational wave speed sqrt((lambda + 2 mu)/rho) m/s of every cell (e,)."""
-    return np.sqrt(scene.per_cell(_wave_modulus) / scene.per_cell(_density))
+    return np.sqrt(
+        scene.per_cell(lambda m: m.bulk_modulus + 4 * m.shear_modulus / 3)
+        / scene.per_cell(_density)
+    )
 
 
 def cell_altitudes(scene: Scene) -> Floats:
@@ -198,10 +198,6 @@ def _elasticity(lam: Floats, mu: Floats, d: int) -> Floats:
     return np.asarray(
         lam[:, None, None] * np.outer(normal, normal) + mu[:, None, None] * np.diag(weights)
     )
-
-
-def _wave_modulus(m: Material) -> float:
-    return m.bulk_modulus + 4 * m.shear_modulus / 3
 
 
 def _density(m: Material) -> float:

@@ -1,13 +1,20 @@
-"""Warnings of locking of linear elements: near incompressibility, and in bending."""
+"""Locking of linear elements: warnings, and the measured factor.
+
+Locking factor of linear cells: small displacement relative to quadratic cells.
+"""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from validate.scene.mesh import Mesh
+from validate.arrays import Floats
+from validate.errors import SceneError
+from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.system import build
+from validate.scene.mesh import Mesh, quadratic
 from validate.scene.meshless import AnyScene, Meshless
-from validate.scene.scene import Pressure, Scene
+from validate.scene.scene import Load, Pressure, Scene
 
 # P1 / P2 displacement of a held cube that is pulled, 4 boxes an edge: .98 at nu .3, .96 at .4, .92
 # at .45, .82 at .49, .67 at .4999.
@@ -44,8 +51,27 @@ def locking_of(scene: AnyScene) -> tuple[Locking, ...]:
     if isinstance(scene, Meshless) or scene.mesh.order != 1:
         return ()
     cells = f"linear {_SHAPES[scene.mesh.kind][0]}"
-    found = (_volume(scene, cells), _mean(scene, cells), _bending(scene, cells))
-    return tuple(locking for locking in found if locking)
+    nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
+    found = []
+    if scene.plane != "stress" and scene.dilatation == "pointwise" and nu >= LOCKING_FROM:
+        instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
+        cause = f"{cells} lock near incompressibility and are too stiff; compare with {instead}"
+        found.append(Locking(f"nu = {nu:g}", cause))
+    few = round(across, 1) < _MEAN_ACROSS
+    if scene.plane != "stress" and scene.dilatation == "nodal_mean" and nu >= _MEAN_FROM and few:
+        where = f"nu = {nu:g}, {across:.1f} across the body"
+        cause = (
+            f"a mesh of few {cells} with nodal mean dilatation is too stiff where plates hold the "
+            "body; compare with order 2 or a finer mesh"
+        )
+        found.append(Locking(where, cause))
+    sides = np.ptp(scene.mesh.nodes, axis=0)
+    slender = sides.max() >= _SLENDER * sides.min() and round(across, 1) < _ACROSS
+    if slender and _bends(scene, int(sides.argmax())):
+        where = f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long"
+        cause = f"a mesh of few {cells} locks in bending; compare with order 2 or a finer mesh"
+        found.append(Locking(where, cause))
+    return tuple(found)
 
 
 def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
@@ -54,39 +80,15 @@ def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
     for label, scene in scenes:
         for one in locking_of(scene):
             found.setdefault(one.cause, {}).setdefault(one.where, []).append(label)
-    return tuple(
-        f"{cause}: " + ", ".join(f"{where} ({_few(labels)})" for where, labels in places.items())
-        for cause, places in found.items()
-    )
-
-
-def _few(labels: list[str]) -> str:
-    """The first methods by name."""
-    more = len(labels) - _NAMED
-    return "; ".join(labels[:_NAMED]) + (f" and {more} more methods" if more > 0 else "")
-
-
-def _volume(scene: Scene, cells: str) -> Locking | None:
-    nu = float(scene.per_cell(lambda m: m.nu).max())
-    if nu < LOCKING_FROM or scene.dilatation != "pointwise" or scene.plane == "stress":
-        return None
-    instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
-    return Locking(
-        f"nu = {nu:g}",
-        f"{cells} lock near incompressibility and are too stiff; compare with {instead}",
-    )
-
-
-def _mean(scene: Scene, cells: str) -> Locking | None:
-    nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
-    few = round(across, 1) < _MEAN_ACROSS
-    if scene.dilatation != "nodal_mean" or nu < _MEAN_FROM or not few or scene.plane == "stress":
-        return None
-    return Locking(
-        f"nu = {nu:g}, {across:.1f} across the body",
-        f"a mesh of few {cells} with nodal mean dilatation is too stiff where plates hold the "
-        "body; compare with order 2 or a finer mesh",
-    )
+    notes = []
+    for cause, places in found.items():
+        words = []
+        for where, labels in places.items():
+            more = len(labels) - _NAMED
+            rest = f" and {more} more methods" if more > 0 else ""
+            words.append(f"{where} ({'; '.join(labels[:_NAMED])}{rest})")
+        notes.append(f"{cause}: {', '.join(words)}")
+    return tuple(notes)
 
 
 def _across(mesh: Mesh) -> float:
@@ -94,19 +96,6 @@ def _across(mesh: Mesh) -> float:
     sides = np.ptp(mesh.nodes, axis=0)
     boxes = len(mesh.cells) / _SHAPES[mesh.kind][1]
     return float(sides.min() / (np.prod(sides) / boxes) ** (1 / len(sides)))
-
-
-def _bending(scene: Scene, cells: str) -> Locking | None:
-    sides = np.ptp(scene.mesh.nodes, axis=0)
-    across = _across(scene.mesh)
-    if sides.max() < _SLENDER * sides.min() or round(across, 1) >= _ACROSS:
-        return None
-    if not _bends(scene, int(sides.argmax())):
-        return None
-    return Locking(
-        f"{across:.1f} across a body {sides.max() / sides.min():.0f} times as long",
-        f"a mesh of few {cells} locks in bending; compare with order 2 or a finer mesh",
-    )
 
 
 def _bends(scene: Scene, along: int) -> bool:
@@ -118,3 +107,50 @@ def _bends(scene: Scene, along: int) -> bool:
     acting = [np.asarray(one.direction) for one in (*scene.drives, *scene.loads)
               if not isinstance(one, Pressure)]  # fmt: skip
     return not acting or any(np.abs(np.delete(d, along)).max(initial=0.0) > 1e-9 for d in acting)
+
+
+def locking_factor(scene: Scene, probe: str) -> float:
+    """Displacement at a probe under the scene's one load, linear over quadratic cells (same mesh).
+
+    Small strain, static, the load as a uniform traction; along the quadratic displacement, of
+    hexahedra that of mixed ones. 1 says that the scene's cells do as well as quadratic ones, 0.6
+    that they show 60 % of the motion. A scene with nodal mean or mixed dilatation is judged as it
+    is. Raises `SceneError` without that probe, for other than one load, for quadratic cells, and
+    for a probe that does not move.
+    """
+    points = [p.point for p in scene.probes if p.name == probe]
+    if len(points) != 1 or len(scene.loads) != 1 or scene.mesh.order != 1:
+        raise SceneError(
+            f"locking at '{probe}': needs linear cells, one load and that probe; the scene has "
+            f"order {scene.mesh.order}, {len(scene.loads)} loads, probes "
+            f"{[p.name for p in scene.probes]}"
+        )
+    small = replace(
+        scene,
+        material=replace(scene.material, law="linear"),
+        regions=tuple(
+            replace(r, material=replace(r.material, law="linear")) for r in scene.regions
+        ),
+        loads=tuple(
+            replace(load, spread="consistent") if isinstance(load, Load) else load
+            for load in scene.loads
+        ),
+    )
+    # Quadratic hexahedra lock near nu = .5, too; those of linear pressure do not.
+    finer = replace(
+        small, body=quadratic(scene.mesh), dilatation="mixed" if scene.mesh.bricks else "pointwise"
+    )
+    ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
+    length = float(reference @ reference)
+    if length == 0:
+        raise SceneError(f"locking at '{probe}': the probe does not move under the load")
+    return float(ours @ reference) / length
+
+
+def _moved(scene: Scene, points: Floats) -> Floats:
+    """Displacement (d,) m of the one point under a unit of the one load."""
+    system = build(scene)
+    u = np.zeros(scene.mesh.nodes.size)
+    u[system.free] = system.factor().solve(system.loads[system.free, 0])
+    moved: Floats = barycentric_rows(scene.mesh, points).apply(u.reshape(scene.mesh.nodes.shape))[0]
+    return moved

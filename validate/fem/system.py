@@ -1,4 +1,4 @@
-"""System of a scene: stiffness, constrained unknowns, factorisation, response columns.
+"""System of a scene: stiffness, constrained unknowns, rigid motions, response columns.
 
 A linear scene with drives and cavity pressures is the sum of fixed fields: u = sum_j q_j u_j
 + sum_i P_i u_i. They are solved for once; every later step is a short product (the columns of the
@@ -21,12 +21,57 @@ from validate.fem.assembly.assemble import lumped, mass, stiffness, stiffness_da
 from validate.fem.assembly.assemble import mass as mass_matrix
 from validate.fem.assembly.loads import hung_masses, load_columns
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
-from validate.fem.linear_solvers.factor import Factor, factorise, require_assembly
-from validate.fem.linear_solvers.frontal import Fronts
-from validate.fem.rigid import require_held
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise, require_assembly
 from validate.scene.mesh import Mesh
 from validate.scene.places import Place, nodes_of
-from validate.scene.scene import Drive, Load, Scene
+from validate.scene.scene import Load, Scene
+
+_FREE = 1e-14  # square of the rows, of the largest, under a motion that nothing holds
+_SHOWN = 0.3  # share of a motion's largest component from which it is named
+
+
+def require_held(scene: Scene, held: Ints, more: Floats | None = None, hint: str = "") -> None:
+    """Raise `SceneError` that names the rigid motions that the unknowns `held` (h,), foundations
+    and the rows `more` (m, N) leave free."""
+    mesh = scene.mesh
+    modes, words = rigid_motions(mesh)
+    # Unknowns that foundations bind to the ground
+    bedded = [
+        int(node) * mesh.dimension + c
+        for f in scene.foundations
+        if f.stiffness > 0
+        for node in nodes_of(mesh, f.facets)
+        for c in f.components
+    ]
+    rows = [modes[held], modes[bedded]]
+    if more is not None:
+        rows.append(more @ modes)
+    every = np.vstack([*rows, np.zeros((1, len(words)))])
+    _, sizes, motions = np.linalg.svd(every.T @ every)
+    loose = motions[sizes <= _FREE * max(float(sizes.max()), 1e-300)]
+    if len(loose):
+        share = np.abs(loose).max(axis=0)
+        named = ", ".join(w for w, s in zip(words, share, strict=True) if s > _SHOWN * share.max())
+        raise SceneError(
+            f"the body can move rigidly in {len(loose)} of {len(words)} ways ({named}): "
+            f"{len(held)} unknowns are held and its stiffness matrix is not positive "
+            f"definite; add a support or pin{hint}"
+        )
+
+
+def rigid_motions(mesh: Mesh) -> tuple[Floats, tuple[str, ...]]:
+    """Translations and rotations (N, 3 or 6) of the body's size, and their names."""
+    d, n = mesh.dimension, len(mesh.nodes)
+    x = (mesh.nodes - mesh.nodes.mean(axis=0)) / np.ptp(mesh.nodes, axis=0).max()
+    planes = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
+    modes = np.zeros((n, d, d + len(planes)))
+    for c in range(d):
+        modes[:, c, c] = 1.0
+    for r, (i, j) in enumerate(planes):
+        modes[:, i, d + r], modes[:, j, d + r] = -x[:, j], x[:, i]
+    turns = ["z"] if d == 2 else list("xyz")
+    words = (*(f"along {a}" for a in "xyz"[:d]), *(f"about {a}" for a in turns))
+    return modes.reshape(n * d, -1), words
 
 
 @dataclass(frozen=True)
@@ -134,11 +179,26 @@ def build(scene: Scene) -> System:
             moves[driven, j] = part.columns(mesh.nodes[nodes])[:, i]
             continue
         if drive.shape is not None:
-            driven, u = _shaped(scene, drive, drive.shape.u)
+            # Each node moves by its own, per metre.
+            driven, u = _unknowns(scene, drive.facets, tuple(range(mesh.dimension))), drive.shape.u
+            if u.size != len(driven):
+                raise SceneError(
+                    f"drive '{drive.name}': a shape of {u.shape} for {len(driven)} unknowns of its "
+                    "nodes"
+                )
             held[driven] = True
-            moves[driven, j] = u
+            moves[driven, j] = u.ravel()
             continue
-        driven = _driven(scene, drive)
+        axes = np.flatnonzero(drive.direction)
+        if len(axes) != 1:
+            raise SceneError(
+                f"drive '{drive.name}' must move along one axis, got {drive.direction}"
+            )
+        driven = _unknowns(scene, drive.facets, (int(axes[0]),))
+        if drive.point is not None:
+            places = mesh.nodes[driven // mesh.dimension]
+            away = np.linalg.norm(places - np.array(drive.point), axis=1)
+            driven = driven[[int(np.argmin(away))]]
         held[driven] = True
         moves[driven, j] = sum(drive.direction)
     if held.all():
@@ -165,57 +225,27 @@ def responses(system: System) -> Responses:
         )
     mesh, factor = system.scene.mesh, system.factor()
     loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
-    columns = [_driven_field(system, factor, move) for move in system.moves.T]
-    columns += [_loaded_field(system, factor, load) for load in loads]
+    columns = []
+    for move in system.moves.T:
+        u = move.copy()
+        u[system.free] = factor.solve(-(system.K @ move)[system.free])
+        columns.append(u)
+    for load in loads:
+        u = np.zeros_like(load)
+        u[system.free] = factor.solve(load[system.free])
+        columns.append(u)
     fields = np.array(columns).reshape(-1, *mesh.nodes.shape)
     shapes = np.concatenate([mesh.nodes[None], fields])
     forms = [volume_form(c, shapes) for c in system.cavities]
     volumes = np.array(forms).reshape(-1, *(3 * [len(shapes)]))  # also without cavities
-    return Responses(system.scene, fields, _reactions(system, columns, loads), volumes)
-
-
-def _driven_field(system: System, factor: Factor | Fronts, move: Floats) -> Floats:
-    u = move.copy()
-    u[system.free] = factor.solve(-(system.K @ move)[system.free])
-    return u
-
-
-def _loaded_field(system: System, factor: Factor | Fronts, load: Floats) -> Floats:
-    u = np.zeros_like(load)
-    u[system.free] = factor.solve(load[system.free])
-    return u
-
-
-def _reactions(system: System, columns: list[Floats], loads: list[Floats]) -> Floats:
-    """Force of each drive on the body along it: residual K u - f of every column."""
+    # Force of each drive on the body along it: residual K u - f of every column
     drives = len(system.scene.drives)
     residuals = [system.K @ u for u in columns]
     for i, load in enumerate(loads):
         residuals[drives + i] = residuals[drives + i] - load
     copies = system.scene.copies
-    return np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
-
-
-def _driven(scene: Scene, drive: Drive) -> Ints:
-    axes = np.flatnonzero(drive.direction)
-    if len(axes) != 1:
-        raise SceneError(f"drive '{drive.name}' must move along one axis, got {drive.direction}")
-    driven = _unknowns(scene, drive.facets, (int(axes[0]),))
-    if drive.point is None:
-        return driven
-    mesh = scene.mesh
-    away = np.linalg.norm(mesh.nodes[driven // mesh.dimension] - np.array(drive.point), axis=1)
-    return driven[[int(np.argmin(away))]]
-
-
-def _shaped(scene: Scene, drive: Drive, u: Floats) -> tuple[Ints, Floats]:
-    """The unknowns of a drive whose nodes move each by its own, and how, per metre."""
-    driven = _unknowns(scene, drive.facets, tuple(range(scene.mesh.dimension)))
-    if u.size != len(driven):
-        raise SceneError(
-            f"drive '{drive.name}': a shape of {u.shape} for {len(driven)} unknowns of its nodes"
-        )
-    return driven, u.ravel()
+    reactions = np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
+    return Responses(system.scene, fields, reactions, volumes)
 
 
 def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
@@ -232,20 +262,17 @@ def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:
         if free[nodes][:, along].any():
             continue
         open_ones = np.flatnonzero(free[:, along].any(axis=1))
-        hint = (
-            "the body has no free node" if not len(open_ones) else _nearest(mesh, nodes, open_ones)
-        )
+        hint = "the body has no free node"
+        if len(open_ones):
+            away, index = cKDTree(mesh.nodes[open_ones]).query(mesh.nodes[nodes])
+            nearest = open_ones[np.asarray(index)[int(np.argmin(away))]]
+            at = ", ".join(f"{1e3 * x:.3g}" for x in mesh.nodes[nearest])
+            far = 1e3 * float(np.min(away))
+            hint = f"the nearest free node is at ({at}) mm, {far:.3g} mm away"
         raise SceneError(
             f"{what} '{name}': supports and pins hold all {len(nodes) * int(along.sum())} "
             f"unknowns of its {len(nodes)} nodes, so it would have no effect; {hint}"
         )
-
-
-def _nearest(mesh: Mesh, nodes: Ints, others: Ints) -> str:
-    away, index = cKDTree(mesh.nodes[others]).query(mesh.nodes[nodes])
-    nearest = others[np.asarray(index)[int(np.argmin(away))]]
-    at = ", ".join(f"{1e3 * x:.3g}" for x in mesh.nodes[nearest])
-    return f"the nearest free node is at ({at}) mm, {1e3 * float(np.min(away)):.3g} mm away"
 
 
 def _unknowns(scene: Scene, facets: Place, components: tuple[int, ...]) -> Ints:

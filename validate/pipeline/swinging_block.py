@@ -13,8 +13,8 @@ from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Scene
-from validate.solve.candidates import SwingingBody
 from validate.solve.schemes import candidates
+from validate.solve.study_entries import SwingingBody
 
 _SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
 

@@ -62,7 +62,7 @@ class Material:
     A declaration may leave E and nu open (None). Every law has these at small strain, which is all
     that the linear schemes use; `coefficients` are what the law has beyond them; with a `prony`
     series it is the relaxed law, whose isochoric stress comes late. At nu = 0.5 mixed cells and
-    static schemes keep the volume exactly (`fem.assembly.incompressible`), others refuse it.
+    static schemes keep the volume exactly (`fem.assembly.volume_constraints`), others refuse it.
     Dynamic schemes need rho kg/m^3; Rayleigh damping is C = mass_damping M + stiffness_damping K,
     in 1/s and s (the alpha_0 and alpha_1 of paper 001, eq 7). Raises `SceneError` for values out of
     range, coefficients that the law does not know, and those that lose positive energy, with the

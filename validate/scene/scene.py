@@ -288,7 +288,7 @@ class Scene:
     and the parameters where the mesh follows from them. `copies`: planes of symmetry leave this
     many equal parts, of which the mesh is one; the force of a drive is that on the whole body.
     `dilatation`: the volume change is that of every point, in the mean of the cells around each
-    node (tet4), or "mixed", projected in every cell (`fem.assembly.mean_dilatation`); the latter
+    node (tet4), or "mixed", projected in every cell (`fem.assembly.assemble`); the latter
     two do not lock near nu = .5. Declared, "by_element" is the one of them that the mesh's cells
     may have. `plane` and `thickness` m are those of a 2-D mesh; at 1 m all forces are per metre.
     `force_unit`: N, or that of a recording whose unit nobody stated; moduli are then in it per m^2,

@@ -16,7 +16,7 @@ from validate.fem.system import System, damping_of, mass_of
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import rule_of
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.stepping import explicit_maps, newmark_maps, spectral_radii
+from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
 _COUPLED = 1e-8  # of the damping, as in `fem.modes`

@@ -93,32 +93,46 @@ def march(
         )
     smooths = isinstance(stepper, Smoothing) and stepper.smooth
     frames = frozenset(at.tolist())
-    shown = _smoothed(stepper, inputs, frames) if smooths else _filtered
+    shown = _smoothed(stepper, inputs, frames) if smooths else lambda state: state
     walk, outcome = _walk(stepper, inputs, frames, tell, shown, points)
-    outcome = _listened(stepper, walk, outcome)
+    if outcome.state == "finished" and isinstance(stepper, Listening):
+        # A filter that no measurement reached is its model under another name.
+        why = stepper.unheard(walk.numbers)
+        outcome = Outcome("invalid", outcome.step, why) if why else outcome
     done = len(walk.updates)
     traces = {"updates": Trace(np.array(walk.updates, dtype=np.float64), "1")}
     traces |= given_traces(stepper.scene, inputs[:done])
     for name, unit in stepper.units.items():
         traces[name] = Trace(np.array([numbers[name] for numbers in walk.numbers]), unit)
-    traces |= _totals(stepper.scene, traces)
+    # `<set>.force.<axis>` N of sets that follow tracked points: the sum over the points
+    scene = stepper.scene
+    totals = {}
+    for part in scene.tracked:
+        for c, axis in enumerate(_AXES[: part.places.shape[1]]):
+            of = [traces.get(f"{name}.force") for name in part.inputs[c :: part.places.shape[1]]]
+            forces = [trace.y for trace in of if trace is not None]
+            if forces:
+                totals[f"{part.name}.force.{axis}"] = Trace(np.sum(forces, axis=0), "N")
+    traces |= totals
     traces |= probe_traces(stepper.scene, np.array(walk.probes))
-    traces = {name: _in_unit_of(stepper.scene, trace) for name, trace in traces.items()}
+    for name, trace in traces.items():
+        if trace.unit == "N":  # the unit that the scene has for forces: schemes know numbers alone
+            traces[name] = replace(trace, unit=stepper.scene.force_unit)
     seconds = None if smooths else np.array(walk.seconds)[:done]
     times = step_times(seconds)
     u = np.array(walk.fields).reshape(-1, *stepper.scene.mesh.nodes.shape)
     sd = np.array(walk.sd).reshape(u.shape) if isinstance(stepper, Uncertain) else None
     at = at[at < done]
-    x = None if points is None else _stacked(walk.points, done, points, u)
+    # (nt, p, d), of no steps too
+    x = (
+        None
+        if points is None
+        else np.array(walk.points).reshape(done, points.weights.shape[0], u.shape[2])
+    )
     return Run(
         method, t[:done], at, u, traces, outcome, setup_s, times, sd, seconds, tuple(walk.said),
         points=x,
     )  # fmt: skip
-
-
-def _stacked(found: list[Floats], done: int, points: Rows, u: Floats) -> Floats:
-    """(nt, p, d), of no steps too."""
-    return np.array(found).reshape(done, points.weights.shape[0], u.shape[2])
 
 
 @dataclass(frozen=True)
@@ -147,10 +161,6 @@ def _smoothed(stepper: Stepper, inputs: Floats, at: frozenset[int]) -> Callable[
     return stepper.smoother(notes)
 
 
-def _filtered(state: State) -> State:
-    return state
-
-
 def _walk(
     stepper: Stepper,
     inputs: Floats,
@@ -159,7 +169,8 @@ def _walk(
     shown: Callable[[State], State],
     points: Rows | None,
 ) -> tuple[_Kept, Outcome]:
-    walk, state, rows = _Kept(), stepper.rest(), _probe_rows(stepper)
+    scene, walk, state = stepper.scene, _Kept(), stepper.rest()
+    rows = probe_rows(scene.mesh, scene.probes) if scene.probes else None
     often = -(-len(inputs) // _TOLD)
     for i, value in enumerate(inputs):
         if i % often == 0:
@@ -205,19 +216,6 @@ def _run_away(stepper: Stepper, state: State, rows: Rows | None, *, shown: bool)
     return f"a displacement of {words}, above {RUNAWAY:g} times the body's {size:.3g} m"
 
 
-def _listened(stepper: Stepper, walk: _Kept, outcome: Outcome) -> Outcome:
-    """A filter that no measurement reached is its model under another name: its run is invalid."""
-    if outcome.state != "finished" or not isinstance(stepper, Listening):
-        return outcome
-    why = stepper.unheard(walk.numbers)
-    return Outcome("invalid", outcome.step, why) if why else outcome
-
-
-def _in_unit_of(scene: Scene, trace: Trace) -> Trace:
-    """A force in the unit that the scene has for forces: schemes know numbers alone."""
-    return replace(trace, unit=scene.force_unit) if trace.unit == "N" else trace
-
-
 def given_traces(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     """`<drive>.displacement` m, `<load>.force` N (with `per_node` that at each node, else the
     total), `<weight>.acceleration` m/s^2, `<pressure>.pressure` Pa, of a rigid body
@@ -235,25 +233,6 @@ def given_traces(scene: Scene, inputs: Floats) -> dict[str, Trace]:
     for mover, y in zip(scene.movers[::-1], columns[::-1], strict=False):
         traces[f"{mover.name}.displacement"] = Trace(y, "m")
     return traces
-
-
-def _totals(scene: Scene, traces: Mapping[str, Trace]) -> dict[str, Trace]:
-    """`<set>.force.<axis>` N of sets that follow tracked points: the sum over the points."""
-    totals = {}
-    for part in scene.tracked:
-        for c, axis in enumerate(_AXES[: part.places.shape[1]]):
-            of = [traces.get(f"{name}.force") for name in part.inputs[c :: part.places.shape[1]]]
-            forces = [trace.y for trace in of if trace is not None]
-            if forces:
-                totals[f"{part.name}.force.{axis}"] = Trace(np.sum(forces, axis=0), "N")
-    return totals
-
-
-def _probe_rows(stepper: Stepper) -> Rows | None:
-    scene = stepper.scene
-    if not scene.probes:
-        return None
-    return probe_rows(scene.mesh, scene.probes)
 
 
 def probe_traces(scene: Scene, values: Floats) -> dict[str, Trace]:
@@ -276,9 +255,6 @@ def step_times(seconds: Floats | None) -> StepTimes | None:
     """Of steps that took (nt,) s, without the first ones; None where none was timed."""
     if seconds is None or not len(seconds):
         return None
-    return _quantiles(seconds[_UNTIMED if len(seconds) > 2 * _UNTIMED else 0 :])
-
-
-def _quantiles(seconds: Floats) -> StepTimes:
+    seconds = seconds[_UNTIMED if len(seconds) > 2 * _UNTIMED else 0 :]
     p50, p99 = np.quantile(seconds, [0.5, 0.99])
     return StepTimes(float(p50), float(p99), float(seconds.max()), len(seconds))

@@ -10,20 +10,16 @@ from collections.abc import Callable
 
 from validate.plugins import Registry, settings_faults
 from validate.scene.mesh import Kind
-from validate.solve.candidates import RUNGS, Asked, Rival
-from validate.solve.dynamic.equilibrium_start import FromEquilibrium
-from validate.solve.dynamic.implicit import NewtonDynamics
+from validate.solve.dynamic.implicit import FromEquilibrium, NewtonDynamics
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.release import LetGo
 from validate.solve.dynamic.viscous_modes import ViscousModes
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.external.release import ExternalLetGo
-from validate.solve.external.scheme import ExternalSimulator
-from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, NoFluid
+from validate.solve.external.scheme import ExternalLetGo, ExternalSimulator
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, NoFluid, PulsePressure
 from validate.solve.fluid.pressure_loop import PressureLoop
-from validate.solve.fluid.pulse import PulsePressure
 from validate.solve.handles import Handles, handles_faults
 from validate.solve.haptic.loop import HapticLoop
 from validate.solve.haptic.needle import NeedleLoop
@@ -36,7 +32,7 @@ from validate.solve.static.proportional import Proportional
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.stretch_test import StretchTest
 from validate.solve.static.without_mechanics import Harmonic, RigidMotion
-from validate.solve.stepping import Stepping
+from validate.solve.study_entries import RUNGS, Asked, Rival, Stepping
 from validate.solve.types import SceneSolver, Scheme
 
 _OWN: tuple[type[Scheme], ...] = (

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, Ints, checked
+from validate.arrays import Floats, checked
 from validate.errors import RecordingError, UsageError
 from validate.recording.clocks.alignment import RECORD
 from validate.recording.types import Markers, Record, Recording, Source
@@ -89,35 +89,31 @@ class Camera:
     def looks(self, points: Points, seeds: Mapping[str, np.random.Generator]) -> Markers:
         """Every point at each `every`-th time; the first sample is seen whole."""
         pick = np.arange(0, len(points.t), self.every)
-        x = points.rest + self._shown(points, pick, seeds["odd"])
+        u = points.u[pick]  # displacements (k, p, 3) m when the camera really looked
+        if self.late:
+            jitter = self.late * seeds["odd"].standard_normal(len(pick) - 1)
+            t = points.t[pick] + np.append(0.0, jitter)
+            t = np.clip(t, points.t[0], points.t[-1])
+            flat = points.u.reshape(len(points.t), -1)
+            late = np.stack([np.interp(t, points.t, column) for column in flat.T], axis=1)
+            u = late.reshape(u.shape)
+        x = points.rest + u
         noise = self.sd * seeds["markers"].standard_normal(x.shape)
         noise[0] /= np.sqrt(self.still)
         x = (x + noise) @ self.rotation.T + np.array(self.shift)
-        x += self._strayed(x.shape, seeds["odd"])
+        # How far off (k, p, 3) m looks are; the first one is not
+        rng = seeds["odd"]
+        off = np.zeros(x.shape)
+        if self.outliers:
+            odd = rng.random(x.shape[:2]) < self.outliers
+            odd[0] = False
+            way = rng.standard_normal((int(odd.sum()), 3))
+            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
+        x += off
         unseen = seeds["missing"].random(x.shape[:2]) < self.missing
         unseen[0] = False
         x[unseen] = np.nan
         return Markers(points.t[pick], points.names, x, self.sd, "camera")
-
-    def _shown(self, points: Points, pick: Ints, rng: np.random.Generator) -> Floats:
-        """Displacements (k, p, 3) m when the camera really looked."""
-        if not self.late:
-            return points.u[pick]
-        t = points.t[pick] + np.append(0.0, self.late * rng.standard_normal(len(pick) - 1))
-        t = np.clip(t, points.t[0], points.t[-1])
-        flat = points.u.reshape(len(points.t), -1)
-        seen = np.stack([np.interp(t, points.t, column) for column in flat.T], axis=1)
-        return seen.reshape(len(pick), *points.u.shape[1:])
-
-    def _strayed(self, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
-        """How far off (k, p, 3) m looks are; the first one is not."""
-        off = np.zeros(shape)
-        if self.outliers:
-            odd = rng.random(shape[:2]) < self.outliers
-            odd[0] = False
-            way = rng.standard_normal((int(odd.sum()), 3))
-            off[odd] = self.astray * way / np.linalg.norm(way, axis=1)[:, None]
-        return off
 
 
 def require_noise(variance: float) -> None:
@@ -183,7 +179,13 @@ def record_tracked(
     if clash:
         raise RecordingError(f"markers {clash} are both tracked points and fiducials; rename them")
     lead = 1 if points.t[0] > 0 else 0
-    seen = _with_fiducials(points, fiducials, lead)
+    # The points at rest at t = 0, and the fiducials that never move
+    nt, k, f = len(points.t), len(points.names), len(fiducials)
+    u = np.zeros((nt + lead, k + f, 3))
+    u[lead:, :k] = points.u
+    fixed = np.array(list(fiducials.values())).reshape(f, 3)
+    t = np.concatenate([np.zeros(lead), points.t])
+    seen = Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
     if np.abs(seen.u[0]).max() > _AT_REST:
         raise RecordingError(
             f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
@@ -191,14 +193,18 @@ def record_tracked(
         )
     seeds = streams(origin.seed, ("markers", "missing", *readings, "odd"))
     clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}
+    led = {}
+    for name, reading in readings.items():
+        what = f"reading '{name}'"
+        y = checked(reading.y, what, (len(seen.t) - lead,), error=RecordingError)
+        led[name] = np.concatenate([np.zeros(lead), y])
     return Recording(
         origin.name,
         Source(origin.name, "", 0, "made in memory"),
         START_NS,
         markers={"markers": camera.looks(seen, seeds)},
         signals={
-            k: signal(seen.t, _led(r.y, lead, seen.t, k), r.unit, r.sd, "scene", seeds[k])
-            for k, r in readings.items()
+            k: signal(seen.t, led[k], r.unit, r.sd, "scene", seeds[k]) for k, r in readings.items()
         },
         metadata={
             "marker_layout": {k: _text(v) for k, v in zip(seen.names, seen.rest, strict=True)},
@@ -217,21 +223,6 @@ def record_tracked(
             **clock,
         },
     )
-
-
-def _with_fiducials(points: Points, fiducials: Mapping[str, Floats], lead: int) -> Points:
-    """The points at rest at t = 0, and the fiducials that never move."""
-    nt, k, f = len(points.t), len(points.names), len(fiducials)
-    u = np.zeros((nt + lead, k + f, 3))
-    u[lead:, :k] = points.u
-    fixed = np.array(list(fiducials.values())).reshape(f, 3)
-    t = np.concatenate([np.zeros(lead), points.t])
-    return Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
-
-
-def _led(y: Floats, lead: int, t: Floats, name: str) -> Floats:
-    y = checked(y, f"reading '{name}'", (len(t) - lead,), error=RecordingError)
-    return np.concatenate([np.zeros(lead), y])
 
 
 def _text(vector: Floats) -> str:

@@ -99,39 +99,30 @@ def _speckle(
     margin = np.ceil(4 * sd).astype(int)  # speckle does not change at the border
     wide = np.pad(amplitude, [(m, m) for m in margin], mode="edge")
     field = gaussian_filter(_white(wide.shape, rng) * wide, sd, mode="constant")
-    power = np.prod([(_taps(s) ** 2).sum() for s in sd])
+    power = 1.0
+    for s in sd:
+        impulse = np.zeros(2 * int(np.ceil(4 * s)) + 3)
+        impulse[len(impulse) // 2] = 1
+        power *= (gaussian_filter(impulse, s, mode="constant") ** 2).sum()
     inner = field[margin[0] : -margin[0], margin[1] : -margin[1]]
     return np.asarray(inner / np.sqrt(power))
-
-
-def _taps(sd: float) -> Floats:
-    impulse = np.zeros(2 * int(np.ceil(4 * sd)) + 3)
-    impulse[len(impulse) // 2] = 1
-    return np.asarray(gaussian_filter(impulse, sd, mode="constant"))
 
 
 def _amplitude(scanner: Scanner, target: Target, rng: np.random.Generator) -> Floats:
     """Echo amplitude of the tissue with its regions; power is mixed in the pixels of a wall."""
     shape = (scanner.height, scanner.width)
-    texture = target.texture * _slow(shape, target.texture_size / scanner.m_per_px, rng)
+    # A smooth random field of sd 1
+    size = target.texture_size / scanner.m_per_px
+    slow = gaussian_filter(rng.standard_normal(shape), size, mode="reflect")
+    texture = target.texture * np.asarray(slow / slow.std())
     power = 10 ** (texture / 10)
     for outline, level in ((target.second, target.second_level), (target.outline, target.level)):
         if outline is not None:
-            share = coverage(_in_pixels(scanner, outline), shape)
+            if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+                raise SceneError(f"outline {outline.shape}: expected at least 3 points (k, 2) in m")
+            share = coverage(np.asarray(outline / scanner.m_per_px), shape)
             power = power * (1 - share) + 10 ** (level / 10) * share
     return np.asarray(np.sqrt(power))
-
-
-def _slow(shape: tuple[int, int], size: float, rng: np.random.Generator) -> Floats:
-    """A smooth random field of sd 1; `size` px."""
-    field = gaussian_filter(rng.standard_normal(shape), size, mode="reflect")
-    return np.asarray(field / field.std())
-
-
-def _in_pixels(scanner: Scanner, outline: Floats) -> Floats:
-    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-        raise SceneError(f"outline {outline.shape}: expected at least 3 points (k, 2) in m")
-    return np.asarray(outline / scanner.m_per_px)
 
 
 def _losses(scanner: Scanner, target: Target) -> Floats:

@@ -11,9 +11,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
+from validate.fem.laws.energies import ByVolume, outer
 from validate.fem.laws.law import NeoHooke
-from validate.fem.laws.tensors import outer
-from validate.fem.laws.volumetric import ByVolume
 from validate.parameters import quantity
 from validate.scene.laws import Coefficients, LawKind
 

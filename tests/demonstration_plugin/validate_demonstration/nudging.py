@@ -13,7 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats
 from validate.estimate.gating import NoiseSettings
-from validate.estimate.kalman.batch import Batch
+from validate.estimate.kalman.coordinates import Batch
 from validate.estimate.measurements import Measurements, Timetable, timetable
 from validate.fem.system import System
 from validate.parameters import quantity

@@ -8,8 +8,13 @@ import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, checked
-from validate.compare.shapes.boundary import Boundary, deformed_boundary
-from validate.compare.shapes.soundness import Soundness, require_upright, soundness
+from validate.compare.shapes.boundary import (
+    Boundary,
+    Soundness,
+    deformed_boundary,
+    require_upright,
+    soundness,
+)
 from validate.errors import ComparisonError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.assembly.locate import barycentric_rows
@@ -138,7 +143,12 @@ def pair(one: Field, other: Field, onto: Mesh | Scene | Common | None = None) ->
     the nearest point of the nearest cell and is counted. Raises `ComparisonError` for different
     dimensions and when more than half the nodes lie outside.
     """
-    common = _common(onto, other)
+    if isinstance(onto, Common):
+        common = onto
+    elif isinstance(onto, Scene):
+        common = Common(onto.mesh, onto)
+    else:
+        common = Common(other.mesh if onto is None else onto)
     on = common.mesh
     require_upright(on, "the common mesh")
     dimensions = (one.mesh.dimension, other.mesh.dimension, on.dimension)
@@ -151,14 +161,6 @@ def pair(one: Field, other: Field, onto: Mesh | Scene | Common | None = None) ->
     u_other, away_other = _carried(other, on)
     outside = np.concatenate([away_one, away_other])
     return FieldPair(one, other, common, u_one, u_other, outside)
-
-
-def _common(onto: Mesh | Scene | Common | None, other: Field) -> Common:
-    if isinstance(onto, Common):
-        return onto
-    if isinstance(onto, Scene):
-        return Common(onto.mesh, onto)
-    return Common(other.mesh if onto is None else onto)
 
 
 def same_mesh(one: Mesh, other: Mesh) -> bool:

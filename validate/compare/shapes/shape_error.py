@@ -13,12 +13,17 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from validate.arrays import Floats, Ints
-from validate.compare.score import Score
-from validate.compare.shapes.boundary import Boundary, deformed_boundary, enclosed, normals
-from validate.compare.shapes.metric import Counted, Metric
+from validate.arrays import Floats
+from validate.compare.score import Counted, Metric, Score
+from validate.compare.shapes.boundary import (
+    Boundary,
+    crossings,
+    deformed_boundary,
+    enclosed,
+    normals,
+    require_comparable,
+)
 from validate.compare.shapes.pair import FieldPair, same_mesh
-from validate.compare.shapes.soundness import crossings, require_comparable
 from validate.errors import ComparisonError
 from validate.scene.shape_functions import symmetric_points
 
@@ -121,7 +126,11 @@ def distances(points: Floats, boundary: Boundary) -> Floats:
     # The nearest piece holds a point no further than the nearest corner is.
     lists = cKDTree(centres).query_ball_point(points, np.asarray(near) * (1 + 1e-9) + reach)
     found = np.full(len(points), np.inf)
-    for part in _parts([len(pieces) for pieces in lists]):
+    lengths = [len(pieces) for pieces in lists]
+    number = np.cumsum(lengths) // _CHUNK
+    cuts = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(lengths)]
+    parts = [slice(a, b) for a, b in pairwise(cuts)]
+    for part in parts:
         which = np.repeat(np.arange(len(points))[part], [len(pieces) for pieces in lists[part]])
         pieces = np.concatenate([np.asarray(p, dtype=np.int64) for p in lists[part]])
         np.minimum.at(found, which, np.linalg.norm(_to_simplices(points[which], x[pieces]), axis=1))
@@ -149,28 +158,19 @@ def _gauss(boundary: Boundary) -> Floats:
     return np.asarray(places.reshape(-1, boundary.points.shape[1]))
 
 
-def _parts(lengths: list[int]) -> list[slice]:
-    number = np.cumsum(lengths) // _CHUNK
-    cuts = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(lengths)]
-    return [slice(a, b) for a, b in pairwise(cuts)]
-
-
 def _to_simplices(p: Floats, x: Floats) -> Floats:
     """Vector (k, d) from each point to the nearest point of its segment or triangle (k, c, d)."""
     if x.shape[1] == 2:
         return _to_segment(p, x[:, 0], x[:, 1])
     edges = [_to_segment(p, x[:, i], x[:, (i + 1) % 3]) for i in range(3)]
-    best = np.take_along_axis(np.stack(edges), _shortest(edges)[None, :, None], axis=0)[0]
+    shortest = np.asarray(np.argmin([np.linalg.norm(v, axis=1) for v in edges], axis=0))
+    best = np.take_along_axis(np.stack(edges), shortest[None, :, None], axis=0)[0]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     square = (normal**2).sum(axis=1)
     sides = [np.cross(x[:, (i + 1) % 3] - x[:, i], p - x[:, i]) for i in range(3)]
     above = np.all([(s * normal).sum(axis=1) >= 0 for s in sides], axis=0) & (square > 0)
     height = ((x[:, 0] - p) * normal).sum(axis=1) / np.where(square > 0, square, 1.0)
     return np.asarray(np.where(above[:, None], height[:, None] * normal, best))
-
-
-def _shortest(vectors: list[Floats]) -> Ints:
-    return np.asarray(np.argmin([np.linalg.norm(v, axis=1) for v in vectors], axis=0))
 
 
 def _to_segment(p: Floats, a: Floats, b: Floats) -> Floats:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.score import Score
-from validate.compare.shapes.metric import Counted, Metric
+from validate.compare.score import Counted, Metric, Score
 from validate.compare.shapes.pair import Common, Field, FieldPair, count_outside, pair
 from validate.compare.shapes.shape_error import OF_BODIES, SHAPE_METRICS
 from validate.errors import ComparisonError
-from validate.fem.assembly.cells import rule, values_at, volumes_at
+from validate.fem.assembly.assemble import rule, values_at, volumes_at
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
@@ -256,7 +255,10 @@ def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = N
     Without a scene on the common mesh the energy norms are left out, as they have no moduli.
     """
     scores, refused = [], []
-    for metric in _default(between) if metrics is None else metrics:
+    if metrics is None:
+        bodies = between.common.scene is not None
+        metrics = tuple(m for m in METRICS_OF_FIELDS if bodies or m not in ENERGY_METRICS)
+    for metric in metrics:
         try:
             scores.append(metric.score(between))
         except ComparisonError as error:
@@ -284,9 +286,3 @@ def compare_fields(
             f"{name}: {reason}"
         )
     return found.scores
-
-
-def _default(between: FieldPair) -> tuple[Metric[FieldPair], ...]:
-    if between.common.scene is not None:
-        return METRICS_OF_FIELDS
-    return tuple(m for m in METRICS_OF_FIELDS if m not in ENERGY_METRICS)

@@ -19,8 +19,8 @@ from validate.errors import UsageError
 from validate.estimate.ensemble.member_filter import HANDLES, MemberModel, MemberStepper, sight
 from validate.estimate.ensemble.members import Members
 from validate.estimate.gating import NoiseSettings
+from validate.estimate.kalman.formulas import Corrected, Reach, ensemble_update
 from validate.estimate.measurements import Measurements
-from validate.estimate.reduced.sampled_kalman import Corrected, Reach, ensemble_update
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.mesh import Mesh

@@ -15,14 +15,15 @@ from validate.arrays import Floats, Ints
 from validate.errors import UsageError
 from validate.estimate.ensemble.members import (
     Coordinates,
+    Doubts,
     Members,
+    doubts,
     explicit_members,
     implicit_members,
     in_nodes,
 )
-from validate.estimate.ensemble.parameters import Doubts, doubts
 from validate.estimate.extended import kernels as kernel
-from validate.estimate.extended.explicit_step import FAR, MARGIN, explicit_step
+from validate.estimate.extended.explicit_filter import FAR, MARGIN, explicit_step
 from validate.estimate.gating import (
     Care,
     care_of,
@@ -32,16 +33,15 @@ from validate.estimate.gating import (
     gate_units,
     gated_out,
 )
-from validate.estimate.kalman.batch import OneAtATime
-from validate.estimate.kalman.formulas import Innovation, innovation_units, nothing
+from validate.estimate.kalman.coordinates import OneAtATime
+from validate.estimate.kalman.formulas import Corrected, Innovation, innovation_units, nothing
 from validate.estimate.measurements import Measurements, Timetable, timetable
-from validate.estimate.reduced.sampled_kalman import Corrected
 from validate.fem.critical import critical_step
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
+from validate.solve.dynamic.linear import StartName
 from validate.solve.dynamic.newmark_rule import rule_of
-from validate.solve.excitation import StartName
 from validate.solve.handles import LARGE, Handles
 from validate.solve.types import Ending, State
 

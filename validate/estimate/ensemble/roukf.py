@@ -15,9 +15,8 @@ from scipy.linalg import helmert, solve, solve_triangular
 from validate.arrays import Floats
 from validate.estimate.ensemble.member_filter import HANDLES, MemberModel, MemberStepper, sight
 from validate.estimate.gating import NoiseSettings
-from validate.estimate.kalman.formulas import best_gain, innovation
+from validate.estimate.kalman.formulas import Corrected, best_gain, innovation
 from validate.estimate.measurements import Measurements
-from validate.estimate.reduced.sampled_kalman import Corrected
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.handles import Handles, require_handled

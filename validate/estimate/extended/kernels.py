@@ -8,10 +8,8 @@ Paper 003, eqs 35-39. P is packed by row, one column a component or node:
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.fem.kernels import central_difference as central_kernel
 from validate.fem.kernels import explicit as explicit_kernels
-from validate.fem.kernels.central_difference import pull
-from validate.fem.kernels.explicit import add_forces_and_blocks
+from validate.fem.kernels.explicit import add_forces_and_blocks, pull
 from validate.fem.kernels.jit_cache import compiled
 from validate.fem.large_strain.explicit import PackedBody
 
@@ -19,9 +17,7 @@ _UNSIGNED = np.int64(0x7FFFFFFFFFFFFFFF)  # all bits of a double but its sign
 HUGE = 1e300  # m^2: beyond it the next products would leave the number range
 
 ROW = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # packed row of (i, j) of a symmetric 3 x 3
-_compiled = compiled(
-    *explicit_kernels.MODULES, explicit_kernels, central_kernel, error_model="numpy"
-)
+_compiled = compiled(*explicit_kernels.MODULES, explicit_kernels, error_model="numpy")
 
 
 @_compiled

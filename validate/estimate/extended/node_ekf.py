@@ -17,8 +17,12 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.extended import kernels as kernel
-from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.extended.explicit_filter import (
+    ExplicitFilterStepper,
+    ExplicitStep,
+    beyond,
+    explicit_step,
+)
 from validate.estimate.gating import (
     Care,
     NoiseSettings,
@@ -153,19 +157,18 @@ class NodeCore:
         if self.care is None:
             return self._corrected(memory, z, self.R)
         shown, late = memory.u[self.rows], self.care.late((memory.u - memory.before)[self.rows])
-        S_yy = self._predicted(memory.P) + noise(self.R, late)
+        # H P H^T (m, m) m^2: only components of one node are correlated, if blocks are nodes.
+        if self.settings.block == "node":
+            node, axis = np.divmod(self.rows, 3)
+            P = memory.P[kernel.ROW[axis[:, None], axis], node[:, None]]
+            predicted = np.where(node[:, None] == node, P, 0.0)
+        else:
+            predicted = np.diag(memory.P[0, self.rows])
+        S_yy = predicted + noise(self.R, late)
         passed, gated = self.care.passed(z, shown, S_yy)
         R = self.R if late is None else self.R + late**2
         memory, found = self._corrected(memory, passed, R)
         return memory, gated_out(found, z, shown, gated)
-
-    def _predicted(self, P: Floats) -> Floats:
-        """H P H^T (m, m) m^2: only components of one node are correlated, if blocks are nodes."""
-        if self.settings.block != "node":
-            return np.diag(P[0, self.rows])
-        node, axis = np.divmod(self.rows, 3)
-        same = node[:, None] == node
-        return np.where(same, P[kernel.ROW[axis[:, None], axis], node[:, None]], 0.0)
 
     def _corrected(self, memory: NodeMemory, z: Floats, R: Floats) -> tuple[NodeMemory, Innovation]:
         c, before, y, sd = self.settings, memory.before, np.empty(len(z)), np.empty(len(z))

@@ -1,4 +1,4 @@
 """filterpy's filters with this package's checks, and a comparison with its own filters.
 
-Only `names` imports filterpy.
+Only `classes` imports filterpy.
 """

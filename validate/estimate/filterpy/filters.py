@@ -14,7 +14,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
-from validate.estimate.filterpy.linear_model import LinearModel, require_symmetric
 from validate.estimate.gating import (
     Care,
     NoiseSettings,
@@ -25,7 +24,13 @@ from validate.estimate.gating import (
 )
 from validate.estimate.kalman.formulas import Innovation, best_gain, innovation, nothing
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.linear_system import LoadDoubt, ReducedModel, reduced_model
+from validate.estimate.reduced.linear_system import (
+    LinearModel,
+    LoadDoubt,
+    ReducedModel,
+    reduced_model,
+    require_symmetric,
+)
 from validate.estimate.reduced.reduced_kf import dense_covariance
 from validate.estimate.reduced.small_state import CoreStepper
 from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
@@ -49,7 +54,7 @@ def seeded(seed: int) -> Iterator[None]:
 
 def kalman(model: LinearModel) -> Any:
     """filterpy's `KalmanFilter` of a model."""
-    from validate.estimate.filterpy.names import KalmanFilter  # filterpy takes 0.6 s
+    from validate.estimate.filterpy.classes import KalmanFilter  # filterpy takes 0.6 s
 
     kf = KalmanFilter(model.size, len(model.H), model.B.shape[1])
     kf.F, kf.B, kf.H = model.F.copy(), model.B.copy(), model.H.copy()
@@ -61,7 +66,7 @@ def unscented(model: LinearModel) -> Any:
 
     Its f takes the loads as keyword `u` of `predict`.
     """
-    from validate.estimate.filterpy.names import MerweScaledSigmaPoints, UnscentedKalmanFilter
+    from validate.estimate.filterpy.classes import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
     points = MerweScaledSigmaPoints(model.size, 1.0, 2.0, 0.0, sqrt_method=_root)
 
@@ -76,7 +81,7 @@ def unscented(model: LinearModel) -> Any:
 
 def ensemble(model: LinearModel) -> Any:
     """filterpy's `EnsembleKalmanFilter` with 50 members, whose `predict` takes the loads."""
-    from validate.estimate.filterpy.ensemble import Ensemble
+    from validate.estimate.filterpy.classes import Ensemble
 
     enkf = Ensemble(model)
     enkf.Q, enkf.R = model.Q.copy(), model.R.copy()
@@ -134,8 +139,16 @@ class FilterpyFilter:
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         reduced = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
+        make = self.make
+        if isinstance(make, str):
+            if make not in FILTERPY_FILTERS:
+                raise ComparisonError(
+                    f"no external filter '{make}'; expected one of {', '.join(FILTERPY_FILTERS)}, "
+                    "or a function"
+                )
+            make = FILTERPY_FILTERS[make]
         with seeded(self.seed):
-            first = _made(self.make)(reduced.model)
+            first = make(reduced.model)
         require_shapes(first, reduced.model)
         if self.smooth:
             require_exact_covariances(first)
@@ -143,17 +156,6 @@ class FilterpyFilter:
         core = FilterpyCore(reduced, first, self.seed, care)
         table = timetable(measurements, self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
-
-
-def _made(make: Make | str) -> Make:
-    if not isinstance(make, str):
-        return make
-    if make not in FILTERPY_FILTERS:
-        raise ComparisonError(
-            f"no external filter '{make}'; expected one of {', '.join(FILTERPY_FILTERS)}, "
-            "or a function"
-        )
-    return FILTERPY_FILTERS[make]
 
 
 def require_shapes(filter_: Any, model: LinearModel) -> None:
@@ -183,7 +185,7 @@ def require_exact_covariances(filter_: Any) -> None:
     """Raise `UsageError` unless P and gain of the filter are those of the linear model.
 
     filterpy's unscented filter computes its gain from points without the step's noise."""
-    from validate.estimate.filterpy.names import KalmanFilter
+    from validate.estimate.filterpy.classes import KalmanFilter
 
     if not isinstance(filter_, KalmanFilter) or filter_.alpha != 1.0:
         raise UsageError(

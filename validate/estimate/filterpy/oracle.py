@@ -6,30 +6,28 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.filterpy.filters import kalman
-from validate.estimate.filterpy.linear_model import LinearModel
-from validate.estimate.filterpy.names import (
+from validate.estimate.filterpy.classes import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     MerweScaledSigmaPoints,
     UnscentedKalmanFilter,
     drawing,
 )
+from validate.estimate.filterpy.filters import kalman
 from validate.estimate.kalman.formulas import (
     Gaussian,
+    SigmaPoints,
     ekf_predict,
     ekf_update,
-    kf_predict,
-    kf_update,
-)
-from validate.estimate.reduced.sampled_kalman import (
-    SigmaPoints,
     enkf_predict,
     enkf_update,
     ensemble_gaussian,
+    kf_predict,
+    kf_update,
     ukf_predict,
     ukf_update,
 )
+from validate.estimate.reduced.linear_system import LinearModel
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Coordinates of a displacement filter's state: nodal displacements or modal amplitudes."""
+"""Coordinates of a displacement filter's state, and batch filtering in them.
+
+Batch filtering of many recordings of one experiment with common gains.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,11 +9,14 @@ from typing import Protocol
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
+from validate.estimate.kalman.covariance import Decoupled, Dense
+from validate.estimate.kalman.formulas import Gain, log_likelihood
+from validate.estimate.kalman.gains import GainSequence
 from validate.fem.modes import modes_of
 from validate.fem.system import System, once
+from validate.solve.dynamic.linear import Excitation
 from validate.solve.dynamic.newmark_rule import Propagation, Rule, per_mode
-from validate.solve.excitation import Excitation
 
 
 class Coordinates(Protocol):
@@ -124,3 +130,103 @@ def excitation_in(coordinates: Coordinates, nodal: Excitation) -> Excitation:
         mass=of(nodal.mass),
         starts=None if nodal.starts is None else coordinates.amplitudes(nodal.starts),
     )
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Estimates `values` (seeds, nt, p) m, innovations y (seeds, nt, m) m, `nis` (seeds, nt) with
+    degrees of freedom `dof` (nt,) and `log_likelihood` (seeds, nt).
+
+    `frozen` is the step from which the gains repeat; None where they never do.
+    """
+
+    values: Floats
+    y: Floats
+    nis: Floats
+    dof: Floats
+    log_likelihood: Floats
+    frozen: int | None
+
+
+class OneAtATime:
+    """A filter whose gains depend on what is measured: recordings are filtered one by one."""
+
+    def batch(self, inputs: Floats, z: Floats, rows: Floats) -> Batch | None:
+        """None."""
+        return None
+
+
+def batch_of(
+    gains: GainSequence, values: Floats, y: Floats, stacked: "StackedGains", dof: Floats
+) -> Batch:
+    """Return the statistics of innovations y (seeds, nt, m) m that these gains left."""
+    nis, log_det = stacked.statistics(y)
+    density = np.asarray(log_likelihood(nis, dof, log_det))
+    return Batch(values, y, nis, dof, density, gains.frozen)
+
+
+@dataclass(frozen=True)
+class StackedGains:
+    """Gain number `which` (nt,) of every step, -1 for none; all gains `G` (k, m, n), zero for what
+    they do not see, and `S_yy` (k, m, m) m^2, the unit matrix there."""
+
+    which: Ints
+    G: Floats
+    S_yy: Floats
+
+    def statistics(self, y: Floats) -> tuple[Floats, Floats]:
+        """NIS (seeds, nt) of innovations y (seeds, nt, m) m and ln det S_yy (nt,), zero where
+        nothing was measured."""
+        nis, log_det, seen = np.zeros(y.shape[:2]), np.zeros(y.shape[1]), self.which >= 0
+        if seen.any():
+            S = self.S_yy[self.which[seen]]
+            scaled = np.linalg.solve(S, np.moveaxis(y[:, seen], 0, 2))
+            nis[:, seen] = np.einsum("stm,tms->st", y[:, seen], scaled)
+            log_det[seen] = np.linalg.slogdet(self.S_yy)[1][self.which[seen]]
+        return nis, log_det
+
+
+def stacked_gains(gains: GainSequence, nt: int, m: int, n: int) -> StackedGains:
+    """Return the gains of nt steps in arrays: m components measured, n numbers in the state."""
+    places: dict[int, int] = {}
+    which = np.full(nt, -1)
+    distinct: list[Gain] = []
+    for step, gain in gains.gains.items():
+        if step <= nt:
+            which[step - 1] = places.setdefault(id(gain), len(distinct))
+            if which[step - 1] == len(distinct):
+                distinct.append(gain)
+    stack, S_yy = np.zeros((len(distinct), n, m)), np.zeros((len(distinct), m, m))
+    for G, S, gain in zip(stack, S_yy, distinct, strict=True):
+        if all(gain.seen):
+            G[:], S[:] = gain.G, gain.S_yy
+        else:
+            seen = np.array(gain.seen)
+            G[:, seen], S[:] = gain.G, np.where(np.outer(seen, seen), gain.S_yy, np.eye(m))
+    return StackedGains(which, np.ascontiguousarray(stack.swapaxes(1, 2)), S_yy)
+
+
+def in_amplitudes(nodal: Dense, modes: InModes) -> Decoupled:
+    """Return the recursion of nodal displacements in amplitudes of all modes: its transition is
+    diagonal."""
+    Q = _white(nodal.Q, modes)
+    if Q is None:
+        Q = modes.amplitudes(modes.amplitudes(nodal.Q).T)
+    P0 = _scaled(nodal.P0, nodal.Q, Q)
+    if P0 is None:
+        P0 = modes.amplitudes(modes.amplitudes(nodal.P0).T)
+    H = np.ascontiguousarray(nodal.H @ modes.shapes)
+    return Decoupled(modes.factors[0], Q, H, nodal.R, P0)
+
+
+def _scaled(one: Floats, other: Floats, turned: Floats) -> Floats | None:
+    """`one` turned, where it is a multiple of `other`; saves two products of full matrices."""
+    largest = float(np.abs(other).max())
+    factor = float(np.abs(one).max()) / largest if largest else 0.0
+    return factor * turned if np.array_equal(one, factor * other) else None
+
+
+def _white(Q: Floats, modes: InModes) -> Floats | None:
+    """`Q` turned, where every unknown has the same variance and shares none with another."""
+    q = float(Q[0, 0])
+    return q * modes.white if np.array_equal(Q, q * np.eye(len(Q))) else None

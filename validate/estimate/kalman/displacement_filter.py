@@ -14,15 +14,18 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.gating import Care, gate_numbers, gate_units
-from validate.estimate.kalman.batch import Batch, batch_of, in_amplitudes, stacked_gains
 from validate.estimate.kalman.coordinates import (
+    Batch,
     Coordinates,
     InModes,
     Nodal,
+    batch_of,
     excitation_in,
+    in_amplitudes,
     in_modes,
+    stacked_gains,
 )
-from validate.estimate.kalman.covariance import Claim, Covariance, Dense
+from validate.estimate.kalman.covariance import Claim, Covariance, Dense, walked
 from validate.estimate.kalman.formulas import (
     Gain,
     Innovation,
@@ -31,14 +34,11 @@ from validate.estimate.kalman.formulas import (
     innovation_units,
     nothing,
 )
-from validate.estimate.kalman.gains import Claims, GainSequence
-from validate.estimate.kalman.modal_kernel import walked
-from validate.estimate.kalman.observation_covariance import shared_gains
+from validate.estimate.kalman.gains import Claims, GainSequence, shared_gains
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System
-from validate.solve.dynamic.linear import InertialStepper
-from validate.solve.excitation import Excitation, Inputs
+from validate.solve.dynamic.linear import Excitation, InertialStepper, Inputs
 from validate.solve.types import State
 
 Recursion = Literal["prior", "posterior"]
@@ -148,7 +148,11 @@ class DisplacementStepper(InertialStepper):
         x, claim, gain, seen = corrected(prior, k, last, moved)
         towards = prior if self.recursion == "prior" else x
         v, a = of.rates(towards, last.x, last.v, a)
-        inner = Estimate(x, v, a, moved, claim, self._look(k, gain, seen))
+        look = None
+        if self.smooth and gain is not None:
+            turned = self.gains.before if self.gains else None
+            look = look_of(turned.gains[k] if turned else gain, seen)
+        inner = Estimate(x, v, a, moved, claim, look)
         if not np.isfinite(a.sum() + x.sum()):
             return State(k, inner, ("diverged", f"the estimate is not finite at step {k}"))
         numbers = {**seen.numbers(self.sensor.names), **gate_numbers(self.care, seen)}
@@ -217,17 +221,17 @@ class DisplacementStepper(InertialStepper):
         of = self.coordinates
         return self.forces(of.free(e.x), of.free(e.v), of.free(e.a), e.inputs)
 
-    def _gain(self, step: int, claim: Claim | None) -> tuple[Gain | None, Claim | None]:
-        if self.gains is not None:
-            return self.gains.at(step), None
-        assert claim is not None
-        prior, seen = self.covariance.predict(claim), self.when.get(step)
-        return (None, prior) if seen is None else self.covariance.update(prior, seen)
-
     def _corrected(
         self, prior: Floats, step: int, last: Estimate, inputs: Inputs
     ) -> tuple[Floats, Claim | None, Gain | None, Innovation]:
-        gain, claim = self._gain(step, last.claim)
+        claim: Claim | None = None
+        if self.gains is not None:
+            gain = self.gains.at(step)
+        else:
+            assert last.claim is not None
+            gain, claim = None, self.covariance.predict(last.claim)
+            if (seen := self.when.get(step)) is not None:
+                gain, claim = self.covariance.update(claim, seen)
         z = self.sensor.table.at(step)
         if z is None or gain is None:
             return prior, claim, None, nothing(len(self.sensor.names))
@@ -274,12 +278,6 @@ class DisplacementStepper(InertialStepper):
         return self._claims.at(state.k) if claim is None else claim
 
     # --- smoothing --------------------------------------------------------------------------------
-
-    def _look(self, step: int, gain: Gain | None, found: Innovation) -> Look | None:
-        if not self.smooth or gain is None:
-            return None
-        turned = self.gains.before if self.gains else None
-        return look_of(turned.gains[step] if turned else gain, found)
 
     def note(self, state: State, framed: bool) -> Note:
         return Note(state.inner.look, framed)

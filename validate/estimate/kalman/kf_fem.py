@@ -33,16 +33,14 @@ from validate.estimate.kalman.displacement_filter import (
     Structure,
     load_shapes,
 )
-from validate.estimate.kalman.gains import GainSequence, schedule
-from validate.estimate.kalman.observation_covariance import shared_gains
+from validate.estimate.kalman.gains import GainSequence, schedule, shared_gains
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.smoother import smooth_setting
 from validate.fem.system import System, once
 from validate.memory import require_memory
 from validate.parameters import quantity
-from validate.solve.dynamic.linear import reactions
+from validate.solve.dynamic.linear import StartName, excitation, reactions
 from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
-from validate.solve.excitation import StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 
 _DENSE = 8  # matrices of all unknowns that the printed recursion holds at once
@@ -112,7 +110,13 @@ class KfFem(DisplacementNoise):
         if self.gains == "every_step":
             covariance = self._dense(system, measurements, nodal)
             return stepper_of(self, system, measurements, nodal, covariance, nodal, None)
-        claimed, covariance = self._shared(system, measurements, nodal)
+        claimed: Coordinates = nodal
+        try:
+            claimed = modes = in_modes(system, nodal.propagation.rule)
+        except SceneError:  # damping couples the modes
+            covariance = self._dense(system, measurements, nodal)
+        else:
+            covariance = modal_covariance(self, system, measurements, modes)
         if self.care(measurements):
             return stepper_of(self, system, measurements, nodal, covariance, claimed, None)
         gains = shared_gains(system, covariance, timetable(measurements, self.dt), self.settled)
@@ -126,15 +130,6 @@ class KfFem(DisplacementNoise):
         noise = noise_shape(self, system, nodal, H)
         A = nodal.propagation.transition()
         return Dense(A, self.Q * noise, H, R, self.P0 * noise)
-
-    def _shared(
-        self, system: System, measurements: Measurements, nodal: Nodal
-    ) -> tuple[Coordinates, Covariance]:
-        try:
-            modes = in_modes(system, nodal.propagation.rule)
-        except SceneError:  # damping couples the modes
-            return nodal, self._dense(system, measurements, nodal)
-        return modes, modal_covariance(self, system, measurements, modes)
 
 
 def modal_covariance(

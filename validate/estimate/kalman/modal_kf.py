@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from validate.estimate.kalman.coordinates import InModes, in_modes
 from validate.estimate.kalman.displacement_filter import DisplacementStepper
+from validate.estimate.kalman.gains import shared_gains
 from validate.estimate.kalman.kf_fem import DisplacementNoise, Gains, modal_covariance, stepper_of
-from validate.estimate.kalman.observation_covariance import shared_gains
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity

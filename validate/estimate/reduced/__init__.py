@@ -1,4 +1,4 @@
-"""Filters on reduced models: modes with a load bias, one amplitude, samples of a small state.
+"""Filters on reduced models: modes with a load bias, one amplitude, shapes at large strain.
 
 Start with `reduced_kf`.
 """

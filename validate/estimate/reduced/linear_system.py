@@ -1,4 +1,4 @@
-"""Linear system in few modes with unknown load, as a small state-space model.
+"""Linear state-space model of few modes with unknown load.
 
 x = (q, q', r, b): amplitudes and rates of the lowest modes, the rest r and a bias b in N of every
 load, which walks at random. Every mode is exact for loads held at their end value over a step. What
@@ -6,19 +6,58 @@ a load does statically to the modes left out follows with its own time constant,
 at once without damping, but with stiffness damping the stiffest modes creep as slowly as the rest.
 Unlike paper 001's filter the rate is estimated too, and what the filter doubts is the load, so that
 a correction moves every node as the load would.
+
+Linear model of a filterpy filter, in the notation of filterpy.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
-from validate.errors import SceneError
-from validate.estimate.filterpy.linear_model import LinearModel
+from validate.arrays import Floats, checked
+from validate.errors import ComparisonError, SceneError
 from validate.estimate.measurements import Measurements
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.solve.dynamic.modal import exact_walk, left_out
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x' = F x + B f + w, z = H x + r with covariances Q of w and R of r; first x0, P0.
+
+    F, Q, P0 (n, n), B (n, l), H (m, n), R (m, m), x0 (n,); f (l,) are the inputs of the step's
+    end in N. Letters are filterpy's: F is the transition here. Raises `ComparisonError` for shapes
+    that do not fit each other, and for covariances that are not symmetric.
+    """
+
+    F: Floats
+    B: Floats
+    H: Floats
+    Q: Floats
+    R: Floats
+    x0: Floats
+    P0: Floats
+
+    def __post_init__(self) -> None:
+        n, m = len(self.F), len(self.H)
+        shapes = {"F": (n, n), "B": (n, None), "H": (m, n), "Q": (n, n), "R": (m, m)}
+        for name, shape in (shapes | {"x0": (n,), "P0": (n, n)}).items():
+            value = checked(getattr(self, name), f"model {name}", shape, error=ComparisonError)
+            object.__setattr__(self, name, value)
+        for name in ("Q", "R", "P0"):
+            require_symmetric(getattr(self, name), f"model {name}")
+
+    @property
+    def size(self) -> int:
+        return len(self.F)
+
+
+def require_symmetric(P: Floats, name: str) -> None:
+    """Raise `ComparisonError` when P differs from its transpose by more than rounding."""
+    off, scale = float(np.abs(P - P.T).max()), float(np.abs(P).max())
+    if off > 1e-9 * scale:
+        raise ComparisonError(f"{name}: differs from its transpose by {off:.1e} of {scale:.1e}")
 
 
 @dataclass(frozen=True)
@@ -60,7 +99,12 @@ def reduced_model(
     """
     lowest = modes_of(system, min(modes, len(system.free)))
     rest = left_out(system, lowest, np.ascontiguousarray(system.loads[system.free]))
-    F, B = _transition(system, lowest, _kept(system, rest, dt), dt)
+    # Share (l,) of the rests that stays over a step: exp(-dt k / c), 0 without damping
+    K, C = (X[system.free][:, system.free] for X in (system.K, system.C))
+    k, c = (np.einsum("ij,ij->j", rest, X @ rest) for X in (K, C))
+    creeps = (c > 0) & (k > 0)
+    kept = np.where(creeps, np.exp(-dt * k / np.where(creeps, c, 1.0)), 0.0)
+    F, B = _transition(system, lowest, kept, dt)
     l = rest.shape[1]
     lift = np.hstack([lowest.shapes, np.zeros_like(lowest.shapes), rest, np.zeros_like(rest)])
     H, n = measurements.free(system.free) @ lift, lift.shape[1]
@@ -85,11 +129,3 @@ def _transition(system: System, modes: Modes, kept: Floats, dt: float) -> tuple[
     F[:, -l:] = B  # a bias is a load
     F[-l:, -l:] = np.eye(l)
     return F, B
-
-
-def _kept(system: System, rest: Floats, dt: float) -> Floats:
-    """Share (l,) of the rests that stays over a step: exp(-dt k / c), 0 without damping."""
-    K, C = (X[system.free][:, system.free] for X in (system.K, system.C))
-    k, c = (np.einsum("ij,ij->j", rest, X @ rest) for X in (K, C))
-    creeps = (c > 0) & (k > 0)
-    return np.where(creeps, np.exp(-dt * k / np.where(creeps, c, 1.0)), 0.0)

@@ -20,7 +20,6 @@ from validate.estimate.kalman.displacement_filter import load_shapes
 from validate.estimate.kalman.formulas import (
     Gaussian,
     Innovation,
-    Update,
     kf_predict,
     kf_update,
     nothing,
@@ -60,24 +59,28 @@ class LoadScale:
         H = measurements.free(system.free)
         shape = load_shapes(system, H)[:, 0]
         care = care_of(measurements, self.gate, self.clock, self.dt)
-        core = _core(self, system, shape, H @ shape, measurements.variances(self.R), care)
+        free = system.free
+        m, c, k = (
+            float(shape @ (X[free][:, free] @ shape)) for X in (system.M, system.C, system.K)
+        )
+        ratio = c / (2 * np.sqrt(m * k))
+        if ratio < OVERDAMPED:
+            raise SceneError(
+                f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
+                f"without inertia needs {OVERDAMPED:g}; use ReducedKf"
+            )
+        per_newton = float(shape @ system.loads[free, 0]) / k
+        core = ScaleCore(
+            self,
+            shape,
+            H @ shape,
+            measurements.variances(self.R),
+            float(np.exp(-self.dt * k / c)),
+            per_newton,
+            care,
+        )
         table = timetable(measurements, self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
-
-
-def _core(
-    settings: LoadScale, system: System, s: Floats, seen: Floats, R: Floats, care: Care | None
-) -> "ScaleCore":
-    free = system.free
-    m, c, k = (float(s @ (X[free][:, free] @ s)) for X in (system.M, system.C, system.K))
-    ratio = c / (2 * np.sqrt(m * k))
-    if ratio < OVERDAMPED:
-        raise SceneError(
-            f"the load's shape has damping ratio {ratio:.2g}, so it oscillates: a filter "
-            f"without inertia needs {OVERDAMPED:g}; use ReducedKf"
-        )
-    per_newton = float(s @ system.loads[free, 0]) / k
-    return ScaleCore(settings, s, seen, R, float(np.exp(-settings.dt * k / c)), per_newton, care)
 
 
 @dataclass(frozen=True)
@@ -126,17 +129,16 @@ class ScaleCore:
         prior = kf_predict(inner.x, A, self.Q)
         if z is None:
             return Scaled(prior, A), nothing(len(self.seen))
-        update, seen = self._updated(prior, z, inner.x.x[0])
+        R, update = np.diag(self.R), None
+        if self.care is not None:
+            moved = self.seen * (prior.x[0] - inner.x.x[0])
+            update, seen = self.care.linear_update(prior, z, self.H, R, moved)
+        else:
+            update = kf_update(prior, z, self.H, R)
+            seen = update.innovation
         if update is None:
             return Scaled(prior, A), seen
         return Scaled(update.posterior, A, look_of(update.gain, seen)), seen
-
-    def _updated(self, prior: Gaussian, z: Floats, was: float) -> tuple[Update | None, Innovation]:
-        R = np.diag(self.R)
-        if self.care is not None:
-            return self.care.linear_update(prior, z, self.H, R, self.seen * (prior.x[0] - was))
-        update = kf_update(prior, z, self.H, R)
-        return update, update.innovation
 
     def free(self, inner: Scaled) -> Floats:
         return np.asarray(self.shape * inner.x.x[0])

@@ -23,8 +23,12 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from validate.arrays import Floats, Ints
 from validate.errors import UsageError
-from validate.estimate.extended.explicit_filter import ExplicitFilterStepper
-from validate.estimate.extended.explicit_step import ExplicitStep, beyond, explicit_step
+from validate.estimate.extended.explicit_filter import (
+    ExplicitFilterStepper,
+    ExplicitStep,
+    beyond,
+    explicit_step,
+)
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Recursion
 from validate.estimate.kalman.formulas import Gain, Innovation, innovation
@@ -172,7 +176,18 @@ class ReducedEKF:
         explicit = explicit_step(system, self.dt, self.substeps)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
         times = timetable(measurements, explicit.h)
-        basis = modes(system, 1) if refusal else self._basis(explicit)
+        if refusal:
+            basis = modes(system, 1)
+        elif self.basis == "pod":
+            basis = pod(explicit, self.shapes, self.snapshot_load)
+        else:
+            basis = modes(system, self.shapes)
+        top = float(np.sqrt(basis.squares.max()))
+        if not refusal and explicit.h * top >= 2:
+            raise UsageError(
+                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {explicit.h:g} s are "
+                f"stable for those below {2 / explicit.h:.4g}; take fewer shapes or smaller steps"
+            )
         model = shapes_covariance(self, explicit, basis, measurements)
         when = {} if refusal else schedule(times)
         recursion = steady(model, when) if self.gains == "steady" and when else model
@@ -184,19 +199,6 @@ class ReducedEKF:
         return ExplicitFilterStepper(
             explicit, core, measurements, times, refusal, care, self.smooth
         )
-
-    def _basis(self, steps: ExplicitStep) -> Basis:
-        if self.basis == "pod":
-            basis = pod(steps, self.shapes, self.snapshot_load)
-        else:
-            basis = modes(steps.system, self.shapes)
-        top = float(np.sqrt(basis.squares.max()))
-        if steps.h * top >= 2:
-            raise UsageError(
-                f"{self.shapes} shapes of up to {top:.4g} 1/s: steps of {steps.h:g} s are "
-                f"stable for those below {2 / steps.h:.4g}; take fewer shapes or smaller steps"
-            )
-        return basis
 
 
 def shapes_covariance(
@@ -286,21 +288,16 @@ class ShapesCore:
     ) -> tuple[ShapesMemory, Innovation]:
         shown = self.rows @ memory.u[self.sensed]
         if self.care is not None:
-            return self._heeded(self.care, memory, number, z, shown)
+            assert memory.claim is not None
+            moved = shown - self.rows @ memory.before[self.sensed]
+            claim = self.recursion.predict(memory.claim, number - memory.at)
+            gain, claim, found, _ = self.care.update(self.recursion, claim, z, shown, moved)
+            if gain is None:
+                return replace(memory, taken=None), found
+            return self._moved(memory, gain, found, number, claim), found
         gain = self.updates[number].gain
         found = innovation(z, shown, gain)
         return self._moved(memory, gain, found, number, None), found
-
-    def _heeded(
-        self, care: Care, memory: ShapesMemory, number: int, z: Floats, shown: Floats
-    ) -> tuple[ShapesMemory, Innovation]:
-        assert memory.claim is not None
-        moved = shown - self.rows @ memory.before[self.sensed]
-        claim = self.recursion.predict(memory.claim, number - memory.at)
-        gain, claim, found, _ = care.update(self.recursion, claim, z, shown, moved)
-        if gain is None:
-            return replace(memory, taken=None), found
-        return self._moved(memory, gain, found, number, claim), found
 
     def _moved(
         self, memory: ShapesMemory, gain: Gain, found: Innovation, number: int, claim: Claim | None

@@ -13,7 +13,6 @@ from scipy.linalg import LinAlgError, solve_discrete_are
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.estimate.filterpy.linear_model import LinearModel
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Recursion, Steady, claimed
 from validate.estimate.kalman.formulas import (
@@ -26,7 +25,12 @@ from validate.estimate.kalman.formulas import (
 )
 from validate.estimate.kalman.gains import Claims, gain_sequence, schedule
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.linear_system import LoadDoubt, ReducedModel, reduced_model
+from validate.estimate.reduced.linear_system import (
+    LinearModel,
+    LoadDoubt,
+    ReducedModel,
+    reduced_model,
+)
 from validate.estimate.reduced.small_state import CoreStepper
 from validate.estimate.smoother import (
     Look,
@@ -98,7 +102,12 @@ def steady(covariance: Dense, when: Mapping[int, Seen]) -> Steady:
     every = int(np.median(np.diff([0, *when]))) if when else 1
     F, Q = covariance.over(every)
     Q = (Q + Q.T) / 2
-    size, sd = _sizes(F, Q, covariance.P0), np.sqrt(covariance.R)
+    # Sizes (n,) of the states after some steps: within them Riccati's entries are comparable
+    P = covariance.P0
+    for _ in range(_SIZING):
+        P = propagated(P, F, Q)
+    sd = np.sqrt(np.maximum(np.diag(P), 0.0))
+    size, sd = np.where(sd > 0, sd, 1.0), np.sqrt(covariance.R)
     A, H = size[:, None] * F.T / size, size[:, None] * covariance.H.T / sd
     try:
         P = _riccati(A, H, Q / np.outer(size, size))
@@ -141,14 +150,6 @@ def _doubled(A: Floats, G: Floats, X: Floats) -> Floats:
         if np.abs(more).max() <= _DOUBLED * np.abs(X).max():
             return X
     raise ValueError(f"the doubling algorithm does not converge within {_DOUBLINGS} iterations")
-
-
-def _sizes(F: Floats, Q: Floats, P: Floats) -> Floats:
-    """Sizes (n,) of the states after some steps: within them Riccati's entries are comparable."""
-    for _ in range(_SIZING):
-        P = propagated(P, F, Q)
-    sd = np.sqrt(np.maximum(np.diag(P), 0.0))
-    return np.where(sd > 0, sd, 1.0)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.estimate.gating import Care, gate_numbers, gate_units
-from validate.estimate.kalman.batch import OneAtATime
+from validate.estimate.kalman.coordinates import OneAtATime
 from validate.estimate.kalman.formulas import Innovation, innovation_units
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Note, Transition, smoothed

@@ -1,7 +1,18 @@
-"""Stiffness, mass and damping matrices (paper 000, eqs 1-5; paper 001, eq 7).
+"""Stiffness, mass and damping matrices, and integrals over cells.
 
 The stiffness is pointwise, mixed or with nodal mean dilatation; materials may differ from cell to
 cell.
+
+Integrals over the cells of a mesh of any kind, deformed or at rest.
+
+Mean dilatation of mixed cells: projection of volume change on constants or linear fields. Three
+fields u, p, theta with p and theta of their own in every cell and eliminated there (Simo, Taylor &
+Pister 1985): theta is the projection of the law's measure of volume change, and the energy is W(F)
+of the isochoric part plus U(theta). Constants on hex8 (mean dilatation, Nagtegaal, Parks & Rice
+1974), tet10 and tri6; linear fields of the place on hex27 (Boffi, Brezzi & Fortin 2013, 8.6), which
+keep its order up to nu -> 1/2; on tet10 constants leave order 2 there.
+
+Foundations (partial friction) and membranes add a stiffness on facets.
 """
 
 from dataclasses import dataclass, replace
@@ -30,13 +41,136 @@ from skfem.models.elasticity import lame_parameters
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.cells import rule, values_at, volumes_at
-from validate.fem.assembly.mean_dilatation import projections
-from validate.fem.assembly.surface import surface_stiffness
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
-from validate.scene.scene import Scene
-from validate.scene.shape_functions import simplex_slopes, symmetric_points
+from validate.scene.places import facets_of
+from validate.scene.scene import Foundation, Membrane, Scene
+from validate.scene.shape_functions import (
+    CORNERS,
+    EDGES,
+    LATTICE,
+    Quadrature,
+    barycentric,
+    brick_rule,
+    collapsed_points,
+    facet_rule,
+    gauss_points,
+    simplex_rule,
+    simplex_slopes,
+    symmetric_points,
+)
+
+
+def surface_stiffness(scene: Scene) -> tuple[sparse.csr_array, ...]:
+    """What the scene's foundations and membranes add to K; empty when it has none."""
+    return (
+        *(foundation_stiffness(scene.mesh, f) for f in scene.foundations),
+        *(membrane_stiffness(scene.mesh, m) for m in scene.membranes),
+    )
+
+
+def foundation_stiffness(mesh: Mesh, foundation: Foundation) -> sparse.csr_array:
+    """K (N, N) N/m of springs to the ground, k integral of N_a N_b dA per held component."""
+    facets = facets_of(mesh, foundation.facets)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=2)
+    mass = np.einsum("q,fq,qa,qb->fab", rule.weights, area, rule.N, rule.N)
+    select = np.zeros((3, 3))
+    select[foundation.components, foundation.components] = foundation.stiffness
+    return _on_facets(mesh, facets, np.einsum("fab,ij->faibj", mass, select))
+
+
+def membrane_stiffness(mesh: Mesh, membrane: Membrane) -> sparse.csr_array:
+    """K (N, N) N/m of a thin elastic sheet on facets, in plane stress, without bending.
+
+    With surface gradients g_a and the tangent projector P, thickness t and plane-stress lambda',
+    K_ab = t integral of lambda' g_a g_b^T + mu (g_b g_a^T + (g_a . g_b) P) dA. The sheet is taut:
+    it carries compression too, where a slack one would wrinkle.
+    """
+    facets = facets_of(mesh, membrane.facets)
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    e1, e2 = J[..., 0], J[..., 1]
+    normal = np.cross(e1, e2)
+    area = np.linalg.norm(normal, axis=2)
+    n = normal / area[..., None]
+    dual = np.stack([np.cross(e2, n), np.cross(n, e1)], axis=2) / area[..., None, None]
+    g = np.einsum("qaj,fqji->fqai", rule.dN, dual)
+    P = np.eye(3) - np.einsum("fqi,fqj->fqij", n, n)
+    mu = membrane.material.shear_modulus
+    nu = membrane.material.nu
+    plane = 2 * mu * nu / (1 - nu)  # lambda' = E nu / (1 - nu^2)
+    w = membrane.thickness * rule.weights * area
+    K = plane * np.einsum("fq,fqai,fqbj->faibj", w, g, g)
+    K += mu * np.einsum("fq,fqbi,fqaj->faibj", w, g, g)
+    K += mu * np.einsum("fq,fqak,fqbk,fqij->faibj", w, g, g, P)
+    return _on_facets(mesh, facets, K)
+
+
+def _on_facets(mesh: Mesh, facets: Ints, K: Floats) -> sparse.csr_array:
+    """Element matrices (f, a, i, b, j) summed into (N, N), node-major."""
+    dofs = (3 * facets[:, :, None] + np.arange(3)).reshape(len(facets), -1)
+    size = dofs.shape[1]
+    rows = np.repeat(dofs, size, axis=1).ravel()
+    columns = np.tile(dofs, (1, size)).ravel()
+    shape = (mesh.nodes.size, mesh.nodes.size)
+    return sparse.csr_array((K.ravel(), (rows, columns)), shape=shape)
+
+
+def rule(mesh: Mesh, points: int) -> Quadrature:
+    """`points` Gauss points along each axis: exact to degree 2 points - 1."""
+    inside = gauss_points if mesh.bricks else collapsed_points
+    return _rule_at(mesh, *inside(mesh.dimension, points))
+
+
+def nodal_rule(mesh: Mesh) -> Quadrature:
+    """Shapes at the nodes of a cell, without weights: where slopes of linear fields peak."""
+    if mesh.bricks:
+        xi: Floats = (CORNERS if mesh.order == 1 else LATTICE)[mesh.dimension]
+    else:
+        xi = np.vstack([np.zeros(mesh.dimension), np.eye(mesh.dimension)])
+        if mesh.order == 2:
+            xi = np.vstack([xi, xi[np.array(EDGES[mesh.dimension])].mean(axis=1)])
+    return _rule_at(mesh, xi, np.zeros(len(xi)))
+
+
+def _rule_at(mesh: Mesh, xi: Floats, weights: Floats) -> Quadrature:
+    if mesh.bricks:
+        return brick_rule(xi, weights, mesh.order)
+    return simplex_rule(mesh.order, barycentric(xi), weights)
+
+
+def jacobians(mesh: Mesh, rule: Quadrature, u: Floats | None = None) -> Floats:
+    """det dx/dxi (e, q) of the mesh, moved by u (n, d) m when given; not positive = inverted."""
+    x = mesh.nodes if u is None else mesh.nodes + u
+    return np.asarray(np.linalg.det(rule.jacobians(x[mesh.cells])))
+
+
+def volumes_at(mesh: Mesh, rule: Quadrature) -> Floats:
+    """Weight times volume (e, q) m^d: an integral is the sum of these times the integrand."""
+    return rule.weights * jacobians(mesh, rule)
+
+
+def values_at(mesh: Mesh, rule: Quadrature, nodal: Floats) -> Floats:
+    """Nodal values (n, c) interpolated at the quadrature points (e, q, c)."""
+    return rule.at(nodal[mesh.cells])
+
+
+def projections(mesh: Mesh, places: Floats, weights: Floats) -> Floats:
+    """Pi (e, q, q): what values at the points of every cell become, in the mean with `weights`.
+
+    `places` (e, q, d) m and `weights` (e, q) m^d are those of the points. Pi is symmetric in the
+    scalar product of the weights, so that it is its own adjoint.
+    """
+    volume = weights.sum(axis=1)[:, None, None]
+    middle = (weights[..., None] * places).sum(axis=1, keepdims=True) / volume
+    fields = np.ones((*weights.shape, 1))
+    if mesh.kind == "hex27":
+        fields = np.concatenate([fields, (places - middle) / np.cbrt(volume)], axis=2)
+    weighted = np.swapaxes(fields * weights[..., None], 1, 2)
+    return np.asarray(fields @ np.linalg.solve(weighted @ fields, weighted))
+
 
 # The library's mesh and element, and the degree that a mass is integrated to.
 _ELEMENTS = {
@@ -97,7 +231,9 @@ def mass(scene: Scene, *, damping: bool = False) -> sparse.csr_array:
     if any(m.rho is None for m in materials):
         raise SceneError("a dynamic scheme needs the density; set rho kg/m3 of every material")
     weight = scene.per_cell(lambda m: (m.rho or 0.0) * (m.mass_damping if damping else 1.0))
-    weight, basis = scene.thickness * weight, _basis(scene.mesh)
+    _, element, degree = _ELEMENTS[scene.mesh.kind]
+    weight = scene.thickness * weight
+    basis = Basis(library_mesh(scene.mesh), element(), intorder=degree)
     scalar = asm(BilinearForm(_weighted_mass), basis, weight=weight[:, None])
     if scene.mesh.kind == "hex27":
         theirs = _renumbered(basis.doflocs.T, scene.mesh.nodes)
@@ -127,19 +263,18 @@ def lumped(scene: Scene, M: sparse.csr_array) -> Floats:
 
 def lame_constants(scene: Scene) -> tuple[Floats, Floats]:
     """lambda and mu (e,) Pa of every cell; in plane stress lambda' = E nu/(1 - nu^2). At nu = 0.5
-    lambda is that of the penalty beside unknown pressures (`fem.assembly.incompressible`)."""
-    stress = scene.plane == "stress"
-    return scene.per_cell(_plane_stress if stress else _lambda), scene.per_cell(_mu)
+    lambda is that of the penalty beside unknown pressures (`fem.assembly.volume_constraints`)."""
+    if scene.plane == "stress":
+        lam = scene.per_cell(lambda m: m.E * m.nu / (1 - m.nu**2))
+    else:
+        lam = scene.per_cell(_lambda)
+    return lam, scene.per_cell(_mu)
 
 
 def _lambda(m: Material) -> float:
     if m.incompressible:
         return m.assembled_bulk_modulus - 2 / 3 * m.shear_modulus
     return float(lame_parameters(m.E, m.nu)[0])
-
-
-def _plane_stress(m: Material) -> float:
-    return m.E * m.nu / (1 - m.nu**2)
 
 
 def _mu(m: Material) -> float:
@@ -152,11 +287,6 @@ def library_mesh(mesh: Mesh) -> Any:
     corners = np.ascontiguousarray(mesh.corners[:, order].T)
     vertices = int(mesh.corners.max()) + 1
     return _ELEMENTS[mesh.kind][0](np.ascontiguousarray(mesh.nodes[:vertices].T), corners)
-
-
-def _basis(mesh: Mesh) -> Basis:
-    _, element, mass_degree = _ELEMENTS[mesh.kind]
-    return Basis(library_mesh(mesh), element(), intorder=mass_degree)
 
 
 def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:
@@ -182,7 +312,14 @@ def _assembled(scene: Scene, lam: Floats, mu: Floats) -> sparse.csr_array:
     lam, mu = (c[:, None, None, None, None] for c in (lam, mu))
     cells = lam * outer + mu * (np.swapaxes(outer, 2, 4) + dots)
     cells = cells.reshape(e, a * d, a * d)
-    return _summed(mesh, cells + volume if mixed else cells)
+    # The matrices (e, k, k) of all cells in one (N, N), N = n d, node-major
+    K = cells + volume if mixed else cells
+    d = mesh.dimension
+    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(len(K), -1).astype(np.int32)
+    rows, columns = (np.broadcast_to(u, K.shape).ravel()
+                     for u in (unknowns[:, :, None], unknowns[:, None, :]))  # fmt: skip
+    entries = sparse.coo_array((K.ravel(), (rows, columns)), shape=2 * (mesh.nodes.size,))
+    return sparse.csr_array(entries)
 
 
 def mean_divergence(scene: Scene) -> tuple[sparse.csr_array, Floats]:
@@ -224,16 +361,6 @@ def stiffness_points(mesh: Mesh) -> StiffnessPoints:
     return StiffnessPoints(slopes, weights, L @ mesh.nodes[mesh.corners])
 
 
-def _summed(mesh: Mesh, K: Floats) -> sparse.csr_array:
-    """The matrices (e, k, k) of all cells in one (N, N), N = n d, node-major."""
-    d = mesh.dimension
-    unknowns = (mesh.cells[..., None] * d + np.arange(d)).reshape(len(K), -1).astype(np.int32)
-    rows, columns = (np.broadcast_to(u, K.shape).ravel()
-                     for u in (unknowns[:, :, None], unknowns[:, None, :]))  # fmt: skip
-    entries = sparse.coo_array((K.ravel(), (rows, columns)), shape=2 * (mesh.nodes.size,))
-    return sparse.csr_array(entries)
-
-
 def _renumbered(places: Floats, nodes: Floats) -> Ints:
     """The library's unknown at each of our nodes; it numbers edges and faces in its own order."""
     distance, theirs = cKDTree(places).query(nodes)
@@ -262,7 +389,13 @@ def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
     pointwise = B.T @ sparse.diags_array(kappa * volumes) @ B
     ones = np.ones(len(mesh.cells))
     K_dev = _assembled(scene, _lambda(material) * ones, _mu(material) * ones) - pointwise
-    share = _cell_to_node(mesh.corners, volumes, len(mesh.nodes))
+    corners = mesh.corners
+    per = corners.shape[1]
+    columns = np.repeat(np.arange(len(corners)), per)
+    values = np.repeat(volumes / per, per)
+    share = sparse.csr_array(
+        (values, (corners.ravel(), columns)), shape=(len(mesh.nodes), len(corners))
+    )
     V = np.asarray(share.sum(axis=1))
     D = sparse.diags_array(1 / V) @ share @ B
     return sparse.csr_array(K_dev + D.T @ sparse.diags_array(kappa * V) @ D)
@@ -293,10 +426,3 @@ def shape_gradients(mesh: Mesh) -> Floats:
     inverse = np.linalg.inv(x[:, 1:] - x[:, :1])
     rest = np.swapaxes(inverse, 1, 2)
     return np.concatenate([-rest.sum(axis=1, keepdims=True), rest], axis=1)
-
-
-def _cell_to_node(corners: Ints, volumes: Floats, n: int) -> sparse.csr_array:
-    per = corners.shape[1]
-    columns = np.repeat(np.arange(len(corners)), per)
-    values = np.repeat(volumes / per, per)
-    return sparse.csr_array((values, (corners.ravel(), columns)), shape=(n, len(corners)))

@@ -1,7 +1,7 @@
 """Strain and stress of every cell, averaged over its points, for display.
 
 Mixed and averaged volume changes are those of the points here, so that pressures of a mean
-dilatation element are not the ones that it was solved with (`fem.assembly.mean_dilatation` has
+dilatation element are not the ones that it was solved with (`fem.assembly.assemble` has
 those).
 """
 
@@ -11,9 +11,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.assembly.assemble import stiffness_points
+from validate.fem.laws.energies import green_strain
 from validate.fem.laws.law import law_of
-from validate.fem.laws.tensors import green_strain
-from validate.scene.material import Material
 from validate.scene.scene import Scene
 
 _EYE = np.eye(3)
@@ -54,17 +53,15 @@ def cell_fields(scene: Scene, u: Floats) -> CellFields:
     for i, region in enumerate(scene.regions, start=1):
         own[region.cells] = i
     for i, material in enumerate((scene.material, *(r.material for r in scene.regions))):
-        stress[own == i] = _stress(material, H[own == i])
+        # Cauchy stress (..., 3, 3) Pa: P F^T / J, or Hooke's law
+        cells = own == i
+        if material.law == "linear":
+            eps = (H[cells] + np.swapaxes(H[cells], -1, -2)) / 2
+            volume = np.trace(eps, axis1=-2, axis2=-1)[..., None, None]
+            lam = material.bulk_modulus - 2 * material.shear_modulus / 3
+            stress[cells] = lam * volume * _EYE + 2 * material.shear_modulus * eps
+        else:
+            F = H[cells] + _EYE
+            J = np.linalg.det(F)[..., None, None]
+            stress[cells] = law_of(material).stress(H[cells]) @ np.swapaxes(F, -1, -2) / J
     return CellFields(mean, np.einsum("eqij,eq->eij", stress, share))
-
-
-def _stress(material: Material, H: Floats) -> Floats:
-    """Cauchy stress (..., 3, 3) Pa: P F^T / J, or Hooke's law."""
-    if material.law == "linear":
-        eps = (H + np.swapaxes(H, -1, -2)) / 2
-        volume = np.trace(eps, axis1=-2, axis2=-1)[..., None, None]
-        lam = material.bulk_modulus - 2 * material.shear_modulus / 3
-        return np.asarray(lam * volume * _EYE + 2 * material.shear_modulus * eps)
-    F = H + _EYE
-    J = np.linalg.det(F)[..., None, None]
-    return np.asarray(law_of(material).stress(H) @ np.swapaxes(F, -1, -2) / J)

@@ -7,7 +7,7 @@ from validate.errors import SceneError
 from validate.fem.assembly.assemble import mass
 from validate.scene.mesh import Mesh
 from validate.scene.places import Place, facets_of, kind_of, nodes_of
-from validate.scene.scene import Load, Pressure, Scene, Weight
+from validate.scene.scene import Pressure, Scene, Weight
 from validate.scene.shape_functions import facet_rule
 
 
@@ -26,7 +26,13 @@ def load_columns(scene: Scene) -> Floats:
         if isinstance(load, Pressure):
             columns[:, j] = _pushed(scene.mesh, load).ravel()
             continue
-        columns[:, j] = np.outer(_nodal(scene.mesh, load), load.direction).ravel()
+        # The share (n,) of the input that every node takes
+        if load.spread == "consistent":
+            shares = uniform_shares(scene.mesh, load.facets)
+        else:
+            shares, nodes = np.zeros(len(scene.mesh.nodes)), nodes_of(scene.mesh, load.facets)
+            shares[nodes] = 1.0 if load.spread == "per_node" else 1 / len(nodes)
+        columns[:, j] = np.outer(shares, load.direction).ravel()
     return columns
 
 
@@ -40,18 +46,8 @@ def hung_masses(scene: Scene) -> Floats:
 
 def _pushed(mesh: Mesh, load: Pressure) -> Floats:
     """Forces (n, 3) N of one Pa: -integral of N_a n dA over the undeformed faces, n outward."""
-    facets = _outward(mesh, load)
-    rule = facet_rule(3, facets.shape[1])
-    J = rule.jacobians(mesh.nodes[facets])
-    normal = np.cross(J[..., 0], J[..., 1])
-    found = np.zeros_like(mesh.nodes)
-    np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
-    return found
-
-
-def _outward(mesh: Mesh, load: Pressure) -> Ints:
-    """The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
-    facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body."""
+    # The faces (f, m) as the surface of the body has them, oriented outward: a mesh file's own
+    # facet set may be oriented either way. Raises `SceneError` for 2-D, and faces within the body
     if mesh.dimension != 3:
         raise SceneError(f"pressure '{load.name}': supported for 3-D meshes, not for {mesh.kind}")
     outside = {tuple(row): i for i, row in enumerate(np.sort(mesh.surface, axis=1).tolist())}
@@ -62,16 +58,13 @@ def _outward(mesh: Mesh, load: Pressure) -> Ints:
             f"pressure '{load.name}': {at.count(-1)} of {len(at)} faces lie inside the body; "
             "choose faces of its surface"
         )
-    return np.asarray(mesh.surface[at])
-
-
-def _nodal(mesh: Mesh, load: Load) -> Floats:
-    """The share (n,) of the input that every node takes."""
-    if load.spread == "consistent":
-        return uniform_shares(mesh, load.facets)
-    shares, nodes = np.zeros(len(mesh.nodes)), nodes_of(mesh, load.facets)
-    shares[nodes] = 1.0 if load.spread == "per_node" else 1 / len(nodes)
-    return shares
+    facets = np.asarray(mesh.surface[at])
+    rule = facet_rule(3, facets.shape[1])
+    J = rule.jacobians(mesh.nodes[facets])
+    normal = np.cross(J[..., 0], J[..., 1])
+    found = np.zeros_like(mesh.nodes)
+    np.add.at(found, facets, -np.einsum("q,fqi,qa->fai", rule.weights, normal, rule.N))
+    return found
 
 
 def uniform_shares(mesh: Mesh, place: Place) -> Floats:

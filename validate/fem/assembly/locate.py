@@ -85,7 +85,16 @@ class Rows:
 def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
     """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
     if mesh.bricks:
-        return _brick_rows(mesh, points)
+        cells = _near_cells(mesh, points)
+        x = mesh.nodes[mesh.corners[cells]]
+        flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
+        xi = np.clip(_local(flat, each), 0.0, 1.0)
+        feet = np.einsum("ka,kad->kd", brick_values(xi), flat)
+        away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
+        # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
+        best, pick = np.argmin(away, axis=1), np.arange(len(points))
+        weights = brick_values(xi.reshape(*cells.shape, -1)[pick, best], mesh.order)
+        return Rows(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
     L, cell = _barycentric(mesh, points)
     clipped = np.clip(L, 0, None)
     clipped /= clipped.sum(axis=1, keepdims=True)
@@ -162,19 +171,6 @@ def _near_cells(mesh: Mesh, points: Floats) -> Ints:
     near = min(_CANDIDATES, len(mesh.cells))
     _, cells = cKDTree(mesh.nodes[mesh.corners].mean(axis=1)).query(points, k=near)
     return np.asarray(cells).reshape(len(points), near)
-
-
-def _brick_rows(mesh: Mesh, points: Floats) -> Rows:
-    cells = _near_cells(mesh, points)
-    x = mesh.nodes[mesh.corners[cells]]
-    flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
-    xi = np.clip(_local(flat, each), 0.0, 1.0)
-    feet = np.einsum("ka,kad->kd", brick_values(xi), flat)
-    away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
-    # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
-    best, pick = np.argmin(away, axis=1), np.arange(len(points))
-    weights = brick_values(xi.reshape(*cells.shape, -1)[pick, best], mesh.order)
-    return Rows(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
 
 
 def _local(x: Floats, points: Floats) -> Floats:

@@ -11,9 +11,16 @@ are as many again. The order of the cells makes no difference while the nodes st
 from typing import Any
 
 from validate.arrays import Floats
-from validate.fem.kernels.lanes import lanes_of, load
+from validate.fem.kernels.lanes import (
+    BLOCK,
+    FOUR,
+    add_forces_of,
+    add_numbers_of,
+    edges,
+    lanes_of,
+    load,
+)
 from validate.fem.kernels.laws import first_split
-from validate.fem.kernels.nodes_in_lanes import BLOCK, FOUR, add_forces_of, add_numbers_of, edges
 from validate.fem.kernels.points import (
     INVARIANTS,
     NEO_HOOKE,

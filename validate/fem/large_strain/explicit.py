@@ -1,11 +1,14 @@
-"""Bodies of tet4 or mixed hex8 at large strain for explicit schemes, with compiled forces.
+"""Bodies of tet4 or mixed hex8 at large strain for explicit schemes.
 
-The element loops are in `fem.kernels.explicit` and `fem.kernels.bricks`; this is their packing and
+The element loops are in `fem.kernels.explicit` and `fem.kernels.cells`; this is their packing and
 their interface.
+
+Mixed hexahedra packed for the compiled loops of `fem.kernels.cells`.
 """
 
 import math
 import os
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
@@ -17,21 +20,65 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import shape_gradients
-from validate.fem.assembly.surface import foundation_stiffness
-from validate.fem.kernels import central_difference as central_kernel
+from validate.fem.assembly.assemble import foundation_stiffness, shape_gradients, stiffness_points
 from validate.fem.kernels import explicit as kernels
 from validate.fem.kernels import points as laws
-from validate.fem.kernels.cells import ROWS
-from validate.fem.kernels.lanes import on_lines
-from validate.fem.kernels.nodes_in_lanes import BLOCK
+from validate.fem.kernels.cells import BRICK_ROWS, CORNERS, LANES, POINTS, ROWS
+from validate.fem.kernels.explicit import Cells
+from validate.fem.kernels.lanes import BLOCK, on_lines
 from validate.fem.kernels.points import NEO_HOOKE, SVK
-from validate.fem.large_strain.brick_packing import packed_bricks, require_bricks
 from validate.fem.laws.viscoelasticity import cell_branches, taut
 from validate.scene.laws import coupled_lambda, further_laws, ogden_terms
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
+
+_BRICK_LAWS = ("neo_hooke", "mooney_rivlin", "yeoh")
+
+
+# kappa, C10, C01, C20, C30 Pa.
+_CARD: tuple[Callable[[Material], float], ...] = (
+    lambda m: m.bulk_modulus,
+    lambda m: m.shear_modulus / 2 - m.coefficients.C01,
+    lambda m: m.coefficients.C01,
+    lambda m: m.coefficients.C20,
+    lambda m: m.coefficients.C30,
+)
+
+
+def require_bricks(scene: Scene) -> None:
+    """Raise `SceneError` for what mixed hexahedra have no explicit form of."""
+    if scene.dilatation != "mixed":
+        raise SceneError(
+            f"explicit hexahedra must be mixed, because {scene.dilatation} ones lock; use "
+            "dilatation='mixed'"
+        )
+    for m in (scene.material, *(r.material for r in scene.regions)):
+        form = m.coefficients.volumetric
+        if m.law not in _BRICK_LAWS or form != "split":
+            raise SceneError(
+                f"explicit hexahedra support the laws {', '.join(_BRICK_LAWS)} in their split "
+                f"form, not '{m.law}' ({form})"
+            )
+
+
+def packed_bricks(scene: Scene) -> tuple[Floats, Cells]:
+    """Geometry (blocks, 9, 25, 16) and cells (blocks, 8, 16), the rest without stiffness."""
+    mesh, points = scene.mesh, stiffness_points(scene.mesh)
+    e = len(mesh.cells)
+    blocks = -(-e // LANES)
+    rows = np.zeros((blocks * LANES, POINTS + 1, BRICK_ROWS))
+    rows[:e, :POINTS, :24] = np.swapaxes(points.slopes, 2, 3).reshape(e, POINTS, 24)
+    rows[:e, :POINTS, 24] = points.weights
+    for k, modulus in enumerate(_CARD):
+        rows[:e, POINTS, k] = scene.per_cell(modulus)
+    rows[:e, POINTS, 5] = 1 / points.weights.sum(axis=1)
+    cells = np.zeros((blocks * LANES, CORNERS), np.int32)
+    cells[:e] = 3 * mesh.cells
+    packed = rows.reshape(blocks, LANES, POINTS + 1, BRICK_ROWS).transpose(0, 2, 3, 1)
+    lanes = cells.reshape(blocks, LANES, CORNERS).swapaxes(1, 2)
+    return np.ascontiguousarray(packed), np.ascontiguousarray(lanes)
+
 
 Precision = Literal["double", "single"]
 RowName = Literal["u", "d", "r", "old", "v", "a"]
@@ -52,7 +99,7 @@ _LAWS = {
 
 
 #: Law, geometry, cells, springs and their diagonal (empty without any), workspace.
-PackedBody = tuple[int, Floats, kernels.Cells, central_kernel.Springs, Floats, Floats]
+PackedBody = tuple[int, Floats, kernels.Cells, kernels.Springs, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -80,7 +127,7 @@ class ExplicitMotion:
 
 @dataclass(frozen=True)
 class CentralRule:
-    """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `central_kernel.advance`.
+    """Steps of dt s, d' = keep d - gain (r + lag (r - old) - f): `kernels.advance`.
 
     `held` unknowns move by `moves` (held, k) times the drives, `loaded` take `loads` (loaded, l).
     """
@@ -118,9 +165,23 @@ class ExplicitBody:
         self.branches = cell_branches(scene)
         self._taut = self.geometry
         if self.branches:
-            _require_one_caller(mesh, threads)
+            if mesh.bricks:
+                raise SceneError(
+                    "explicit hexahedra do not support a Prony series: remove it, or use tet4 or "
+                    "NewtonDynamics"
+                )
+            if threads > 1:
+                raise SceneError(
+                    f"{threads} threads: a viscoelastic body supports one; use threads=1"
+                )
             self._taut = _packed(taut(scene))[0]
-        self._swift = self._in(precision)
+        if precision == "single" and not knows_single(scene):
+            raise SceneError(
+                "single precision supports tet4 of St. Venant-Kirchhoff or neo-Hooke in its "
+                "split form, without a Prony series; take precision='double'"
+            )
+        # The geometry that forces and blocks are reckoned with
+        self._swift = self.geometry if precision == "double" else _in_single(self.geometry)
         self.work = on_lines(np.zeros(kernels.work_size(len(mesh.nodes))))
         self._quick = self.work if precision == "double" else _in_single(self.work)
         self._places = {1: self._quick}
@@ -137,17 +198,6 @@ class ExplicitBody:
             size = kernels.parts_size(self.size // 3)
             self._places[threads] = on_lines(np.zeros((threads, size), self._quick.dtype))
         self._parts = self._places[threads]
-
-    def _in(self, precision: Precision) -> Floats:
-        """The geometry that forces and blocks are reckoned with."""
-        if precision == "double":
-            return self.geometry
-        if not knows_single(self.scene):
-            raise SceneError(
-                "single precision supports tet4 of St. Venant-Kirchhoff or neo-Hooke in its "
-                "split form, without a Prony series; take precision='double'"
-            )
-        return _in_single(self.geometry)
 
     def _spring(self, springs: sparse.csr_array) -> None:
         self.springs, self._own_springs = springs, np.asarray(springs.diagonal())
@@ -218,7 +268,7 @@ class ExplicitBody:
         rows = np.empty((6, self.size))
         rows[:4] = motion.rows[:4]
         memory, series = self._remembered(motion, rule.dt)
-        work, taken, size = central_kernel.advance(
+        work, taken, size = kernels.advance(
             self.law, self._swift, self.cells, self._packed[3], rows,
             rule.keep, rule.gain, rule.lag, rule.dt,
             rule.held, rule.moves, rule.loaded, rule.loads, _own(begin), _own(end), substeps,
@@ -268,16 +318,6 @@ def require_threads(threads: int) -> None:
     """Raise `SceneError` for fewer than one."""
     if threads < 1:
         raise SceneError(f"{threads} threads: use 1, or at most the number of idle cores")
-
-
-def _require_one_caller(mesh: Mesh, threads: int) -> None:
-    if mesh.bricks:
-        raise SceneError(
-            "explicit hexahedra do not support a Prony series: remove it, or use tet4 or "
-            "NewtonDynamics"
-        )
-    if threads > 1:
-        raise SceneError(f"{threads} threads: a viscoelastic body supports one; use threads=1")
 
 
 def _own(x: Floats) -> Floats:

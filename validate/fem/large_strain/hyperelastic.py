@@ -1,14 +1,14 @@
-"""Hyperelastic body in total Lagrangian form: energy, internal force and tangent of a mesh.
+"""Hyperelastic body in total Lagrangian form: energy, internal force and tangent.
 
 f_int = sum over points of w P : dN/dX, K_t its derivative (Bonet & Wood 2008, ch. 9). The isochoric
 law acts at every point, the volumetric one on the law's measure of volume change (tr E or J - 1):
-pointwise, projected in every cell (`fem.assembly.mean_dilatation`), or averaged around each node
+pointwise, projected in every cell (`fem.assembly.assemble`), or averaged around each node
 (`fem.large_strain.hyperelastic`). At rest the tangent is that of `fem.assembly.assemble`.
 
-Near nu = .5 Newton's method wants the pressures p of the tangent to be unknowns of their own,
-p' = U'(theta(u)) + U''(theta(u)) dtheta (`extrapolated`): the pressure that a step of size d leaves
-at its end, kappa d^2 too large, then stiffens or softens nothing (Magisano, Leonetti & Garcea 2017
-for stresses at points). At a solution both are one.
+Near nu = .5 Newton's method wants the pressures p of the tangent to be unknowns of their own, p' =
+U'(theta(u)) + U''(theta(u)) dtheta (`extrapolated`): the pressure that a step of size d leaves at
+its end, kappa d^2 too large, then stiffens or softens nothing (Magisano, Leonetti & Garcea 2017 for
+stresses at points). At a solution both are one.
 
 At nu = .5 the mean J - 1 of every cell is kept at zero by multipliers, p = multiplier + U'(theta)
 with a finite kappa in U (augmented Lagrangian: Hestenes 1969; Simo & Taylor 1991 for volumes). The
@@ -21,24 +21,31 @@ leaves no stress across (`fem.laws.plane_stress`). Forces are those of the scene
 Departures: four points per quadratic tetrahedron (degree 2) integrate the stiffness at rest
 exactly; at large strain they are what the order of convergence needs, not exact. Foundations act as
 linear springs at any displacement; membranes are known at small strain only and are refused.
+
+Common interface of linear and large-strain bodies for Newton's method.
 """
 
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import shape_gradients, stiffness_points
-from validate.fem.assembly.mean_dilatation import projections
-from validate.fem.assembly.surface import foundation_stiffness
+from validate.fem.assembly.assemble import (
+    foundation_stiffness,
+    projections,
+    shape_gradients,
+    stiffness_points,
+)
+from validate.fem.laws.energies import green_strain, volume_change
 from validate.fem.laws.law import Law, parts_of
 from validate.fem.laws.plane_stress import PlaneStress
-from validate.fem.laws.tensors import green_strain, volume_change
 from validate.fem.laws.viscoelasticity import Branches, Lagged, Remembered, second_stress
+from validate.fem.system import System
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
 from validate.scene.scene import Scene
@@ -410,3 +417,52 @@ def _law(scene: Scene, material: Material) -> tuple[Law, float]:
     """The isochoric law and kappa Pa; in plane stress both as one, with no volumetric part left."""
     law, kappa = parts_of(material, averaged=scene.dilatation != "pointwise")
     return (PlaneStress(law, kappa), 0.0) if scene.plane == "stress" else (law, kappa)
+
+
+class Elastic(Protocol):
+    """What is needed of a body at displacements u (N,) m; `unit_force` N scales its rounding."""
+
+    @property
+    def unit_force(self) -> float: ...
+
+    def force(self, u: Floats) -> Floats: ...
+
+    def tangent(self, u: Floats, pressures: Floats | None = None) -> sparse.csr_array: ...
+
+    def extrapolated(self, u: Floats, du: Floats) -> Floats | None: ...
+
+    def energy(self, u: Floats) -> float: ...
+
+    def inverted(self, u: Floats) -> Inverted | None: ...
+
+
+@dataclass(frozen=True)
+class LinearBody:
+    """K u, whatever u; `unit_force` N is what a displacement of the body's size would take."""
+
+    K: sparse.csr_array
+    unit_force: float
+
+    def force(self, u: Floats) -> Floats:
+        return np.asarray(self.K @ u)
+
+    def tangent(self, u: Floats, pressures: Floats | None = None) -> sparse.csr_array:
+        return self.K
+
+    def extrapolated(self, u: Floats, du: Floats) -> None:
+        return None
+
+    def energy(self, u: Floats) -> float:
+        return float(u @ (self.K @ u)) / 2
+
+    def inverted(self, u: Floats) -> None:
+        return None
+
+
+def elastic(system: System) -> Elastic:
+    """Return the body of a system; raises `SceneError` for what has no form at large strain."""
+    scene = system.scene
+    if scene.material.law != "linear":
+        return Body(scene)
+    size = float(np.ptp(scene.mesh.nodes, axis=0).max())
+    return LinearBody(system.K, size * float(np.linalg.norm(system.K.diagonal())))

@@ -6,7 +6,7 @@ kernel contracts. `kappa` 0 leaves the isochoric part of a split law, for nodal 
 whose volumetric part is a function of one scalar measure of the cell's dilatation.
 
 Sources: Bonet & Wood (2008), ch. 6; Simo & Miehe (1992) for the volumetric function. Laws of
-invariants are in `fem.laws.polynomial`, of principal stretches in `fem.laws.ogden`.
+invariants are in `fem.laws.energies`, of principal stretches in `fem.laws.energies`.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -16,10 +16,18 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.laws.ogden import Ogden
-from validate.fem.laws.polynomial import Polynomial
-from validate.fem.laws.tensors import EYE, cofactor, green_strain, outer, trace, volume_change
-from validate.fem.laws.volumetric import ByVolume, split_energy
+from validate.fem.laws.energies import (
+    EYE,
+    ByVolume,
+    Ogden,
+    Polynomial,
+    cofactor,
+    green_strain,
+    outer,
+    split_energy,
+    trace,
+    volume_change,
+)
 from validate.scene.laws import LAWS, VolumetricName, coupled_lambda, law_kind, ogden_terms
 from validate.scene.material import Material, Prony
 
@@ -223,9 +231,9 @@ def stiffened(material: Material, factor: float) -> Material:
         scaled_modulus = 9 * kappa * mu / (3 * kappa + mu)
         nu = (3 * kappa - 2 * mu) / (2 * (3 * kappa + mu))
     moduli = [f.name for f in fields(c) if f.metadata["unit"] == "Pa"]
-    scaled = replace(c, **{name: _times(factor, getattr(c, name)) for name in moduli})
+    values: dict[str, Any] = {name: getattr(c, name) for name in moduli}
+    for name, value in values.items():
+        terms = isinstance(value, tuple)
+        values[name] = tuple(factor * v for v in value) if terms else factor * value
+    scaled = replace(c, **values)
     return replace(material, E=scaled_modulus, nu=nu, coefficients=scaled, prony=Prony())
-
-
-def _times(factor: float, value: Any) -> Any:
-    return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value

@@ -18,8 +18,8 @@ from functools import partial
 import numpy as np
 
 from validate.arrays import Floats
+from validate.fem.laws.energies import EYE, cofactor, outer, volume_change
 from validate.fem.laws.law import Law, stiffened
-from validate.fem.laws.tensors import EYE, cofactor, outer, volume_change
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 

@@ -1,4 +1,4 @@
-"""Direct factorisation, Gauss-Seidel sweeps, and condensation of sparse systems.
+"""Direct factorisation and condensation of sparse systems.
 
 Start with `factor`, the one place that chooses a solver.
 """

@@ -1,24 +1,35 @@
-"""Static condensation of a linear system on selected nodes, exact (paper 000, eqs 17-20).
+"""Condensed linear systems: static condensation, imposed displacements, boundary swap.
 
-Forces act on kept nodes only, so that only their rows and columns of the inverse are needed. Two
-forms: `dense` holds all of them (the paper's explicit inverse, m^2 numbers), `by columns` keeps the
-factor and solves for a column when a node is first touched (m numbers each): what a step then needs
-is one short product with the columns in use.
+Condensation is exact (paper 000, eqs 17-20). Forces act on kept nodes only, so that only their rows
+and columns of the inverse are needed. Two forms: `dense` holds all of them (the paper's explicit
+inverse, m^2 numbers), `by columns` keeps the factor and solves for a column when a node is first
+touched (m numbers each): what a step then needs is one short product with the columns in use.
 
 Departures: the paper inverts K explicitly; here the factor is applied to unit forces, whose error
 grows with the condition of K only once.
-"""
 
+A tool that touches the body gives the displacement of a few combinations c . u of kept unknowns;
+their forces follow from a system as small as their number (paper 000, section 5.2: a contact adds
+a node to the working matrix). Nothing is inverted or updated in size, so nothing drifts: what was
+removed has left no trace.
+
+Boundary swap (paper 000): force and displacement change places. For forces on all kept unknowns u =
+A f. An unknown whose displacement is given instead changes places with its force by a principal
+pivot, a rank-one update of the dense matrix. Rounding adds up over many pivots: it is measured on
+random states and, beyond a limit, the matrix is made afresh."""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.cavity import CavitySurface
-from validate.fem.linear_solvers.factor import Factor
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.kernels.jit_cache import compiled
+from validate.fem.linear_solvers.factor import Factor, Fronts
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.memory import require_memory
@@ -156,10 +167,203 @@ def condense(system: System, keep: Ints) -> Condensed:
     d = mesh.dimension
     free = np.flatnonzero(np.isin((nodes[:, None] * d + np.arange(d)).ravel(), system.free))
     kept = np.ascontiguousarray(whole.fields[:, nodes].reshape(len(whole.fields), nodes.size * d))
-    surfaces = tuple(_renumbered(c, nodes) for c in system.cavities)
+    facets = [np.searchsorted(nodes, c.facets) for c in system.cavities]
+    surfaces = tuple(
+        CavitySurface(c.name, of, np.unique(of))
+        for c, of in zip(system.cavities, facets, strict=True)
+    )
     return Condensed(whole, nodes, free, kept, surfaces, system, system.factor())
 
 
-def _renumbered(surface: CavitySurface, nodes: Ints) -> CavitySurface:
-    facets = np.searchsorted(nodes, surface.facets)
-    return CavitySurface(surface.name, facets, np.unique(facets))
+_DEPENDENT = 1e-12  # of the compliance along a row: what others leave of it
+
+
+@dataclass(frozen=True)
+class Imposed:
+    """The displacement `weights` . u[`unknowns`] of kept unknowns (r,): of a node along an axis, or
+    of a point between nodes."""
+
+    unknowns: Ints
+    weights: Floats
+
+
+def along(node: int, axis: Floats) -> Imposed:
+    """Return the displacement of kept node number `node` along a unit vector (d,)."""
+    d = len(axis)
+    return Imposed(node * d + np.arange(d), np.asarray(axis, dtype=np.float64))
+
+
+def between(nodes: Ints, shares: Floats, axis: Floats) -> Imposed:
+    """Of a point of a facet: kept nodes (m,) with their shares (m,), along a unit vector (d,)."""
+    d = len(axis)
+    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
+    return Imposed(unknowns, np.outer(shares, axis).ravel())
+
+
+@dataclass(frozen=True)
+class WorkingSet:
+    """Imposed rows (c): `columns` (c, W) m per newton along each, `coupling` (c, c) m/N among them,
+    `bases` (c, m) what a unit of each drive and pressure moves along each."""
+
+    condensed: Condensed
+    rows: tuple[Imposed, ...] = ()
+    columns: Floats | None = None
+    coupling: Floats | None = None
+    bases: Floats | None = None
+
+    def with_row(self, row: Imposed) -> "WorkingSet":
+        """One more. Raises `SceneError` for a row that is held, or follows from the others."""
+        return self.with_rows((row,))
+
+    def with_rows(self, rows: Sequence[Imposed]) -> "WorkingSet":
+        """All of these more, at once. Raises as `with_row` does."""
+        condensed = self.condensed
+        found = [self.columns] if self.columns is not None else []
+        for row in rows:
+            column = np.zeros(condensed.size)  # (W,) m per newton along the row
+            for unknown, weight in zip(row.unknowns.tolist(), row.weights.tolist(), strict=True):
+                if weight:
+                    column += weight * condensed.column(unknown)
+            found.append(column[None])
+        more = np.array([condensed.fields[:, row.unknowns] @ row.weights for row in rows])
+        columns = np.vstack(found)
+        bases = more if self.bases is None else np.vstack([self.bases, more])
+        every = (*self.rows, *rows)
+        coupling = np.array([[r.weights @ c[r.unknowns] for r in every] for c in columns])
+        coupling = (coupling + coupling.T) / 2
+        # Every compliance that is left beside the others, as pivots of the scaled matrix
+        own = np.sqrt(np.abs(np.diag(coupling)))
+        sizes = np.linalg.eigvalsh(coupling / np.outer(own, own)) if own.all() else np.zeros(1)
+        if not sizes[0] > _DEPENDENT:
+            raise SceneError(
+                f"a prescribed motion along one of {len(coupling)} axes follows from the others, "
+                f"or is already held: {sizes[0]:.1e} of its compliance remains"
+            )
+        return WorkingSet(condensed, every, columns, coupling, bases)
+
+    def without(self, index: int) -> "WorkingSet":
+        """Return the others, as if that one had never been."""
+        kept = [i for i in range(len(self.rows)) if i != index]
+        if not kept:
+            return WorkingSet(self.condensed)
+        assert self.columns is not None
+        assert self.coupling is not None
+        assert self.bases is not None
+        rows = tuple(self.rows[i] for i in kept)
+        coupling = self.coupling[np.ix_(kept, kept)]
+        return WorkingSet(self.condensed, rows, self.columns[kept], coupling, self.bases[kept])
+
+    def forces(self, z: Floats, targets: Floats) -> Floats:
+        """(c,) N along each row, so that it moves by its target (c,) m under drives m and pressures
+        Pa z (m,)."""
+        if self.coupling is None or self.bases is None:
+            return np.zeros(0)
+        return np.asarray(np.linalg.solve(self.coupling, targets - self.bases @ z))
+
+    def displacement(self, z: Floats, forces: Floats) -> Floats:
+        """(W,) m of the kept unknowns."""
+        u = z @ self.condensed.fields
+        return np.asarray(u if self.columns is None else u + forces @ self.columns)
+
+
+def displaced(system: WorkingSet, z: Floats, targets: Sequence[float]) -> tuple[Floats, Floats]:
+    """Displacements (W,) m and the rows' forces (c,) N at once."""
+    forces = system.forces(z, np.asarray(targets, dtype=np.float64))
+    return system.displacement(z, forces), forces
+
+
+_EVERY = 64  # pivots between two measurements of the drift
+_DRIFT = 1e-11  # of the largest displacement: beyond it the matrix is made afresh
+_VANISHES = 1e-13  # of the unknown's own compliance: the others hold it already
+
+
+class Swapped:
+    """The mixed matrix T (m, m) of a compliance A (m, m) m/N: y = T x, where x is the force of an
+    unknown that is free and the displacement of one that is `driven`, and y the other of the two.
+
+    It changes in place: a tick has no time for copies. `pivots`, `refactorisations` and
+    `worst_drift` say what was done.
+    """
+
+    def __init__(self, A: Floats, seed: int = 0) -> None:
+        self.A, self.T = A, A.copy()
+        self.driven: NDArray[np.bool_] = np.zeros(len(A), dtype=bool)
+        self.pivots = self.refactorisations = 0
+        self.worst_drift = 0.0
+        self._random = np.random.default_rng(seed)
+
+    def swap(self, unknown: int) -> None:
+        """Give the unknown's displacement instead of its force, or its force again.
+
+        Raises `SceneError` where the unknowns driven already hold it, or nothing moves it.
+        """
+        pivot = float(self.T[unknown, unknown])
+        own = float(self.A[unknown, unknown])
+        least = _VANISHES * (own if not self.driven[unknown] else 1 / own if own else np.inf)
+        if not pivot > least:
+            raise SceneError(
+                f"unknown {unknown} cannot be driven: its compliance is {pivot:.1e} m/N "
+                f"together with the driven unknowns, {own:.1e} m/N alone"
+            )
+        _pivot(self.T, unknown)
+        self.driven[unknown] = not self.driven[unknown]
+        self.pivots += 1
+        if self.pivots % _EVERY == 0 and self.drift() > _DRIFT:
+            self.refactor()
+
+    def solve(self, given: Floats) -> tuple[Floats, Floats]:
+        """Displacements (m,) m and forces (m,) N, from `given` (m,): m where driven, N else."""
+        found = self.T @ given
+        u = np.where(self.driven, given, found)
+        return u, np.where(self.driven, found, given)
+
+    def drift(self) -> float:
+        """Return the largest |u - A f| over the largest |u| of a random state: what rounding has
+        left."""
+        given = self._random.standard_normal(len(self.A))
+        size = np.sqrt(np.diag(self.A))
+        given *= np.where(self.driven, size, np.divide(1, size, out=np.zeros_like(size),
+                                                       where=size > 0))  # fmt: skip
+        u, f = self.solve(given)
+        scale = float(np.abs(u).max(initial=0.0))
+        found = float(np.abs(u - self.A @ f).max(initial=0.0)) / scale if scale else 0.0
+        self.worst_drift = max(self.worst_drift, found)
+        return found
+
+    def refactor(self) -> None:
+        """T from A by one factorisation over what is driven."""
+        self.T = mixed(self.A, np.flatnonzero(self.driven))
+        self.refactorisations += 1
+
+
+def mixed(A: Floats, driven: Ints) -> Floats:
+    """Return the matrix of `Swapped` at once: [[A_ff - A_fd X, X^T], [-X, A_dd^-1]], X = A_dd^-1
+    A_df."""
+    T = A.copy()
+    if not len(driven):
+        return T
+    rest = np.setdiff1d(np.arange(len(A)), driven)
+    inverse = np.linalg.inv(A[np.ix_(driven, driven)])
+    X = inverse @ A[np.ix_(driven, rest)]
+    T[np.ix_(driven, driven)] = (inverse + inverse.T) / 2
+    T[np.ix_(driven, rest)] = -X
+    T[np.ix_(rest, driven)] = X.T
+    T[np.ix_(rest, rest)] -= A[np.ix_(rest, driven)] @ X
+    return T
+
+
+@compiled()
+def _pivot(T: Floats, i: int) -> None:
+    """The principal pivot of T (m, m) at i, in place."""
+    m = len(T)
+    p = 1 / T[i, i]
+    row = T[i].copy()
+    for j in range(m):
+        if j != i:
+            factor = T[j, i] * p
+            for k in range(m):
+                T[j, k] -= factor * row[k]
+            T[j, i] = factor
+    for k in range(m):
+        T[i, k] = -row[k] * p
+    T[i, i] = p

@@ -65,7 +65,7 @@ from validate.report.sections.motion_words import motion_words, rests
 from validate.report.views.numbers import scale, shown_unit
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
-from validate.solve.dynamic.equilibrium_start import FromEquilibrium
+from validate.solve.dynamic.implicit import FromEquilibrium
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear

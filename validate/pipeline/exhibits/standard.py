@@ -6,8 +6,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.force_error import TrackError, nrmse, track_error
 from validate.compare.row import LongRow, RowBlock
-from validate.compare.track import TrackError, nrmse, track_error
 from validate.pipeline.checks.consistency import consistency_exhibit, nis_of
 from validate.pipeline.exhibits.gating import estimated_exhibit, gate_exhibit
 from validate.pipeline.experiment.experiment import Experiment

@@ -41,9 +41,9 @@ from validate.scene.geometries.refinement import linear, of_element
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.scene import Load, Scene
-from validate.solve.candidates import StillBody, SwingingBody
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.schemes import candidates
+from validate.solve.study_entries import StillBody, SwingingBody
 
 _LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh
 _COARSER = (0.5, 0.7, 1.0)  # of the reference's level

@@ -16,10 +16,10 @@ from validate.recording.types import Recording
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene
-from validate.solve.candidates import RUNGS as RUNGS
-from validate.solve.candidates import SHOWN as SHOWN
-from validate.solve.candidates import Rival as Rival
-from validate.solve.candidates import Rung as Rung
+from validate.solve.study_entries import RUNGS as RUNGS
+from validate.solve.study_entries import SHOWN as SHOWN
+from validate.solve.study_entries import Rival as Rival
+from validate.solve.study_entries import Rung as Rung
 from validate.solve.types import Scheme
 
 LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes are taken many times

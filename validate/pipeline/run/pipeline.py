@@ -9,12 +9,12 @@ from time import perf_counter
 from typing import Any
 
 from validate.compare.exhibit import captioned
+from validate.compare.force_error import track_scores
 from validate.compare.inputs import Declared
 from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
-from validate.compare.track import track_scores
 from validate.engine.execution import Report
 from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError

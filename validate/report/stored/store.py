@@ -12,11 +12,10 @@ from importlib.resources import files
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.compare.domain import Domain, domains
 from validate.compare.overall_verdict import Overall
 from validate.compare.published import Published
 from validate.compare.residual import Residual
-from validate.compare.result import MethodResult, Result
+from validate.compare.result import Domain, MethodResult, Result, domains
 from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.identify.budget import IdentifiedValue

@@ -9,7 +9,7 @@ Departures: a cut-off cluster of equal frequencies is taken whole, so there may 
 asked for. The static correction has no rates: it gives no share of damping and inertia forces.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -20,12 +20,17 @@ from validate.errors import SceneError
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, SwingingBody
-from validate.solve.dynamic.linear import InertialStepper, Reactions, reactions
+from validate.solve.dynamic.linear import (
+    Excitation,
+    InertialStepper,
+    Inputs,
+    StartName,
+    excitation,
+    reactions,
+)
 from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode, require_start, rule_of
-from validate.solve.excitation import Excitation, Inputs, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.stepping import Rates, Stepping
+from validate.solve.study_entries import Asked, Rates, Rival, Stepping, SwingingBody
 from validate.solve.types import Scheme, State, Stepper
 
 # --- Steps of q'' + c q' + w^2 q = f for many modes at once: exact ones, and Newmark's rules.
@@ -159,17 +164,16 @@ class Modal:
             require_start(system, rule, "consistent")
         excited = excitation(system, rule)
         walk = exact_walk(modes, self.dt, self.propagate) if exact else walk_by_rule(modes, rule)
-        columns = _columns(excited)
+        # Forces (m, l + 3 k) of unit loads, drives, their rates and accelerations
+        columns = np.hstack([excited.loads, -excited.stiffness, -excited.damping, -excited.mass])
         rest = left_out(system, modes, columns) if self.static_correction else None
         rows, at_once = reactions(system), self.a0 == "equilibrium"
         forces = np.ascontiguousarray(modes.shapes.T @ columns)
-        projected = _projected(system, rows, modes)
+        # Reaction rows of K, C and M on the mode shapes, (k, r) each
+        free = system.free
+        K, C, M = (np.asarray(R[:, free] @ modes.shapes) for R in (rows.K, rows.C, rows.M))
+        projected = K, C, M
         return ModalStepper(system, rows, modes, excited, walk, forces, rest, projected, at_once)
-
-
-def _columns(excited: Excitation) -> Floats:
-    """Forces (m, l + 3 k) of unit loads, drives, their rates and accelerations."""
-    return np.hstack([excited.loads, -excited.stiffness, -excited.damping, -excited.mass])
 
 
 def left_out(system: System, modes: Modes, forces: Floats) -> Floats:
@@ -178,13 +182,6 @@ def left_out(system: System, modes: Modes, forces: Floats) -> Floats:
         return np.zeros_like(forces)
     kept = modes.shapes @ ((modes.shapes.T @ forces) / modes.omega[:, None] ** 2)
     return np.asarray(system.factor().solve(forces) - kept)
-
-
-def _projected(system: System, rows: Reactions, modes: Modes) -> tuple[Floats, Floats, Floats]:
-    """Reaction rows of K, C and M on the mode shapes, (k, r) each."""
-    free = system.free
-    K, C, M = (np.asarray(R[:, free] @ modes.shapes) for R in (rows.K, rows.C, rows.M))
-    return K, C, M
 
 
 @dataclass(frozen=True)
@@ -223,14 +220,24 @@ class ModalStepper(InertialStepper):
         last: ModalState = state.inner
         k, a, old = state.k + 1, last.a, last.signal
         moved = self.excitation.moved(k, inputs, last.inputs)
-        new = _signal(moved)
+        new = np.concatenate([moved.loads, moved.q, moved.rate, moved.acceleration])
         if k == 1 and self.equilibrium:
             old = old.copy()
             old[: len(moved.loads)] = moved.loads
             a = self.forces_on @ old
         q, v, a = self.walk.step(last.q, last.v, a, *self._ends(old, new))
         inner = ModalState(q, v, a, moved, new)
-        return State(k, inner, numbers=self._forces_of_drives(inner))
+        rows, (K, C, M) = self.reactions, self.projected
+        if not rows.names:
+            return State(k, inner, numbers={})
+        moves = self.system.moves
+        driven = rows.numbers(moves @ moved.q, moves @ moved.rate, moves @ moved.acceleration,
+                              moved.loads)  # fmt: skip
+        forces = K @ q + C @ v + M @ a
+        if self.left_out is not None:
+            forces = forces + rows.K[:, self.system.free] @ (self.left_out @ new)
+        shares = rows.named(forces)
+        return State(k, inner, numbers={name: driven[name] + shares[name] for name in driven})
 
     def _ends(self, old: Floats, new: Floats) -> tuple[Floats, Floats]:
         """Modal forces at both ends; for a rule the one force of its balance, given as new."""
@@ -250,22 +257,6 @@ class ModalStepper(InertialStepper):
         u = self.modes.shapes @ modal.q
         u = u if self.left_out is None else u + self.left_out @ modal.signal
         return self.nodal(u, modal.inputs.q)
-
-    def _forces_of_drives(self, modal: ModalState) -> Mapping[str, float]:
-        rows, (K, C, M), of = self.reactions, self.projected, modal.inputs
-        if not rows.names:
-            return {}
-        moves = self.system.moves
-        driven = rows.numbers(moves @ of.q, moves @ of.rate, moves @ of.acceleration, of.loads)
-        forces = K @ modal.q + C @ modal.v + M @ modal.a
-        if self.left_out is not None:
-            forces = forces + rows.K[:, self.system.free] @ (self.left_out @ modal.signal)
-        shares = rows.named(forces)
-        return {name: driven[name] + shares[name] for name in driven}
-
-
-def _signal(inputs: Inputs) -> Floats:
-    return np.concatenate([inputs.loads, inputs.q, inputs.rate, inputs.acceleration])
 
 
 def _of_modes(count: int) -> Callable[[float], Scheme]:

@@ -20,8 +20,14 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import DampingTerms, MassName, System
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, Rung, SwingingBody
-from validate.solve.dynamic.linear import Moving, MovingStepper, reactions
+from validate.solve.dynamic.linear import (
+    DriveRates,
+    Moving,
+    MovingStepper,
+    StartName,
+    excitation,
+    reactions,
+)
 from validate.solve.dynamic.newmark_rule import (
     Propagation,
     RuleName,
@@ -29,11 +35,20 @@ from validate.solve.dynamic.newmark_rule import (
     require_start,
     rule_of,
 )
-from validate.solve.excitation import DriveRates, StartName, excitation
 from validate.solve.explicit.linear import highest_frequency
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
-from validate.solve.stepping import LOOSE, Rates, Stepping, implicit_maps, newmark_maps
+from validate.solve.study_entries import (
+    LOOSE,
+    Asked,
+    Rates,
+    Rival,
+    Rung,
+    Stepping,
+    SwingingBody,
+    implicit_maps,
+    newmark_maps,
+)
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 # --- Paper 002's Newmark update as it is printed, and the step up to which it is stable.
@@ -181,29 +196,24 @@ class NewmarkStepper(MovingStepper):
         last: Moving = state.inner
         u, v, k = last.u, last.v, state.k + 1
         f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
-        solved = self._solved(u, self.propagation.history(u, v, a) + f)
+        b, solver = self.propagation.history(u, v, a) + f, self.propagation.solver
+        if isinstance(solver, Iterative):
+            solved = solver.solve_from(b, u)
+        else:
+            solved = Solved(solver.solve(b), 0, True)
         u_new = solved.x
         v_new, a_new = self.propagation.rates(u_new, u, v, a)
         if self.misprinted:
             u_new = u_new + self.propagation.rule.h * (v_new - v)
         numbers = self.forces(u_new, v_new, a_new, moved)
         new = Moving(u_new, v_new, a_new, moved)
-        return State(k, new, _failure(k, new, solved), solved.iterations, numbers)
-
-    def _solved(self, u: Floats, b: Floats) -> Solved:
-        solver = self.propagation.solver
-        if isinstance(solver, Iterative):
-            return solver.solve_from(b, u)
-        return Solved(solver.solve(b), 0, True)
-
-
-def _failure(k: int, new: Moving, solved: Solved) -> tuple[Ending, str] | None:
-    if not np.isfinite(new.a.sum()):
-        return "diverged", f"accelerations are not finite at step {k}"
-    if not solved.converged:
-        why = f"{solved.iterations} iterations leave the residual above the tolerance"
-        return "not_converged", f"step {k}: {why}"
-    return None
+        failure: tuple[Ending, str] | None = None
+        if not np.isfinite(new.a.sum()):
+            failure = "diverged", f"accelerations are not finite at step {k}"
+        elif not solved.converged:
+            why = f"{solved.iterations} iterations leave the residual above the tolerance"
+            failure = "not_converged", f"step {k}: {why}"
+        return State(k, new, failure, solved.iterations, numbers)
 
 
 def _with(**settings: Any) -> Callable[[float], Scheme]:

@@ -2,8 +2,9 @@
 
 M u'' + C u' + K (u - u_0) + sum of K_iso q_i = 0 and q_i' + q_i/tau_i = g_i u', with the tangent K
 at the equilibrium u_0 under the loads, and K_iso what the isochoric law's relaxing stress adds to
-it (`fem.laws.viscous`). On the lowest modes of K and M that is a linear system of first order,
-stepped by its matrix exponential: no step is too long. The body starts at rest and undeformed.
+it (`fem.laws.viscoelasticity`). On the lowest modes of K and M that is a linear system of first
+order, stepped by its matrix exponential: no step is too long. The body starts at rest and
+undeformed.
 
 Departures: everything of second order about u_0 is left out, so that a beam that swings by a tenth
 of its length shortens by too little; loads are constant from t = 0 on.
@@ -55,13 +56,24 @@ class ViscousModes:
         if scene.regions:
             raise SceneError("ViscousModes needs one material; use NewtonDynamics")
         start = perf_counter()
-        found = _vibrations(scene, inputs[0], self.modes)
+        bare = replace(scene, material=replace(scene.material, prony=Prony()))
+        key, last = tuple(inputs[0].tolist()), _Remembered.last
+        if last and last[0].mesh is bare.mesh and last[:3] == (bare, key, self.modes):
+            found: _Vibrations | Run = last[3]
+        else:
+            found = _about_equilibrium(bare, inputs[0], self.modes)
+            if isinstance(found, _Vibrations):
+                _Remembered.last = (bare, key, self.modes, found)
         if isinstance(found, Run):
             return found
         setup = perf_counter() - start
         q = _walked(found, scene.material.prony, t)
         u = found.equilibrium + np.einsum("ti,ind->tnd", q, found.shapes)
-        return _told(scene, t, inputs, u, setup)
+        traces = {"updates": Trace(np.zeros(len(t)), "1")} | given_traces(scene, inputs)
+        if scene.probes:
+            rows = probe_rows(scene.mesh, scene.probes)
+            traces |= probe_traces(scene, np.array([rows.apply(frame) for frame in u]))
+        return Run("", t, np.arange(len(t)), u, traces, Outcome("finished", len(t)), setup, None)
 
 
 @dataclass(frozen=True)
@@ -83,17 +95,6 @@ class _Remembered:
     body, and only this is the same in all of them."""
 
     last: tuple[Scene, tuple[float, ...], int, _Vibrations] | None = None
-
-
-def _vibrations(scene: Scene, loads: Floats, modes: int) -> _Vibrations | Run:
-    bare = replace(scene, material=replace(scene.material, prony=Prony()))
-    key, last = tuple(loads.tolist()), _Remembered.last
-    if last and last[0].mesh is bare.mesh and last[:3] == (bare, key, modes):
-        return last[3]
-    found = _about_equilibrium(bare, loads, modes)
-    if isinstance(found, _Vibrations):
-        _Remembered.last = (bare, key, modes, found)
-    return found
 
 
 def _about_equilibrium(scene: Scene, loads: Floats, modes: int) -> _Vibrations | Run:
@@ -144,11 +145,3 @@ def _walked(found: _Vibrations, prony: Prony, t: Floats) -> Floats:
         x = over[dt] @ x
         q[i] = x[:r]
     return q
-
-
-def _told(scene: Scene, t: Floats, inputs: Floats, u: Floats, setup: float) -> Run:
-    traces = {"updates": Trace(np.zeros(len(t)), "1")} | given_traces(scene, inputs)
-    if scene.probes:
-        rows = probe_rows(scene.mesh, scene.probes)
-        traces |= probe_traces(scene, np.array([rows.apply(frame) for frame in u]))
-    return Run("", t, np.arange(len(t)), u, traces, Outcome("finished", len(t)), setup, None)

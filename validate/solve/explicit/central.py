@@ -31,9 +31,8 @@ from validate.fem.large_strain.explicit import (
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.candidates import Asked, Rival, SwingingBody
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.stepping import TETS, Radii, Rates, Stepping
+from validate.solve.study_entries import TETS, Asked, Radii, Rates, Rival, Stepping, SwingingBody
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -128,7 +127,22 @@ class CentralDifference:
         body = ExplicitBody(system.scene, self.threads, self.precision)
         body.share(1)  # until a pilot has shown that more pay
         masses = system.masses[system.free]
-        rule = self._rule(system, beta)
+        alpha = np.zeros(len(system.moves))
+        if self.damping != "none":
+            alpha = lumped_damping(system) / system.masses
+        half, free = alpha * self.step / 2, np.zeros(len(alpha))
+        free[system.free] = 1.0
+        loaded = np.intersect1d(np.flatnonzero(system.loads.any(axis=1)), system.free)
+        rule = CentralRule(
+            self.step,
+            free * (1 - half) / (1 + half),
+            free * self.step**2 / system.masses / (1 + half),
+            beta / self.step,
+            system.held,
+            system.moves[system.held],
+            loaded,
+            system.loads[loaded],
+        )
         stepper = CentralStepper(
             self, system, body, rule, beta, system.held, plates, feels_loads, masses, past
         )
@@ -150,24 +164,6 @@ class CentralDifference:
                 f"lagged damping needs one value of stiffness damping, got {sorted(betas)} s"
             )
         return float(betas.pop())
-
-    def _rule(self, system: System, beta: float) -> CentralRule:
-        alpha = np.zeros(len(system.moves))
-        if self.damping != "none":
-            alpha = lumped_damping(system) / system.masses
-        half, free = alpha * self.step / 2, np.zeros(len(alpha))
-        free[system.free] = 1.0
-        loaded = np.intersect1d(np.flatnonzero(system.loads.any(axis=1)), system.free)
-        return CentralRule(
-            self.step,
-            free * (1 - half) / (1 + half),
-            free * self.step**2 / system.masses / (1 + half),
-            beta / self.step,
-            system.held,
-            system.moves[system.held],
-            loaded,
-            system.loads[loaded],
-        )
 
 
 @dataclass(frozen=True)
@@ -252,7 +248,15 @@ class CentralStepper:
                 f"the displacements are not finite after it; dt is {ratio:.3g} of the critical step"
             )
             return replace(state, failure=("diverged", words))
-        new = _worked(past, motion, inputs, work, taken)
+        total = past.work + work
+        new = replace(
+            past,
+            motion=motion,
+            inputs=inputs,
+            work=total,
+            taken=past.taken + taken,
+            most=max(past.most, abs(total)),
+        )
         numbers, failure = dict(state.numbers), None
         if k % self.settings.watch == 0 or k == 1:
             new, seen, failure = self._watched(new, k)
@@ -357,18 +361,6 @@ class CentralStepper:
         """Displacements (n, 3) m of all nodes."""
         u: Floats = state.inner.motion["u"]
         return u.reshape(-1, 3)
-
-
-def _worked(past: Past, motion: ExplicitMotion, inputs: Floats, more: float, taken: float) -> Past:
-    work = past.work + more
-    return replace(
-        past,
-        motion=motion,
-        inputs=inputs,
-        work=work,
-        taken=past.taken + taken,
-        most=max(past.most, abs(work)),
-    )
 
 
 def lumped_damping(system: System) -> Floats:

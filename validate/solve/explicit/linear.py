@@ -16,18 +16,30 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.linear_solvers.factor import factorise
 from validate.fem.system import DampingTerms, MassName, System, damping_of, mass_of
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, SwingingBody
-from validate.solve.dynamic.linear import Moving, MovingStepper, reactions
+from validate.solve.dynamic.linear import (
+    DriveRates,
+    Moving,
+    MovingStepper,
+    StartName,
+    excitation,
+    reactions,
+)
 from validate.solve.dynamic.newmark_rule import rule_of
-from validate.solve.excitation import DriveRates, StartName, excitation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import Diagonal, Solver
-from validate.solve.stepping import Stepping, UpdateName, explicit_maps
+from validate.solve.study_entries import (
+    Asked,
+    Rival,
+    Stepping,
+    SwingingBody,
+    UpdateName,
+    explicit_maps,
+)
 from validate.solve.types import Ending, State, Stepper
 
 # Displacements of so many times the body's size say that a linear run has left all bounds.
@@ -99,6 +111,13 @@ class ExplicitLinear:
         J = M if self.update == "lagged" else sparse.csr_array(M + self.dt / 2 * C)
         mesh = system.scene.mesh
         rule = rule_of("average", self.dt)
+        # A division where J is diagonal, else its factorisation
+        apart = J - sparse.diags_array(J.diagonal())
+        solver = (
+            Diagonal(1 / J.diagonal())
+            if apart.count_nonzero() == 0
+            else factorise(J, free // mesh.dimension, mesh.nodes)
+        )
         return ExplicitStepper(
             system,
             reactions(system, self.mass, terms),
@@ -106,18 +125,10 @@ class ExplicitLinear:
             self,
             C,
             K,
-            _solver(J, free // mesh.dimension, mesh.nodes),
+            solver,
             stable_step(system, self),
             float(np.ptp(mesh.nodes, axis=0).max()),
         )
-
-
-def _solver(J: sparse.csr_array, node: Ints, places: Floats) -> Solver:
-    """A division where J is diagonal, else its factorisation."""
-    apart = J - sparse.diags_array(J.diagonal())
-    if apart.count_nonzero() == 0:
-        return Diagonal(1 / J.diagonal())
-    return factorise(J, node, places)
 
 
 def stable_step(system: System, settings: ExplicitLinear) -> float:

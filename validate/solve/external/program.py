@@ -40,10 +40,6 @@ def _shipped(name: str, doc: str, *programs: str) -> Simulator:
     return Simulator(name, doc, f"python benchmarks/external/{name}_simulator.py", programs)
 
 
-def _faults(part: object) -> str:
-    return "" if isinstance(part, Simulator) else f"{part!r}: expected a Simulator"
-
-
 SIMULATORS: Registry[Simulator] = Registry(
     "simulators",
     (
@@ -55,7 +51,7 @@ SIMULATORS: Registry[Simulator] = Registry(
         _shipped("sofa", "SOFA", "runSofa"),
     ),
     lambda simulator: simulator.name,
-    _faults,
+    lambda part: "" if isinstance(part, Simulator) else f"{part!r}: expected a Simulator",
 )
 
 
@@ -145,12 +141,23 @@ def run_program(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
     what it writes outside of the folder is not watched.
     """
     apart = (sys.executable, "-I", str(Path(__file__).with_name("limits.py")))
+    # Home, temporary files and caches in the folder; one thread
+    places = {name: folder / ".home" / name.lower() for name in _CACHES}
+    places |= {"HOME": folder / ".home"} | dict.fromkeys(("TMPDIR", "TMP", "TEMP"), folder / ".tmp")
+    for place in places.values():
+        place.mkdir(parents=True, exist_ok=True)
+    surroundings = {
+        **os.environ,
+        **dict.fromkeys(_THREADS, "1"),
+        **{name: str(place) for name, place in places.items()},
+        "PWD": str(folder),
+    }
     start = time.monotonic()
     with (folder / _SAID).open("wb") as said:
         process = subprocess.Popen(
             [*apart, str(limits.memory), str(limits.output), _PEAK, *command, str(folder)],
             cwd=folder,
-            env=_surroundings(folder),
+            env=surroundings,
             stdin=subprocess.DEVNULL,
             stdout=said,
             stderr=subprocess.STDOUT,
@@ -162,8 +169,18 @@ def run_program(command: Sequence[str], folder: Path, limits: Limits) -> Ended:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
     seconds = time.monotonic() - start
-    why = why or _ending(process.returncode)
-    return Ended(seconds, why, _last_line(folder / _SAID), _peak(folder / _PEAK))
+    if not why:
+        code = process.returncode
+        if code >= 0:
+            why = f"ended with code {code}" if code else ""
+        elif -code == signal.SIGXFSZ:
+            why = "stopped at the limit of its output"
+        else:
+            why = f"stopped by signal {-code} ({signal.Signals(-code).name})"
+    # Its peak in bytes; 0 if the file is damaged, since the program can write it, too
+    text = _last_line(folder / _PEAK)
+    peak = int(text) if text.isdecimal() and len(text) < 16 else 0
+    return Ended(seconds, why, _last_line(folder / _SAID), peak)
 
 
 def _watched(pid: int, folder: Path, limits: Limits, start: float) -> str:
@@ -193,24 +210,6 @@ def size_of(folder: Path) -> int:
     return total
 
 
-def _ending(code: int) -> str:
-    if code >= 0:
-        return f"ended with code {code}" if code else ""
-    if -code == signal.SIGXFSZ:
-        return "stopped at the limit of its output"
-    return f"stopped by signal {-code} ({signal.Signals(-code).name})"
-
-
-def _surroundings(folder: Path) -> dict[str, str]:
-    """Home, temporary files and caches in the folder; one thread."""
-    places = {name: folder / ".home" / name.lower() for name in _CACHES}
-    places |= {"HOME": folder / ".home"} | dict.fromkeys(("TMPDIR", "TMP", "TEMP"), folder / ".tmp")
-    for place in places.values():
-        place.mkdir(parents=True, exist_ok=True)
-    own = {name: str(place) for name, place in places.items()}
-    return {**os.environ, **dict.fromkeys(_THREADS, "1"), **own, "PWD": str(folder)}
-
-
 def _last_line(path: Path) -> str:
     if path.is_symlink() or not path.is_file():
         return ""
@@ -218,12 +217,6 @@ def _last_line(path: Path) -> str:
         file.seek(max(0, path.stat().st_size - _LAST_WORDS))
         lines = file.read(_LAST_WORDS).decode("utf-8", "replace").splitlines()
     return next((plain(line) for line in reversed(lines) if line.strip()), "")
-
-
-def _peak(path: Path) -> int:
-    """Return the peak in bytes; 0 if the file is damaged, since the program can write it, too."""
-    text = _last_line(path)
-    return int(text) if text.isdecimal() and len(text) < 16 else 0
 
 
 def plain(text: str, most: int = 200) -> str:

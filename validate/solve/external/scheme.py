@@ -1,8 +1,11 @@
-"""External simulator as a scheme: writes a job, reads the answer, checks both."""
+"""External simulator as a scheme: writes a job, reads the answer, checks both.
+
+Release of a body in an external simulator: vibration by one job, final rest by another.
+"""
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import ClassVar, cast
 
@@ -15,8 +18,14 @@ from validate.fem.assembly.locate import probe_rows
 from validate.parameters import quantity
 from validate.scene.material import Prony
 from validate.scene.scene import Scene
-from validate.solve.external.answer import ExternalAnswer, NoAnswerError, read_answer
-from validate.solve.external.job import ExternalJob, write_job
+from validate.solve.dynamic.release import joined
+from validate.solve.external.exchange import (
+    ExternalAnswer,
+    ExternalJob,
+    NoAnswerError,
+    read_answer,
+    write_job,
+)
 from validate.solve.external.program import Ended, Limits, run_program, size_of, words
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.march import given_traces, probe_traces, step_times
@@ -143,31 +152,27 @@ class ExternalSimulator:
         try:
             return self._asked(scene if self.inertia else at_rest(scene), t, inputs)
         except (SceneError, UsageError) as error:
-            return _unasked(f"cannot run: {error}")
+            traces = {"updates": Trace(np.zeros(0), "1")}
+            none = np.zeros(0)
+            return Run("", none, none.astype(np.int64), np.zeros((0, 0, 3)), traces,
+                       Outcome("refused", 0, f"cannot run: {error}"), 0.0, None)  # fmt: skip
 
     def _asked(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
         require_handled(scene, self)
         command = words(self.command)
         with tempfile.TemporaryDirectory(prefix=_FOLDER, ignore_cleanup_errors=True) as place:
             folder = Path(place).resolve()
-            asked = plain_questions(t, inputs) if self.inertia else self._statics(t, inputs)
+            if self.inertia:
+                asked = plain_questions(t, inputs)
+            elif self.levels and inputs.shape[1] == 1:
+                asked = at_levels(t, inputs, self.levels)
+            else:
+                asked = changes(t, inputs)
             job = write_job(folder, scene, asked.t, asked.inputs, self.inertia, self.tolerance)
             most = size_of(folder) + int(self.output * 2**20)
             limits = Limits(self.seconds, int(self.memory * 2**20), most)
             ended = run_program(command, folder, limits)
             return asked.answered(run_of(folder, job, ended))
-
-    def _statics(self, t: Floats, inputs: Floats) -> Asked:
-        if self.levels and inputs.shape[1] == 1:
-            return at_levels(t, inputs, self.levels)
-        return changes(t, inputs)
-
-
-def _unasked(why: str) -> Run:
-    traces = {"updates": Trace(np.zeros(0), "1")}
-    none = np.zeros(0)
-    return Run("", none, none.astype(np.int64), np.zeros((0, 0, 3)), traces,
-               Outcome("refused", 0, why), 0.0, None)  # fmt: skip
 
 
 def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
@@ -180,7 +185,18 @@ def run_of(folder: Path, job: ExternalJob, ended: Ended) -> Run:
         return _none(job, "invalid", str(error), ended)
     if answer.state == "cannot_run":
         return _none(job, "refused", f"cannot run: {answer.why}", ended, answer.findings)
-    return _answered(job, answer, ended)
+    u, steps = answer.u, len(answer.u)
+    said = [f"external: {answer.name}", *answer.findings]
+    # Its own times are believed as far as they fit into the time that it took.
+    told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
+    if told > ended.seconds:
+        said.append(f"reports that it took {told:.3g} s, but ran for {ended.seconds:.3g} s")
+    return Run(
+        "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
+        Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
+        step_times(answer.step_s), seconds=answer.step_s, said=tuple(said),
+        memory=ended.memory,
+    )  # fmt: skip
 
 
 def _none(
@@ -191,16 +207,6 @@ def _none(
     at = np.zeros(0, dtype=np.int64)
     return Run("", job.times[:0], at, np.zeros((0, *shape)), traces, Outcome(state, 0, why),
                ended.seconds, None, said=said, memory=ended.memory)  # fmt: skip
-
-
-def _answered(job: ExternalJob, answer: ExternalAnswer, ended: Ended) -> Run:
-    u, steps = answer.u, len(answer.u)
-    said = (f"external: {answer.name}", *answer.findings, *_overdrawn(answer, ended))
-    return Run(
-        "", job.times[:steps], np.arange(steps), u, _traces(job, answer),
-        Outcome(cast(Ending, answer.state), steps, answer.why), answer.setup_s,
-        step_times(answer.step_s), seconds=answer.step_s, said=said, memory=ended.memory,
-    )  # fmt: skip
 
 
 def _traces(job: ExternalJob, answer: ExternalAnswer) -> dict[str, Trace]:
@@ -219,9 +225,19 @@ def _traces(job: ExternalJob, answer: ExternalAnswer) -> dict[str, Trace]:
     return traces
 
 
-def _overdrawn(answer: ExternalAnswer, ended: Ended) -> tuple[str, ...]:
-    """Its own times are believed as far as they fit into the time that it took."""
-    told = answer.setup_s + (0.0 if answer.step_s is None else float(answer.step_s.sum()))
-    if told <= ended.seconds:
-        return ()
-    return (f"reports that it took {told:.3g} s, but ran for {ended.seconds:.3g} s",)
+@dataclass(frozen=True)
+class ExternalLetGo(ExternalSimulator):
+    """Settings as of `LetGo`: even steps of time, then statics at the last instant."""
+
+    def solve(self, scene: Scene, t: Floats, inputs: Floats) -> Run:
+        """Return the run under inputs (nt, k) at t (nt,) s; refused as by `ExternalSimulator`."""
+        plain = ExternalSimulator(
+            **{f.name: getattr(self, f.name) for f in fields(ExternalSimulator)}
+        )
+        moving = replace(plain, inertia=True).solve(scene, t[:-1], inputs[:-1])
+        if not moving.finished:
+            return moving
+        still = replace(plain, inertia=False).solve(at_rest(scene), t[-1:], inputs[-1:])
+        both = joined(moving, still, t)
+        said = dict.fromkeys((*both.said, *(f"at rest: {w}" for w in still.said[1:])))
+        return replace(both, said=tuple(said), memory=max(moving.memory, still.memory))

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh

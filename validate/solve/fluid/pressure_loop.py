@@ -23,7 +23,6 @@ from validate.errors import SceneError
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.fluid.cavities import FLUID, Settling
 from validate.solve.fluid.pressure_curve import (
     RATIOS,
@@ -35,6 +34,7 @@ from validate.solve.fluid.pressure_curve import (
 )
 from validate.solve.handles import Handles, require_handled
 from validate.solve.static.quasi_static import condensed
+from validate.solve.study_entries import Asked, Rival, StillBody
 from validate.solve.types import State, Stepper
 
 UpdateName = Literal["proportional", "retuned", "piecewise", "secant", "newton", "golden"]
@@ -120,7 +120,9 @@ class LoopStepper(Settling):
             return self._searched(state, z)
         volumes, V0, last = self.responses.volumes, self.responses.rest_volumes, np.inf
         before: tuple[Floats, Floats] | None = None
-        gains = self._retuned(z) if self.settings.update == "retuned" else self.gains
+        gains = self.gains
+        if self.settings.update == "retuned":  # the line of each cavity's curve with these drives
+            gains = np.diag([tuned_gain(self.responses, i, z) for i in range(len(self.gains))])
         for updates in range(self.settings.max_updates + 1):
             ratios = (volumes @ z @ z @ z) / V0
             error = 1 - ratios
@@ -145,30 +147,18 @@ class LoopStepper(Settling):
             case "newton":
                 return np.asarray(np.linalg.solve(slopes(self.responses, z), error))
             case "piecewise":
-                return np.array([self._chord(float(error[0]))])
+                # Pa between V/V0 = 1 - error and 1 on the cavity's own curve, in pieces of 1 %
+                reached = float(np.clip(1 - error[0], RATIOS[0], RATIOS[-1]))
+                ends = np.interp([reached, 1.0], RATIOS, self.curve)
+                beyond = float(self.gains[0, 0]) * (float(error[0]) - (1 - reached))
+                return np.array([float(ends[1] - ends[0]) + beyond])
             case "secant" if before is not None:
-                return self._secant(z, error, gains, before)
+                # Each cavity by the slope it has just shown, by the gain where it showed none
+                moved, gone = z[self.responses.drives + 1 :] - before[0], before[1] - error
+                seen = np.abs(gone) > _FLAT
+                found = np.divide(moved, gone, out=np.diag(gains).copy(), where=seen)
+                return np.asarray(found * error)
         return np.asarray(gains @ error)
-
-    def _secant(
-        self, z: Floats, error: Floats, gains: Floats, before: tuple[Floats, Floats]
-    ) -> Floats:
-        """Each cavity by the slope it has just shown, by the gain where it showed none."""
-        moved, gone = z[self.responses.drives + 1 :] - before[0], before[1] - error
-        seen = np.abs(gone) > _FLAT
-        found = np.divide(moved, gone, out=np.diag(gains).copy(), where=seen)
-        return np.asarray(found * error)
-
-    def _chord(self, error: float) -> float:
-        """Pa between V/V0 = 1 - error and 1 on the curve of the cavity alone, in pieces of 1 %."""
-        reached = float(np.clip(1 - error, RATIOS[0], RATIOS[-1]))
-        along = float(np.interp(1.0, RATIOS, self.curve) - np.interp(reached, RATIOS, self.curve))
-        return along + float(self.gains[0, 0]) * (error - (1 - reached))
-
-    def _retuned(self, z: Floats) -> Floats:
-        """The line of each cavity's curve with the drives as they are."""
-        count = len(self.gains)
-        return np.diag([tuned_gain(self.responses, i, z) for i in range(count)])
 
     def _searched(self, state: State, z: Floats) -> State:
         """Golden section on |1 - V/V0| between the pressures that the gain takes for +-30 %."""

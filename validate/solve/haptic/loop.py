@@ -1,4 +1,4 @@
-"""Haptic loop: a probe at haptic rate on a slower simulation (paper 003, section 3.5).
+"""Haptic loop: a spring probe at haptic rate on a slower simulation (paper 003, section 3.5).
 
 The body is St. Venant-Kirchhoff (or another law at large strain) by central difference, with as
 many substeps as its critical step needs. It reads the probe at every n-th tick and answers by a
@@ -10,6 +10,12 @@ Departures: the paper's own forces are those of displaced nodes (eq 32) and its 
 reference; here the hand feels the spring of a probe (virtual coupling), and `extrapolates` "place"
 predicts where that spring hangs, not its force. A force begins and ends with its contact: what was
 answered before does not count, and no hand is pulled harder than the body grips.
+
+Body at large strain under a spring probe, stepped explicitly between readings. The spring and the
+nodes that share it enter the compiled step of `CentralDifference` itself: as a stiffness of the
+body, and as a load that follows the probe. So it acts at every substep, on a probe that goes
+straight from the last reading to this one, and its energy is in the balance that the scheme
+watches. Hold and release are decided at readings.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,20 +26,127 @@ from threading import get_native_id
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
+from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError, UsageError
 from validate.fem.critical import critical_step
+from validate.fem.large_strain.explicit import ExplicitMotion
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
-from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping
+from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping, Past
 from validate.solve.handles import LARGE, Handles, require_handled
-from validate.solve.haptic.spring_probe import SpringProbe
-from validate.solve.haptic.touched_body import Read, TouchableBody, TouchedBody
+from validate.solve.haptic.spring_probe import Hold, SpringProbe
 from validate.solve.types import State, Stepper
+
+
+@dataclass(frozen=True)
+class TouchableBody:
+    """All nodes of a system's mesh; see `Touchable`."""
+
+    system: System
+    surface: Ints
+
+    @property
+    def places(self) -> Floats:
+        return self.system.scene.mesh.nodes
+
+    @property
+    def at(self) -> Ints:
+        return np.arange(self.places.size)
+
+    def spread(self, u: Floats) -> Floats:
+        return u.reshape(self.places.shape)
+
+
+@dataclass(frozen=True)
+class Read:
+    """The body when the probe was read: the scheme's own state, the hold, the force (d,) N on the
+    hand and the place (d,) m at which the probe would feel nothing."""
+
+    state: State
+    held: Hold | None
+    force: Floats
+    place: Floats
+
+
+@dataclass(frozen=True)
+class TouchedBody:
+    """`untouched` steps the body while nothing holds it; what steps it while `kept` nodes share the
+    spring is made once."""
+
+    untouched: CentralStepper
+    probe: SpringProbe
+    kept: dict[tuple[int, ...], CentralStepper]
+
+    def rest(self, tip: Floats) -> Read:
+        """Return the body at rest and the probe at `tip` (d,) m."""
+        state = self.untouched.rest()
+        past: Past = replace(state.inner, inputs=np.zeros(len(tip)))
+        return self._read(replace(state, inner=past), None, tip)
+
+    def to(self, last: Read, tip: Floats) -> Read:
+        """One reading further, the probe gone straight to `tip` (d,) m."""
+        inputs = np.zeros(len(tip)) if last.held is None else self._aim(last.held, tip)
+        return self._read(self._holding(last.held).step(last.state, inputs), last.held, tip)
+
+    def _read(self, state: State, held: Hold | None, tip: Floats) -> Read:
+        if state.failure:
+            return Read(state, held, np.zeros(len(tip)), tip)
+        u = state.inner.motion["u"]
+        new = self.probe.follow(held, tip, u)
+        if new is not held:
+            state = replace(state, inner=self._handed_over(state.inner, held, new, tip))
+        place = tip if new is None else self.probe.slack_at(new, u)
+        return Read(state, new, -self.probe.force(new, tip, u), place)
+
+    def _holding(self, held: Hold | None) -> CentralStepper:
+        """The body's stepper with the spring in it, whose inputs are the `_aim` of the probe."""
+        if held is None:
+            return self.untouched
+        if held.pad not in self.kept:
+            free, d = self.untouched, len(self.probe.axis)
+            pad = np.repeat(d * np.array(held.pad), d).reshape(-1, d) + np.arange(d)
+            pulls = np.tile(self.probe.spring / len(pad) * np.eye(d), (len(pad), 1))
+            rule = replace(free.rule, loaded=pad.ravel(), loads=pulls)
+            self.kept[held.pad] = replace(
+                free, body=free.body.sprung(self._stiffness(held)), rule=rule
+            )
+        return self.kept[held.pad]
+
+    def _aim(self, held: Hold, tip: Floats) -> Floats:
+        """The mean displacement (d,) m of the pad at which the spring would be slack."""
+        return np.asarray(tip - self.probe.body.places[held.node] - held.slack)
+
+    def _stiffness(self, held: Hold | None) -> sparse.csr_array:
+        """(N, N) N/m of the spring at the mean of the pad."""
+        N, d = self.probe.body.places.size, len(self.probe.axis)
+        if held is None:
+            return sparse.csr_array((N, N))
+        rows = np.repeat(np.arange(d), len(held.pad))
+        columns = (d * np.array(held.pad) + np.arange(d)[:, None]).ravel()
+        share = np.full(len(rows), 1 / len(held.pad))
+        mean = sparse.csr_array((share, (rows, columns)), shape=(d, N))
+        return sparse.csr_array(self.probe.spring * (mean.T @ mean))
+
+    def _handed_over(self, past: Past, old: Hold | None, new: Hold | None, tip: Floats) -> Past:
+        """The state as the new hold takes it on: forces and stored energy are those of its spring.
+
+        The energy that the spring has in the body's balance jumps with the hold; so does the work.
+        """
+        change = sparse.csr_array(self._stiffness(new) - self._stiffness(old))
+        u, rows = past.motion["u"], past.motion.rows.copy()
+        rows[2] += change @ u
+        rows[3] += change @ (u - past.motion["d"])
+        rows.setflags(write=False)
+        inputs = np.zeros(len(tip)) if new is None else self._aim(new, tip)
+        work = past.work + float(u @ (change @ u)) / 2
+        motion = ExplicitMotion(rows, past.motion.memory)
+        return replace(past, motion=motion, inputs=inputs, work=work)
+
 
 # --- A force between the answers of a slower simulation: the polynomial through the last of
 # them.
@@ -54,16 +167,12 @@ def answers_of(name: Extrapolation) -> int:
 def extrapolated(t: Floats, y: Floats, at: float) -> Floats:
     """Return the polynomial through y (m, d) at distinct times t (m,) s, at the time `at` s:
     (d,)."""
-    return np.asarray(_weights(t, at) @ y)
-
-
-def _weights(t: Floats, at: float) -> Floats:
-    """Lagrange's, (m,); they add up to one."""
+    # Lagrange's, (m,); they add up to one
     apart = t[:, None] - t
     np.fill_diagonal(apart, 1.0)
     beyond = np.tile(at - t, (len(t), 1))
     np.fill_diagonal(beyond, 1.0)
-    return np.asarray((beyond / apart).prod(axis=1))
+    return np.asarray((beyond / apart).prod(axis=1) @ y)
 
 
 def between_answers(y: Floats, every: int, late: int, name: Extrapolation) -> Floats:
@@ -157,8 +266,21 @@ class HapticLoop:
                 "needs one probe and no drive"
             )
         tool, bare = scene.tools[0], replace(system, scene=replace(scene, tools=()))
-        touchable = TouchableBody(bare, _free_surface(system, tool))
-        substeps = self._substeps(bare, touchable)
+        # Nodes that may be touched and of which nothing is held
+        mesh = system.scene.mesh
+        nodes, held = nodes_of(mesh, tool.facets), np.unique(system.held // mesh.dimension)
+        free = np.setdiff1d(nodes, held)
+        if not len(free):
+            raise SceneError(
+                f"probe '{tool.name}': all {len(nodes)} nodes that it may touch are held; choose a "
+                "free face"
+            )
+        touchable = TouchableBody(bare, free)
+        # Explicit steps in a tick: stable with the spring on any one node, by Weyl's bound
+        found = critical_step(bare).lanczos
+        least = float(bare.masses.reshape(touchable.places.shape)[touchable.surface].min())
+        limit = 2 / np.sqrt((2 / found) ** 2 + self.spring / least)
+        substeps = int(np.ceil(self.dt / ((1 - self.margin) * limit)))
         rule = CentralDifference(
             self.every * self.dt, self.every * substeps, self.damping, margin=0.0, watch=self.watch
         )
@@ -168,26 +290,6 @@ class HapticLoop:
                             self.grip, self.slides)  # fmt: skip
         jobs = Background() if self.background else None
         return HapticStepper(self, system, tool, TouchedBody(body, probe, {}), substeps, jobs)
-
-    def _substeps(self, system: System, body: TouchableBody) -> int:
-        """Explicit steps in a tick: stable with the spring on any one node, by Weyl's bound."""
-        found = critical_step(system).lanczos
-        least = float(system.masses.reshape(body.places.shape)[body.surface].min())
-        limit = 2 / np.sqrt((2 / found) ** 2 + self.spring / least)
-        return int(np.ceil(self.dt / ((1 - self.margin) * limit)))
-
-
-def _free_surface(system: System, tool: Needle) -> Ints:
-    """Nodes that may be touched and of which nothing is held."""
-    mesh = system.scene.mesh
-    nodes, held = nodes_of(mesh, tool.facets), np.unique(system.held // mesh.dimension)
-    free = np.setdiff1d(nodes, held)
-    if not len(free):
-        raise SceneError(
-            f"probe '{tool.name}': all {len(nodes)} nodes that it may touch are held; choose a "
-            "free face"
-        )
-    return free
 
 
 @dataclass(frozen=True)
@@ -320,10 +422,7 @@ class HapticStepper:
             force = self.settings.spring * (extrapolated(times, places, k) - tip)
         else:
             force = extrapolated(times, np.array([a.force for a in tick.answers]), k)
-        return self._let_go(force)
-
-    def _let_go(self, force: Floats) -> Floats:
-        """Without what would pull the hand into the body harder than the body grips."""
+        # Without what would pull the hand into the body harder than the body grips
         if self.settings.grip is None:
             return force
         axis = self.body.probe.axis

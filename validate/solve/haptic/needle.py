@@ -23,7 +23,14 @@ from validate.errors import SceneError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.cavity import volume_form
 from validate.fem.kernels.jit_cache import compiled
-from validate.fem.linear_solvers.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import (
+    Condensed,
+    Imposed,
+    WorkingSet,
+    along,
+    between,
+    condense,
+)
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.places import facets_of
@@ -33,7 +40,6 @@ from validate.scene.tool import Needle
 from validate.solve.fluid.pressure_curve import RATIOS, Root, cubic, pressure_of, root_of
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.rates import DEVICE_HZ
-from validate.solve.haptic.working_set import Imposed, WorkingSet, along, between
 from validate.solve.types import Ending, State, Stepper
 
 # --- Where the path of a tip enters a surface: the first facet that it crosses from outside.
@@ -73,16 +79,12 @@ class Surface:
             return None
         nodes = self.facets[index]
         shares = simplex_values(1 if len(nodes) == d else 2, L[None])[0]
-        return Entry(nodes, np.asarray(shares), _normal(x[corners[index]]))
-
-
-def _normal(x: Floats) -> Floats:
-    if len(x) == 2:
-        along = x[1] - x[0]
-        normal = np.array([along[1], -along[0]])
-    else:
-        normal = np.cross(x[1] - x[0], x[2] - x[0])
-    return np.asarray(normal / np.linalg.norm(normal))
+        x0, *others = x[corners[index]]
+        if d == 2:
+            normal = np.array([others[0][1] - x0[1], x0[0] - others[0][0]])
+        else:
+            normal = np.cross(others[0] - x0, others[1] - x0)
+        return Entry(nodes, np.asarray(shares), np.asarray(normal / np.linalg.norm(normal)))
 
 
 @compiled()
@@ -199,7 +201,12 @@ class NeedleLoop:
                 "accepts no drives; remove them"
             )
         tool = scene.tools[0]
-        _require_outside(scene, tool)
+        rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
+        if float(rows.outside[0]) < _ON:
+            at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
+            raise SceneError(
+                f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out"
+            )
         facets = facets_of(scene.mesh, tool.facets)
         small = condense(system, np.unique(facets))
         numbers = np.searchsorted(small.nodes, facets)
@@ -210,19 +217,11 @@ class NeedleLoop:
                 f"needle '{tool.name}': all {len(facets)} facets that it may touch are held or "
                 "driven; choose a free face"
             )
-        small.prefetch(_unknowns_of(np.unique(touchable), scene.mesh.dimension))
+        unknowns_of = (
+            np.unique(touchable)[:, None] * scene.mesh.dimension + np.arange(scene.mesh.dimension)
+        ).ravel()
+        small.prefetch(unknowns_of)
         return NeedleStepper(self, small, tool, Surface(touchable, scene.mesh.dimension))
-
-
-def _require_outside(scene: Scene, tool: Needle) -> None:
-    rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
-    if float(rows.outside[0]) < _ON:
-        at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
-        raise SceneError(f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out")
-
-
-def _unknowns_of(nodes: Ints, d: int) -> Ints:
-    return (nodes[:, None] * d + np.arange(d)).ravel()
 
 
 @dataclass(frozen=True)
@@ -329,7 +328,11 @@ class NeedleStepper:
         tip = np.array(self.tool.tip) + inputs
         touch = last.touch or self._touched(last, tip)
         tick, root = self._solved(touch, tip, last.P)
-        if touch is not None and self._lets_go(touch, tick):
+        # A body that would have to be pulled harder than it grips lets go.
+        grip, pulled = self.settings.grip, 0.0
+        if touch is not None and grip is not None:
+            pulled = float(tick.forces @ touch.axes @ touch.entry.normal)
+        if touch is not None and grip is not None and pulled > grip + _ROUNDING:
             tick, root = self._solved(None, tip, last.P)
             tick = replace(tick, left=touch)
         elif touch is None and last.left is not None and _inside(last.left, tip):
@@ -351,7 +354,11 @@ class NeedleStepper:
 
     def hold(self, entry: Entry, tip: Floats) -> Touch:
         """Return the contact of a tip at `tip` (d,) m with a point of the surface."""
-        axes = _local_axes(self.tool, self.settings.imposes)
+        # (c, d): the needle's axis, then unit vectors across it
+        axes = np.array(self.tool.axis)[None]
+        if self.settings.imposes != "axis":
+            basis = np.linalg.svd(axes)[2]
+            axes = np.asarray(basis * np.sign(basis[0] @ axes[0]))
         node = int(entry.nodes[int(np.argmax(entry.shares))])
         imposed = tuple(
             along(node, a) if self.settings.at == "node" else between(entry.nodes, entry.shares, a)
@@ -405,12 +412,6 @@ class NeedleStepper:
             P += self.gain * error
         lost = not abs(error) < _RUNAWAY
         return Root(P, updates, V, f"volume error {error:.1e}, gain too large" if lost else "")
-
-    def _lets_go(self, touch: Touch, tick: Tick) -> bool:
-        """Whether the body would have to be pulled harder than it grips."""
-        grip = self.settings.grip
-        pulled = float(tick.forces @ touch.axes @ touch.entry.normal)
-        return grip is not None and pulled > grip + _ROUNDING
 
     def hand(self, tick: Tick) -> Floats:
         """Return the force (d,) N on the hand, before it is limited."""
@@ -469,12 +470,3 @@ class NeedleStepper:
 def _inside(touch: Touch, tip: Floats) -> bool:
     """Whether a tip that was let go has not yet gone back out of the surface there."""
     return bool((tip - touch.surface) @ touch.entry.normal < 0)
-
-
-def _local_axes(tool: Needle, imposes: Literal["all", "axis"]) -> Floats:
-    """(c, d): the needle's axis, then unit vectors across it."""
-    axis = np.array(tool.axis)
-    if imposes == "axis":
-        return axis[None]
-    basis = np.linalg.svd(axis[None])[2]
-    return np.asarray(basis * np.sign(basis[0] @ axis))

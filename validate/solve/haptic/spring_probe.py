@@ -52,10 +52,22 @@ class SpringProbe:
     def follow(self, held: Hold | None, tip: Floats, u: Floats) -> Hold | None:
         """Return the hold at this tick: taken, moved, let go or as it was."""
         if held is None:
-            return self._taken(tip, u)
-        if self.grip is not None and self._pulled(held, tip, u) > self.grip:
+            node, away, places = self._nearest(tip, u)
+            if away > self.reach:
+                return None
+            pad = self._pad(node)
+            return Hold(node, pad, tip - self._hung(node, pad, places))
+        # How hard the probe pulls back out, N
+        if self.grip is not None and float(self.force(held, tip, u) @ -self.axis) > self.grip:
             return None
-        return self._moved(held, tip, u) if self.slides else held
+        if not self.slides:
+            return held
+        # The hold at the nearest node, with the force that the spring has
+        node, _, places = self._nearest(tip, u)
+        if node == held.node or not self.spring:
+            return held
+        stretch, pad = self.force(held, tip, u) / self.spring, self._pad(node)
+        return Hold(node, pad, tip - self._hung(node, pad, places) - stretch)
 
     def _nearest(self, tip: Floats, u: Floats) -> tuple[int, float, Floats]:
         """The surface node nearest to the tip, how far it is, and all nodes' places."""
@@ -63,13 +75,6 @@ class SpringProbe:
         away = np.linalg.norm(places[self.body.surface] - tip, axis=1)
         i = int(np.argmin(away))
         return int(self.body.surface[i]), float(away[i]), places
-
-    def _taken(self, tip: Floats, u: Floats) -> Hold | None:
-        node, away, places = self._nearest(tip, u)
-        if away > self.reach:
-            return None
-        pad = self._pad(node)
-        return Hold(node, pad, tip - self._hung(node, pad, places))
 
     def _pad(self, node: int) -> tuple[int, ...]:
         rest = self.body.places
@@ -80,14 +85,6 @@ class SpringProbe:
         """Where the spring hangs (d,) m: the node, moved as the mean of its pad."""
         rest = self.body.places
         return np.asarray(rest[node] + (places - rest)[list(pad)].mean(axis=0))
-
-    def _moved(self, held: Hold, tip: Floats, u: Floats) -> Hold:
-        """The hold at the nearest node, with the force that the spring has."""
-        node, _, places = self._nearest(tip, u)
-        if node == held.node or not self.spring:
-            return held
-        stretch, pad = self.force(held, tip, u) / self.spring, self._pad(node)
-        return Hold(node, pad, tip - self._hung(node, pad, places) - stretch)
 
     def slack_at(self, held: Hold, u: Floats) -> Floats:
         """Where the probe (d,) m would feel nothing."""
@@ -111,7 +108,3 @@ class SpringProbe:
         f = np.zeros(self.body.places.shape)
         f[list(held.pad)] = force / len(held.pad)
         return np.asarray(f.ravel()[self.body.at])
-
-    def _pulled(self, held: Hold, tip: Floats, u: Floats) -> float:
-        """How hard the probe pulls back out, N."""
-        return float(self.force(held, tip, u) @ -self.axis)

@@ -2,7 +2,7 @@
 
 Displacements are sums of a few Krylov vectors, K^-1 f, K^-1 M K^-1 f, ... of a unit force at the
 contact in every direction; the first of them have its statics exactly. Steps are those of eq 3 of
-paper 004 (`solve.regions.solvers`), as the whole solve takes them, so that nothing but the
+paper 004 (`solve.regions.primary`), as the whole solve takes them, so that nothing but the
 reduction lies between the two.
 
 Departures: none of the paper's, which names no reduced model. It holds for a linear body whose
@@ -18,14 +18,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.linear_solvers.factor import Factor, factorise
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
-from validate.solve.haptic.spring_probe import Hold, SpringProbe
+from validate.solve.haptic.spring_probe import SpringProbe
 from validate.solve.regions.body import RegionBody, require_one_probe
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import State, Stepper
@@ -143,23 +142,21 @@ class KrylovStepper:
         held = self.probe.follow(None, tip, self.body.still)
         if held is None:
             return None
-        model = self._model(held)
+        if held.pad not in self.kept:
+            h, body = self.settings.dt, self.body.body
+            unit = np.stack(
+                [self.probe.shared(held, e) for e in np.eye(len(self.tool.tip))], axis=1
+            )
+            V = krylov(self.factor, body.m, unit, self.settings.vectors)
+            K, M, C = V.T @ (body.K @ V), V.T @ (body.m[:, None] * V), V.T @ (body.c[:, None] * V)
+            solve = np.linalg.inv(M / h**2 + C / (2 * h) + K)
+            b = V.T @ unit
+            self.kept[held.pad] = Reduced(
+                V, solve @ (2 * M / h**2), solve @ (C / (2 * h) - M / h**2), solve @ b, b.T
+            )
+        model = self.kept[held.pad]
         zero = np.zeros(len(model.now))
         return ReducedTick(model, self.body.body.places[held.node] + held.slack, zero, zero)
-
-    def _model(self, held: Hold) -> Reduced:
-        if held.pad not in self.kept:
-            self.kept[held.pad] = self._reduced(held)
-        return self.kept[held.pad]
-
-    def _reduced(self, held: Hold) -> Reduced:
-        h, body = self.settings.dt, self.body.body
-        unit = np.stack([self.probe.shared(held, e) for e in np.eye(len(self.tool.tip))], axis=1)
-        V = krylov(self.factor, body.m, unit, self.settings.vectors)
-        K, M, C = V.T @ (body.K @ V), V.T @ (body.m[:, None] * V), V.T @ (body.c[:, None] * V)
-        solve = np.linalg.inv(M / h**2 + C / (2 * h) + K)
-        b = V.T @ unit
-        return Reduced(V, solve @ (2 * M / h**2), solve @ (C / (2 * h) - M / h**2), solve @ b, b.T)
 
     def _told(self, k: int, tick: ReducedTick | None, hand: Floats) -> State:
         size = 0 if tick is None else len(tick.q)

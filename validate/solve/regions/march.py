@@ -21,9 +21,9 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.solve.regions.primary import PrimarySolver
-from validate.solve.regions.solvers import (
+from validate.solve.regions.primary import (
     EXPLICIT,
+    PrimarySolver,
     RegionMatrices,
     RegionSolver,
     SolverName,
@@ -106,32 +106,28 @@ class Coupled:
         """Return the next tick under forces f (m,) N."""
         k, pieces, visible = last.k + 1, list(last.pieces), last.visible.copy()
         for zone, piece in zip(self.zones[1:], pieces[1:], strict=True):
-            visible[zone.own] = self._shown(zone, piece, zone.share(k))
+            u = piece.u[zone.shown]
+            visible[zone.own] = (
+                piece.start + zone.share(k) * (u - piece.start) if self.border == "delayed" else u
+            )
         due = tuple(i for i, zone in enumerate(self.zones) if k % zone.ratio == 0)
         if self.border == "joint" and len(due) > 1:
             self._solve_jointly(due, pieces, visible, f)
         else:
             for i in due:
-                self._solve(i, last, pieces, visible, f)
+                zone, piece = self.zones[i], pieces[i]
+                seen = piece.seen if zone.name in EXPLICIT else visible
+                forces = f[zone.wide] - zone.outside @ seen
+                if isinstance(zone.solver, PrimarySolver):
+                    new, memory = zone.solver.walk(piece.u, piece.before, forces, piece.memory)
+                    pieces[i] = replace(piece, memory=memory)
+                else:
+                    new = zone.solver.next(piece.u, piece.before, forces)
+                self._take(i, new, pieces, visible)
         for i in due:
             if self.zones[i].name in EXPLICIT:
                 pieces[i] = replace(pieces[i], seen=visible)
         return Motion(k, tuple(pieces), visible)
-
-    def _shown(self, zone: Zone, piece: Piece, share: float) -> Floats:
-        u = piece.u[zone.shown]
-        return piece.start + share * (u - piece.start) if self.border == "delayed" else u
-
-    def _solve(self, i: int, last: Motion, pieces: list[Piece], visible: Floats, f: Floats) -> None:
-        zone, piece = self.zones[i], pieces[i]
-        seen = piece.seen if zone.name in EXPLICIT else visible
-        forces = f[zone.wide] - zone.outside @ seen
-        if isinstance(zone.solver, PrimarySolver):
-            new, memory = zone.solver.walk(piece.u, piece.before, forces, piece.memory)
-            pieces[i] = replace(piece, memory=memory)
-        else:
-            new = zone.solver.next(piece.u, piece.before, forces)
-        self._take(i, new, pieces, visible)
 
     def _take(self, i: int, new: Floats, pieces: list[Piece], visible: Floats) -> None:
         """The region's solution becomes its piece, and is shown where the border says so."""
@@ -145,7 +141,14 @@ class Coupled:
     ) -> None:
         """All regions that are due as one system, each unknown with its own period."""
         if due not in self.joints:
-            self.joints[due] = self._joint(due)
+            zones = [self.zones[i] for i in due]
+            at = np.concatenate([z.wide for z in zones])
+            periods = [
+                np.full(len(z.wide), np.inf if z.name == "static" else z.ratio * self.dt)
+                for z in zones
+            ]
+            joint = semi_implicit(self.body, at, np.concatenate(periods))
+            self.joints[due] = at, joint, _outside(self.body.K, at)
         at, solver, outside = self.joints[due]
         u = np.concatenate([pieces[i].u for i in due])
         before = np.concatenate([pieces[i].before for i in due])
@@ -153,15 +156,6 @@ class Coupled:
         ends = np.cumsum([len(self.zones[i].wide) for i in due])
         for i, part in zip(due, np.split(new, ends[:-1]), strict=True):
             self._take(i, part, pieces, visible)
-
-    def _joint(self, due: tuple[int, ...]) -> tuple[Ints, RegionSolver, sparse.csr_array]:
-        zones = [self.zones[i] for i in due]
-        at = np.concatenate([z.wide for z in zones])
-        periods = [
-            np.full(len(z.wide), np.inf if z.name == "static" else z.ratio * self.dt) for z in zones
-        ]
-        solver = semi_implicit(self.body, at, np.concatenate(periods))
-        return at, solver, _outside(self.body.K, at)
 
 
 def zone_of(
@@ -193,21 +187,18 @@ def carried(old: Coupled, motion: Motion, new: Coupled) -> Motion:
     for zone, piece in zip(old.zones, motion.pieces, strict=True):
         rate = (piece.u - piece.before)[zone.shown] / zone.ratio
         speed[zone.own] = rate  # m a tick
-    pieces = tuple(_carried(new, i, motion, speed, old) for i in range(len(new.zones)))
-    return Motion(motion.k, pieces, motion.visible)
-
-
-def _carried(new: Coupled, i: int, motion: Motion, speed: Floats, old: Coupled) -> Piece:
-    zone = new.zones[i]
-    u, start = motion.visible[zone.wide], motion.visible[zone.own]
-    before = u - zone.ratio * speed[zone.wide]
-    if i < len(old.zones) and old.zones[i].ratio == zone.ratio:
-        kept = np.isin(zone.wide, old.zones[i].wide)
-        from_ = np.searchsorted(old.zones[i].wide, zone.wide[kept])
-        u[kept], before[kept] = motion.pieces[i].u[from_], motion.pieces[i].before[from_]
-        same = np.isin(zone.own, old.zones[i].own)
-        start[same] = motion.pieces[i].start[np.searchsorted(old.zones[i].own, zone.own[same])]
-    return Piece(u, before, start, motion.visible, zone.memory)
+    pieces = []
+    for i, zone in enumerate(new.zones):
+        u, start = motion.visible[zone.wide], motion.visible[zone.own]
+        before = u - zone.ratio * speed[zone.wide]
+        if i < len(old.zones) and old.zones[i].ratio == zone.ratio:
+            kept = np.isin(zone.wide, old.zones[i].wide)
+            from_ = np.searchsorted(old.zones[i].wide, zone.wide[kept])
+            u[kept], before[kept] = motion.pieces[i].u[from_], motion.pieces[i].before[from_]
+            same = np.isin(zone.own, old.zones[i].own)
+            start[same] = motion.pieces[i].start[np.searchsorted(old.zones[i].own, zone.own[same])]
+        pieces.append(Piece(u, before, start, motion.visible, zone.memory))
+    return Motion(motion.k, tuple(pieces), motion.visible)
 
 
 # --- stability ------------------------------------------------------------------------------------

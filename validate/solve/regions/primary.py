@@ -1,34 +1,150 @@
-"""Primary region with a law of its own: large strain or viscoelastic.
+"""Solvers of a region, and the primary region with a law of its own (paper 004).
 
 What paper 004 names as future work. The body's own linear stiffness stays everywhere; the cells all
 of whose free nodes are in the primary region add what their law has beyond it, r(u) = f(u) - K u.
 Such cells touch no other region's nodes, so what regions show each other is as in the linear body.
 
-A law at large strain is `fem.large_strain.hyperelastic`, with a Prony series `fem.laws.viscous`. In
-the linear law the isochoric stress relaxes alike: r = sum of h_i, dh_i/dt + h_i/tau_i = g_i K_iso
-du/dt, by the same recursion. K_iso is the stiffness less that of its volume change, 2 K(kappa) -
-K(2 kappa).
+A law at large strain is `fem.large_strain.hyperelastic`, with a Prony series
+`fem.laws.viscoelasticity`. In the linear law the isochoric stress relaxes alike: r = sum of h_i,
+dh_i/dt + h_i/tau_i = g_i K_iso du/dt, by the same recursion. K_iso is the stiffness less that of
+its volume change, 2 K(kappa) - K(2 kappa).
+
+Solvers of one region (paper 004, section 4): eqs 3, 5, 6 and the static one. All carry the
+displacements u now and u- one period T before. The other regions enter by their displacements on
+the right side (eq 7).
+
+Departures: the definition of eq 3 is lost in the text we have. It is taken as (M/T^2 + C/2T + K) u+
+= f + M/T^2 (2 u - u-) + C/2T u-, which gives the paper's whole-model peaks.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import eigsh
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import stiffness
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.viscoelasticity import Branches, cell_branches, relaxed
-from validate.fem.linear_solvers.factor import Factor, factorise
-from validate.fem.linear_solvers.frontal import Fronts
+from validate.fem.linear_solvers.factor import Factor, Fronts, factorise
 from validate.scene.material import LawName, Material, Prony
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.regions.solvers import RegionMatrices, RegionSolver, SemiImplicit
+
+SolverName = Literal["semi_implicit", "explicit", "euler", "static"]
+EXPLICIT: tuple[SolverName, ...] = ("explicit", "euler")
+_DENSE = 60  # unknowns below which Lanczos needs more vectors than there are
+
+
+@dataclass(frozen=True)
+class RegionMatrices:
+    """K (m, m) N/m over the free unknowns, lumped masses m (m,) kg, damping c (m,) N s/m.
+
+    Unknown i belongs to node `node[i]`, which rests at `places[node[i]]` m.
+    """
+
+    K: sparse.csr_array
+    m: Floats
+    c: Floats
+    node: Ints
+    places: Floats
+
+
+class RegionSolver(Protocol):
+    """`next` gives u+ (w,) from u, u- (w,) and forces (w,) less what the others' displacements
+    bring; trailing columns are independent states."""
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats: ...
+
+
+def across(d: Floats, x: Floats) -> Floats:
+    """d (w,) beside x (w,) or (w, q)."""
+    return d if x.ndim == 1 else d[:, None]
+
+
+@dataclass(frozen=True)
+class SemiImplicit:
+    """Eq 3; `inertia` M/T^2 and `damping` C/2T (w,). Static: both are zero."""
+
+    factor: Factor | Fronts
+    inertia: Floats
+    damping: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        M, C = across(self.inertia, u), across(self.damping, u)
+        return self.factor.solve(f + M * (2 * u - before) + C * before)
+
+
+@dataclass(frozen=True)
+class Explicit:
+    """Eq 5 with its K (w, w), `half` c T / 2 m and `gain` T^2/m (w,)."""
+
+    K: sparse.csr_array
+    half: Floats
+    gain: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        half, gain = across(self.half, u), across(self.gain, u)
+        return np.asarray(u + ((1 - half) * (u - before) + gain * (f - self.K @ u)) / (1 + half))
+
+
+@dataclass(frozen=True)
+class ImplicitExplicit:
+    """Eq 6: the new velocity from old forces, the new place from the new velocity."""
+
+    K: sparse.csr_array
+    half: Floats
+    gain: Floats
+
+    def next(self, u: Floats, before: Floats, f: Floats) -> Floats:
+        half, gain = across(self.half, u), across(self.gain, u)
+        return np.asarray(u + (1 - 2 * half) * (u - before) + gain * (f - self.K @ u))
+
+
+def semi_implicit(body: RegionMatrices, at: Ints, T: Floats) -> SemiImplicit:
+    """Eq 3 on the unknowns `at` (w,), each with its own period T (w,) s; infinite: static."""
+    inertia, damping = body.m[at] / T**2, body.c[at] / (2 * T)
+    A = sparse.csr_array(body.K[at][:, at] + sparse.diags_array(inertia + damping))
+    return SemiImplicit(factorise(A, body.node[at], body.places), inertia, damping)
+
+
+def solver_of(name: SolverName, body: RegionMatrices, at: Ints, T: float) -> RegionSolver:
+    """Return the named solver of the unknowns `at` (w,), once every T s."""
+    if name in ("semi_implicit", "static"):
+        return semi_implicit(body, at, np.full(len(at), np.inf if name == "static" else T))
+    kind = Explicit if name == "explicit" else ImplicitExplicit
+    K = sparse.csr_array(body.K[at][:, at])
+    return kind(K, body.c[at] * T / (2 * body.m[at]), T**2 / body.m[at])
+
+
+def critical_period(
+    name: SolverName, body: RegionMatrices, at: Ints, taut: sparse.csr_array | None = None
+) -> float:
+    """Return the longest stable T s of an explicit region whose neighbours stand still; else
+    infinite.
+
+    `taut` (w, w) N/m is what a law adds to K at once. Eq 5: 2/w, whatever the damping. Eq 6:
+    w^2 T^2 + 2 (c/m) T = 4, with the largest c/m.
+    """
+    if name not in EXPLICIT:
+        return np.inf
+    root = sparse.diags_array(1 / np.sqrt(body.m[at]))
+    K = body.K[at][:, at] if taut is None else body.K[at][:, at] + taut
+    A = root @ K @ root
+    if len(at) < _DENSE:
+        square = float(np.linalg.eigvalsh(A.toarray())[-1])
+    else:
+        start = np.random.default_rng(0).standard_normal(len(at))
+        square = float(eigsh(A, k=1, which="LA", v0=start, return_eigenvectors=False)[0])
+    if name == "explicit":
+        return float(2 / np.sqrt(square))
+    c = float((body.c[at] / body.m[at]).max())
+    return float(4 / (np.sqrt(c**2 + 4 * square) + c))
+
 
 _CONTRACTION = 0.2  # of the residual, that keeps a factorisation
 _ROUNDING = 1e-15  # of the cells' unit force
@@ -196,7 +312,9 @@ class PrimaryLaw:
 
     def _of(self, scene: Scene) -> Scene:
         """The scene with the primary region's law."""
-        return _made(scene, lambda m: _material(m, self.law, self.prony))
+        if self.law == "linear":
+            return scene
+        return _made(scene, lambda m: replace(m.of_law(self.law), prony=self.prony))
 
     def beyond(self, wide: Ints, own: Ints) -> Beyond | None:
         """On the unknowns `wide` (w,) of the body, of the mesh's nodes `own` (k,); None where these
@@ -208,7 +326,17 @@ class PrimaryLaw:
         if not inside.any():
             return None
         nodes = np.unique(cells[inside])
-        part = _part(self.scene, inside, nodes)
+        # The scene's cells `inside` (e,) alone, without what acts on them
+        mesh, numbers = self.scene.mesh, np.flatnonzero(inside)
+        regions = tuple(
+            replace(r, cells=np.flatnonzero(np.isin(numbers, r.cells))) for r in self.scene.regions
+        )
+        part = Scene(
+            Mesh(mesh.nodes[nodes], np.searchsorted(nodes, mesh.cells[inside]), mesh.kind),
+            self.scene.material, regions=tuple(r for r in regions if len(r.cells)),
+            plane=self.scene.plane, thickness=self.scene.thickness,
+            dilatation=self.scene.dilatation,
+        )  # fmt: skip
         put = _put(nodes, d, self.free[wide])
         if self.law == "linear":
             twice = _made(part, lambda m: _stiffer(m, 2.0))
@@ -217,20 +345,6 @@ class PrimaryLaw:
         large = self._of(part)
         K = sparse.csr_array(put @ stiffness(part) @ put.T)
         return LargeStrainRegion(Body(relaxed(large)), cell_branches(large), put, K)
-
-
-def _part(scene: Scene, inside: NDArray[np.bool_], nodes: Ints) -> Scene:
-    """The scene's cells `inside` (e,) alone, without what acts on them."""
-    cells = np.searchsorted(nodes, scene.mesh.cells[inside])
-    numbers = np.flatnonzero(inside)
-    regions = tuple(
-        replace(r, cells=np.flatnonzero(np.isin(numbers, r.cells))) for r in scene.regions
-    )
-    return Scene(
-        Mesh(scene.mesh.nodes[nodes], cells, scene.mesh.kind), scene.material,
-        regions=tuple(r for r in regions if len(r.cells)), plane=scene.plane,
-        thickness=scene.thickness, dilatation=scene.dilatation,
-    )  # fmt: skip
 
 
 def _put(nodes: Ints, d: int, unknowns: Ints) -> sparse.csr_array:
@@ -246,10 +360,6 @@ def _put(nodes: Ints, d: int, unknowns: Ints) -> sparse.csr_array:
 def _made(scene: Scene, of: Callable[[Material], Material]) -> Scene:
     regions = tuple(replace(r, material=of(r.material)) for r in scene.regions)
     return replace(scene, material=of(scene.material), regions=regions)
-
-
-def _material(m: Material, law: LawName, prony: Prony) -> Material:
-    return m if law == "linear" else replace(m.of_law(law), prony=prony)
 
 
 def _stiffer(m: Material, times: float) -> Material:
@@ -303,18 +413,14 @@ class PrimarySolver:
             size, acting = float(np.linalg.norm(residual)), sum(map(np.linalg.norm, parts))
             if size <= _TOLERANCE * acting + self.law.rounding:
                 return new
-            factor = self._factor(law, new, anew=size > _CONTRACTION * last)
-            new, last = self._corrected(new, factor.solve(residual), law), size
+            # The last factorisation, as long as it shrinks the residual (Shamanskii 1967)
+            if size > _CONTRACTION * last or not self.kept:
+                J = sparse.csr_array(self.A + law.tangent(new))
+                self.kept[:] = [factorise(J, self.node, self.places)]
+            new, last = self._corrected(new, self.kept[0].solve(residual), law), size
         raise UnsettledError(
             f"no equilibrium of the primary region after {_MOST} Newton iterations"
         )
-
-    def _factor(self, law: Response, u: Floats, *, anew: bool) -> Factor | Fronts:
-        """The last factorisation, as long as it shrinks the residual (Shamanskii 1967)."""
-        if anew or not self.kept:
-            J = sparse.csr_array(self.A + law.tangent(u))
-            self.kept[:] = [factorise(J, self.node, self.places)]
-        return self.kept[0]
 
     def _corrected(self, u: Floats, step: Floats, law: Response) -> Floats:
         for halved in range(_HALVINGS + 1):

@@ -26,11 +26,17 @@ from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.spring_probe import Hold, SpringProbe
-from validate.solve.regions.body import RegionBody, RegionPlan, Regions, require_one_probe
-from validate.solve.regions.map import PrimarySize, SizeName, ratios
+from validate.solve.regions.body import (
+    PrimarySize,
+    RegionBody,
+    RegionPlan,
+    Regions,
+    SizeName,
+    ratios,
+    require_one_probe,
+)
 from validate.solve.regions.march import BorderName, Motion, carried
-from validate.solve.regions.primary import PrimaryLaw, UnsettledError
-from validate.solve.regions.solvers import EXPLICIT, SolverName
+from validate.solve.regions.primary import EXPLICIT, PrimaryLaw, SolverName, UnsettledError
 from validate.solve.types import Ending, State, Stepper
 
 _AXES = "xyz"
@@ -139,16 +145,14 @@ class AsyncRegions:
         require_one_probe(system)
         tool, body = scene.tools[0], RegionBody.of(system)
         every, words = ratios(self.rates, self.dt)
+        primary = None
+        if self.of_its_own:
+            primary = PrimaryLaw(system.scene, system.free, self.law, self.prony)
         plan = RegionPlan(body, self.dt, self.layers, every, self.solvers, self.border,
-                          self.overlap, {}, self._primary(system))  # fmt: skip
+                          self.overlap, {}, primary)  # fmt: skip
         probe = SpringProbe(body, np.array(tool.axis), self.spring, self.reach, self.pad, self.grip,
                       self.slides)  # fmt: skip
         return RegionStepper(self, system, tool, body, plan, probe, words)
-
-    def _primary(self, system: System) -> PrimaryLaw | None:
-        if not self.of_its_own:
-            return None
-        return PrimaryLaw(system.scene, system.free, self.law, self.prony)
 
 
 @dataclass(frozen=True)
@@ -228,20 +232,17 @@ class RegionStepper:
             moved = np.linalg.norm(self.body.spread(last.motion.visible), axis=1)
             deformation = float(moved[held.node])
         around = self.plan.around(held.pad)
-        size = self._size(around.spacing)
-        layers = size.layers(deformation, moved, around.layer) if self.settings.layers else 0
+        s = self.settings
+        least = s.layers[0] if s.layers else 1
+        most = max(least, s.most)  # a fixed one never reads it
+        size = PrimarySize(s.adapt, least, most, s.slope, s.moved, around.spacing)
+        layers = size.layers(deformation, moved, around.layer) if s.layers else 0
         regions = self.plan.regions(held.pad, layers)
         if last.regions is None or last.motion is None:
             return regions, regions.coupled.rest()
         if regions is last.regions:
             return regions, last.motion
         return regions, carried(last.regions.coupled, last.motion, regions.coupled)
-
-    def _size(self, length: float) -> PrimarySize:
-        s = self.settings
-        least = s.layers[0] if s.layers else 1
-        most = max(least, s.most)  # a fixed one never reads it
-        return PrimarySize(s.adapt, least, most, s.slope, s.moved, length)
 
     def _told(self, k: int, tick: RegionTick, hand: Floats, *, changed: bool) -> State:
         coupled = tick.regions.coupled if tick.regions else None

@@ -16,14 +16,13 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.large_strain.elastic import Elastic, elastic
+from validate.fem.large_strain.hyperelastic import Elastic, elastic
 from validate.fem.linear_solvers.factor import (
     elimination_order,
     factorise_general,
     factorise_indefinite,
 )
-from validate.fem.rigid import require_held
-from validate.fem.system import System
+from validate.fem.system import System, require_held
 from validate.parameters import quantity
 from validate.scene.contact import INSIDE
 from validate.scene.scene import Scene
@@ -42,7 +41,7 @@ from validate.solve.static.touching import (
     rub,
     updated,
 )
-from validate.solve.types import Ending, State, Stepper
+from validate.solve.types import State, Stepper
 
 # --- What a contact tells at every step: force, friction, area, penetration, nodes, work.
 
@@ -133,27 +132,22 @@ class ContactNewton:
         require_handled(scene, self)
         N, free = len(system.moves), system.free
         parts = candidates(system)
-        require_held(
-            scene, system.held, _touched_rows(parts, scene), ", or place it in contact at rest"
-        )
+        # Rows (m, N) of what the nodes that touch at rest are held along
+        x = scene.mesh.nodes[parts.nodes]
+        gaps, normals = parts.look(x, np.zeros_like(x))
+        rows = []
+        for i in np.flatnonzero(gaps < INSIDE * np.ptp(scene.mesh.nodes, axis=0).max()):
+            along = np.eye(x.shape[1]) if parts.friction[i] else normals[[i]]
+            full = np.zeros((len(along), scene.mesh.nodes.size))
+            full[:, parts.unknowns[i]] = along
+            rows.append(full)
+        touched_rows = np.concatenate([*rows, np.zeros((0, scene.mesh.nodes.size))])
+        require_held(scene, system.held, touched_rows, ", or place it in contact at rest")
         node, K = free // scene.mesh.dimension, system.K[free][:, free]
         order = elimination_order(K, node, scene.mesh.nodes)
         rank = np.empty(N, dtype=np.int64)
         rank[free[order]] = np.arange(len(free))
         return ContactStepper(self, system, elastic(system), rank, parts)
-
-
-def _touched_rows(parts: Candidates, scene: Scene) -> Floats:
-    """Rows (m, N) of what the nodes that touch at rest are held along."""
-    x = scene.mesh.nodes[parts.nodes]
-    gaps, normals = parts.look(x, np.zeros_like(x))
-    rows = []
-    for i in np.flatnonzero(gaps < INSIDE * np.ptp(scene.mesh.nodes, axis=0).max()):
-        along = np.eye(x.shape[1]) if parts.friction[i] else normals[[i]]
-        full = np.zeros((len(along), scene.mesh.nodes.size))
-        full[:, parts.unknowns[i]] = along
-        rows.append(full)
-    return np.concatenate([*rows, np.zeros((0, scene.mesh.nodes.size))])
 
 
 @dataclass(frozen=True)
@@ -215,7 +209,10 @@ class ContactStepper:
             elif size > 0.5**self.settings.cuts:
                 size /= 2
             else:
-                return replace(state, failure=_stopped(new, k, done))
+                assert new.failure is not None
+                ending, why = new.failure
+                words = f"step {k}: {why}; {100 * done:.3g} % of the step's load was reached"
+                return replace(state, failure=(ending, words))
         return replace(at, k=k, inner=replace(at.inner, inputs=inputs))
 
     def _solved(self, state: State, inputs: Floats) -> State:
@@ -223,7 +220,8 @@ class ContactStepper:
         last: InTouch = state.inner
         drives = len(self.scene.drives)
         f, move = self._loads(inputs), self.system.moves @ (inputs - last.inputs)[:drives]
-        at = frame(self.parts, self._places(last.u), last.inputs, inputs, self._stiff)
+        stiff = self.system.K.diagonal()[self.parts.unknowns].mean(axis=1)  # of the candidates' own
+        at = frame(self.parts, self._places(last.u), last.inputs, inputs, np.asarray(stiff))
         u, status, changed, pressures = last.u, last.status, True, None
         residual, acting = self._residual(u, f)
         deep = self.settings.tolerance * self._size
@@ -243,7 +241,14 @@ class ContactStepper:
             try:
                 step = self._correction(u, pressures, held)
             except SceneError as vanished:
-                return replace(state, failure=("not_converged", _singular(status, vanished)))
+                # Contact may hold what no support holds.
+                why, touching = str(vanished), int((status != OPEN).sum())
+                if touching and not (status == STICK).any():
+                    why = (
+                        f"the body slides off: it is held only by {touching} touching nodes, and "
+                        "all of them slip; add a support, or more friction"
+                    )
+                return replace(state, failure=("not_converged", why))
             pressures, u = self.body.extrapolated(u, step), u + step
             move = np.zeros_like(move)
             bad = self.body.inverted(u)
@@ -260,11 +265,6 @@ class ContactStepper:
     def _small(self, acting: float) -> float:
         """The residual N that counts as none beside the forces that act."""
         return self.settings.tolerance * acting + _ROUNDING * self.body.unit_force
-
-    @property
-    def _stiff(self) -> Floats:
-        """Stiffness (c,) N/m of the candidates' own unknowns."""
-        return np.asarray(self.system.K.diagonal()[self.parts.unknowns].mean(axis=1))
 
     def _places(self, u: Floats) -> Floats:
         """Where the candidates are (c, d) m."""
@@ -314,31 +314,13 @@ class ContactStepper:
         acting = self.body.force(now.u) - self._loads(now.inputs)
         forces = copies * (acting @ self.system.moves)
         numbers = {f"{d.name}.force": float(x) for d, x in zip(scene.drives, forces, strict=True)}
-        numbers |= contact_numbers(self.parts, scene, self._now(now))
-        return numbers | {"energy.strain": self.body.energy(now.u)}
-
-    def _now(self, now: InTouch) -> Touched:
         x = self.scene.mesh.nodes + now.u.reshape(self.scene.mesh.nodes.shape)
-        return Touched(x, now.inputs, now.forces, now.status, now.work)
+        numbers |= contact_numbers(
+            self.parts, scene, Touched(x, now.inputs, now.forces, now.status, now.work)
+        )
+        return numbers | {"energy.strain": self.body.energy(now.u)}
 
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
         u: Floats = state.inner.u
         return u.reshape(self.scene.mesh.nodes.shape)
-
-
-def _singular(status: Ints, why: SceneError) -> str:
-    """Why there is no correction: contact may hold what no support holds."""
-    touching = int((status != OPEN).sum())
-    if not touching or (status == STICK).any():
-        return str(why)
-    return (
-        f"the body slides off: it is held only by {touching} touching nodes, and all of them "
-        "slip; add a support, or more friction"
-    )
-
-
-def _stopped(failed: State, k: int, done: float) -> tuple[Ending, str]:
-    assert failed.failure is not None
-    ending, why = failed.failure
-    return ending, f"step {k}: {why}; {100 * done:.3g} % of the step's load was reached"

@@ -17,9 +17,9 @@ from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.handles import LARGE_STATICS, Handles
 from validate.solve.static.newton import StaticNewton
+from validate.solve.study_entries import Asked, Rival, StillBody
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
@@ -90,16 +90,7 @@ class TabulatedStepper:
         """Return the state at a drive (1,) m; a failure beyond the last load that has a
         solution."""
         place = float(inputs[0]) / self.grid
-        self._extend(max(int(np.ceil(place - _BEYOND)), _NODES - 1))
-        table, last = self.table, len(self.table.states) - 1
-        if place > last + _BEYOND:
-            return replace(self._at(state.k, table.states[last]), failure=table.failure)
-        if abs(place - round(place)) < 1e-9 and 0 <= round(place) <= last:
-            return self._at(state.k + 1, table.states[round(place)])
-        first = max(0, min(int(np.floor(place)) - 1, last - _NODES + 1))
-        return self._between(state.k + 1, place, first, min(first + _NODES, last + 1))
-
-    def _extend(self, count: int) -> None:
+        count = max(int(np.ceil(place - _BEYOND)), _NODES - 1)
         table = self.table
         while len(table.states) <= count and table.failure is None:
             load = np.array([len(table.states) * self.grid])
@@ -108,17 +99,22 @@ class TabulatedStepper:
                 table.failure = found.failure
             else:
                 table.states.append(found)
-
-    def _at(self, k: int, solved: State) -> State:
-        return State(k, self.inner.field(solved), None, solved.updates, solved.numbers)
-
-    def _between(self, k: int, place: float, first: int, end: int) -> State:
+        table, last = self.table, len(self.table.states) - 1
+        if place > last + _BEYOND:
+            return replace(self._at(state.k, table.states[last]), failure=table.failure)
+        if abs(place - round(place)) < 1e-9 and 0 <= round(place) <= last:
+            return self._at(state.k + 1, table.states[round(place)])
+        first = max(0, min(int(np.floor(place)) - 1, last - _NODES + 1))
+        end = min(first + _NODES, last + 1)
         states, nodes = self.table.states[first:end], range(first, end)
         weights = [prod((place - o) / (n - o) for o in nodes if o != n) for n in nodes]
         pairs = list(zip(weights, states, strict=True))
         u = sum(w * self.inner.field(s) for w, s in pairs)
         numbers = {name: float(sum(w * s.numbers[name] for w, s in pairs)) for name in self.units}
-        return State(k, u, numbers=numbers)
+        return State(state.k + 1, u, numbers=numbers)
+
+    def _at(self, k: int, solved: State) -> State:
+        return State(k, self.inner.field(solved), None, solved.updates, solved.numbers)
 
     def field(self, state: State) -> Floats:
         return np.asarray(state.inner)

@@ -1,4 +1,4 @@
-"""Static Newton at large strain: load steps with cut-back, reused factorisations, fluid cavities.
+"""Static Newton at large strain: equilibrium, load steps with cut-back, fluid cavities.
 
 The pressures of the volumetric law are unknowns of the iteration (`Body.extrapolated`). A
 correction of size d changes volumes by d^2, which near nu = .5 raises the residual of the
@@ -9,6 +9,17 @@ Departures from a textbook Newton: a factorisation is kept, across steps too, wh
 shrinks the error by `contraction` or better (Shamanskii 1967); the last one is remembered together
 with the state it led to, so that stepping on from there needs no new one. Results depend on that
 memory within the tolerance only.
+
+Static equilibrium of a hyperelastic body with fluid cavities under drives and dead loads. Unknowns
+are the free displacements and the cavity pressures:
+
+    f_int(u) - sum_i P_i dV_i/dx = f,    V_i(x) = volume ratio x V_i0
+
+Newton's bordered system [A, -G; G^T, 0], A = K_t - sum_i P_i d2V_i/dx2 and G = dV/dx, is solved by
+block elimination with one factorisation of A. It has as many negative eigenvalues as A has plus the
+positive ones of S = G^T A^-1 G, so the Hessian on the constraints G^T du = 0, whose signs decide
+stability, has (negative of A) - (negative of S): A may be indefinite while the fluid holds the body
+(Gould 1985).
 """
 
 from collections.abc import Mapping
@@ -17,17 +28,173 @@ from types import MappingProxyType
 from typing import ClassVar, Literal
 
 import numpy as np
+from scipy import sparse
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.large_strain.hyperelastic import BEYOND_LAW
-from validate.fem.system import System
+from validate.fem.cavity import pressure_load, volume_hessian, volume_of
+from validate.fem.large_strain.hyperelastic import BEYOND_LAW, Body
+from validate.fem.linear_solvers.factor import Factor, elimination_order, factorise_indefinite
+from validate.fem.system import System, require_held
 from validate.parameters import quantity
 from validate.scene.scene import Load, Pressure, Scene, Weight
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
-from validate.solve.static.equilibrium import Balance, Equilibrium, Tangent, equilibrium
+from validate.solve.study_entries import Asked, Rival, StillBody
 from validate.solve.types import Ending, State, Stepper
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Forces at u (N,) m and P (c,) Pa under `inputs` (k + l,), drives in m and then loads.
+
+    `residual` (N,) N holds the reactions, `loads` (c, N) m^2 are dV/dx. `stresses` (e, q) Pa are
+    the volumetric law's slopes that the next tangent takes: those of u, but on the way of an
+    iteration the ones that it has foreseen (`Body.extrapolated`).
+
+    `unbalanced` N is the residual's norm over the free unknowns, zero where it is the stress's own
+    rounding; `acting` N the norm of the forces that act; `gap` the largest error of V/V0, of
+    cavities and of cells with nu = 0.5, whose `multipliers` (e, q) Pa keep it
+    (`fem.large_strain.hyperelastic`).
+    """
+
+    u: Floats
+    pressures: Floats
+    inputs: Floats
+    residual: Floats
+    loads: Floats
+    ratios: Floats
+    gap: float
+    unbalanced: float
+    acting: float
+    stresses: Floats | None = None
+    multipliers: Floats | None = None
+
+    def merit(self, force: float) -> float:
+        """What a line search lowers: the residual in units of `force` N and the volume error."""
+        return float(np.hypot(self.unbalanced / force, self.gap))
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """A factorised at u (N,) m: what unit inputs (N, k + l) and unit pressures (N, c) move.
+
+    `negative` counts the negative eigenvalues of the Hessian under constant volume.
+    """
+
+    factor: Factor
+    inputs: Floats
+    pressures: Floats
+    negative: int
+    u: Floats
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """The parts of the balance that stay: body, system, rest volumes (c,) m^3, elimination order.
+
+    With `constrained` False the cavities are empty: no pressures, no constraint.
+    """
+
+    body: Body
+    system: System
+    constrained: bool
+    rest_volumes: Floats
+    order: Ints
+
+    def balance(
+        self,
+        u: Floats,
+        pressures: Floats,
+        inputs: Floats,
+        target: Floats,
+        stresses: Floats | None = None,
+        multipliers: Floats | None = None,
+    ) -> Balance:
+        """Return the forces at u, P and the inputs, with volumes asked for as ratios `target`
+        (c,)."""
+        cavities = self.system.cavities
+        x = self._places(u)
+        ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
+        loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
+        multipliers = self.body.multipliers if multipliers is None else multipliers
+        inner = self.body.holding(multipliers).force(u)
+        f = self.system.loads @ inputs[len(self.system.scene.drives) :]
+        residual = inner - pressures @ loads - f
+        rounding = 4 * np.finfo(float).eps * self.body.unit_force
+        free = float(np.linalg.norm(residual[self.system.free]))
+        pushing = float(np.abs(pressures) @ np.linalg.norm(loads, axis=1))
+        acting = max(*(float(np.linalg.norm(x)) for x in (inner, f)), pushing, rounding)
+        gap = float(np.abs(ratios - target).max(initial=0.0)) if self.constrained else 0.0
+        gap = max(gap, self.body.volume_error(u))
+        unbalanced = free if free > rounding else 0.0
+        return Balance(
+            u, pressures, inputs, residual, loads, ratios, gap, unbalanced, acting, stresses,
+            multipliers,
+        )  # fmt: skip
+
+    def tangent(self, at: Balance) -> Tangent:
+        """Factorise A at a balance; `SceneError` where a pivot vanishes."""
+        free, moves = self.system.free, self.system.moves
+        A = self.body.holding(at.multipliers).tangent(at.u, at.stresses)
+        x = self._places(at.u)
+        for P, cavity in zip(at.pressures, self.system.cavities, strict=True):
+            if P:
+                A = sparse.csr_array(A - P * volume_hessian(cavity, x))
+        factor = factorise_indefinite(A[free][:, free], self.order)
+        driven = self._solved(factor, -(A @ moves).T).T + moves
+        loaded = self._solved(factor, self.system.loads.T).T
+        pressed = self._solved(factor, at.loads).T
+        negative = factor.negative_pivots
+        if self.constrained:
+            S = at.loads @ pressed
+            negative -= int((np.linalg.eigvalsh((S + S.T) / 2) < 0).sum())
+        return Tangent(factor, np.hstack([driven, loaded]), pressed, negative, at.u)
+
+    def _places(self, u: Floats) -> Floats:
+        """Nodes (n, d) m of the deformed mesh."""
+        nodes = self.system.scene.mesh.nodes
+        return np.asarray(nodes + u.reshape(nodes.shape))
+
+    def _solved(self, factor: Factor, rows: Floats) -> Floats:
+        """Fields (k, N) of the right-hand sides (k, N), zero where held."""
+        out = np.zeros_like(rows)
+        if len(rows):
+            out[:, self.system.free] = factor.solve(rows[:, self.system.free].T.copy()).T
+        return out
+
+    def predicted(self, at: Balance, tangent: Tangent, move: Floats, target: Floats) -> Balance:
+        """Return the linear response to a change `move` (k + l,) of the inputs, forces not yet
+        known."""
+        return self._moved(at, tangent, tangent.inputs @ move, target)
+
+    def correction(self, at: Balance, tangent: Tangent, target: Floats) -> Balance:
+        """Return the Newton correction of an imbalance, forces not yet known."""
+        field = -self._solved(tangent.factor, at.residual[None])[0]
+        return self._moved(at, tangent, field, target)
+
+    def _moved(self, at: Balance, tangent: Tangent, field: Floats, target: Floats) -> Balance:
+        """`at` moved by `field` and by the pressures that close the volumes to first order."""
+        if not self.constrained:
+            return replace(at, u=at.u + field)
+        error = (at.ratios - target) * self.rest_volumes + at.loads @ field
+        dP = np.linalg.solve(at.loads @ tangent.pressures, -error)
+        return replace(at, u=at.u + field + tangent.pressures @ dP, pressures=at.pressures + dP)
+
+    def forces(self, at: Balance) -> Floats:
+        """Forces (k,) N of the plates on the whole body, compression positive."""
+        return np.asarray(self.system.scene.copies * (at.residual @ self.system.moves))
+
+
+def equilibrium(system: System, constrained: bool) -> Equilibrium:
+    """Prepare the body and the elimination order, which holds for every tangent."""
+    mesh, free = system.scene.mesh, system.free
+    require_held(system.scene, system.held)
+    body = Body(system.scene)
+    K = system.K[free][:, free]
+    order = elimination_order(sparse.csr_array(K), free // mesh.dimension, mesh.nodes)
+    volumes = np.array([volume_of(c, mesh.nodes) for c in system.cavities])
+    return Equilibrium(body, system, constrained, volumes, order)
+
 
 _VOLUME = 1e-11  # relative error of a fluid's volume that counts as kept
 _NEGATIVE, _MADE = "tangent.negative_pivots", "newton.factorisations"
@@ -88,7 +255,18 @@ class StaticNewton:
         if not (scene.cavities or scene.inputs):
             raise SceneError("scene without drive, load and cavity: nothing moves; add one")
         problem = equilibrium(system, self.fluid == "exact" and bool(system.cavities))
-        rest = _rest(problem)
+        # The body at rest; `balance` refuses one that can move rigidly
+        volumes, u = len(problem.rest_volumes), np.zeros(len(system.moves))
+        balance = problem.balance(
+            u, np.zeros(volumes), np.zeros(len(scene.inputs)), np.ones(volumes)
+        )
+        tangent = problem.tangent(balance)
+        if tangent.factor.negative_pivots:
+            raise SceneError(
+                f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an "
+                "element is inverted; refine the mesh"
+            )
+        rest = Found(balance, tangent, factorisations=1)
         return NewtonStepper(self, problem, replace(rest, factorisations=0), _Memory(rest))
 
 
@@ -117,20 +295,6 @@ class _Memory:
 
     def __init__(self, last: Found) -> None:
         self.last = last
-
-
-def _rest(problem: Equilibrium) -> Found:
-    """The body at rest; `SceneError` where it can move rigidly."""
-    cavities, inputs = len(problem.rest_volumes), np.zeros(len(problem.system.scene.inputs))
-    u, ones = np.zeros(len(problem.system.moves)), np.ones(cavities)
-    balance = problem.balance(u, np.zeros(cavities), inputs, ones)
-    tangent = problem.tangent(balance)
-    if tangent.factor.negative_pivots:
-        raise SceneError(
-            f"stiffness at rest has {tangent.factor.negative_pivots} negative pivots: an element "
-            "is inverted; refine the mesh"
-        )
-    return Found(balance, tangent, factorisations=1)
 
 
 @dataclass(frozen=True)
@@ -175,19 +339,19 @@ class NewtonStepper:
         A failure keeps the last load that was reached and says what stopped the body there.
         """
         target = np.full(len(state.inner.pressures), self.settings.volume_ratio)
-        good = self._known(state.inner, target)
+        at: Loaded = state.inner
+        if self.memory.last.balance.u is at.u:
+            good = replace(self.memory.last, iterations=0, factorisations=0)
+        else:
+            balance = self.problem.balance(
+                at.u, at.pressures, at.inputs, target, None, at.multipliers
+            )
+            good = Found(balance, self.problem.tangent(balance), factorisations=1)
         kept = not self.problem.constrained or np.abs(good.balance.ratios - target).max() <= _VOLUME
         if kept and (inputs == state.inner.inputs).all():
             numbers = MappingProxyType({**state.numbers, _MADE: 0.0})
             return replace(state, k=state.k + 1, updates=0, numbers=numbers)
         return self._walked(state.k, good, np.array(inputs, dtype=np.float64), target)
-
-    def _known(self, at: Loaded, target: Floats) -> Found:
-        """The equilibrium of a state: remembered, or its forces and tangent made again."""
-        if self.memory.last.balance.u is at.u:
-            return replace(self.memory.last, iterations=0, factorisations=0)
-        balance = self.problem.balance(at.u, at.pressures, at.inputs, target, None, at.multipliers)
-        return Found(balance, self.problem.tangent(balance), factorisations=1)
 
     def _walked(self, k: int, good: Found, inputs: Floats, target: Floats) -> State:
         """Load steps to `inputs`; each failure halves them, to 2^-max_cuts of the way at least,
@@ -199,12 +363,19 @@ class NewtonStepper:
             load = inputs if share == 1 else begin + share * (inputs - begin)
             found = self._load_step(good, load, ratios + share * (target - ratios))
             if isinstance(found, Found):
-                good, done = _added(good, found), share
+                work = good.iterations + found.iterations
+                made = good.factorisations + found.factorisations
+                good, done = replace(found, iterations=work, factorisations=made), share
                 size *= 2 if found.iterations <= _FEW else 1
             elif size > 2.0**-self.settings.max_cuts:
                 size /= 2
             else:
-                why = _stopped(found, self._load_words(good.balance.inputs), done)
+                scene = self.scene
+                drives = [f"{1e3 * d:.4g} mm" for d in good.balance.inputs[: len(scene.drives)]]
+                units = [_UNITS[type(x)] for x in scene.loads]
+                loads = zip(good.balance.inputs[len(scene.drives) :], units, strict=True)
+                load_words = ", ".join(drives + [f"{x:.4g} {unit}" for x, unit in loads])
+                why = _stopped(found, load_words, done)
                 return self._state(k, good, why)
         self.memory.last = good
         return self._state(k + 1, good)
@@ -289,13 +460,6 @@ class NewtonStepper:
             return Failed("not_converged", "the equilibrium is unstable", found.tangent.negative)
         return found
 
-    def _load_words(self, inputs: Floats) -> str:
-        scene = self.scene
-        drives = [f"{1e3 * d:.4g} mm" for d in inputs[: len(scene.drives)]]
-        units = [_UNITS[type(x)] for x in scene.loads]
-        loads = zip(inputs[len(scene.drives) :], units, strict=True)
-        return ", ".join(drives + [f"{x:.4g} {unit}" for x, unit in loads])
-
     def _state(self, k: int, found: Found, failure: tuple[Ending, str] | None = None) -> State:
         at = found.balance
         at.u.setflags(write=False)
@@ -314,15 +478,6 @@ class NewtonStepper:
         """Displacements (n, d) m of all nodes."""
         u: Floats = state.inner.u
         return u.reshape(self.scene.mesh.nodes.shape)
-
-
-def _added(before: Found, found: Found) -> Found:
-    """`found` with the work of the load steps before it."""
-    return replace(
-        found,
-        iterations=before.iterations + found.iterations,
-        factorisations=before.factorisations + found.factorisations,
-    )
 
 
 def _stopped(failed: Failed, load: str, done: float) -> tuple[Ending, str]:

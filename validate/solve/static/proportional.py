@@ -21,7 +21,7 @@ from validate.scene.scene import Scene
 from validate.solve.handles import LARGE, Handles
 from validate.solve.march import march
 from validate.solve.static.quasi_static import QuasiStatic
-from validate.solve.types import Run, Scheme, Trace
+from validate.solve.types import Run, Scheme
 
 _KEPT = 32  # solutions at unit modulus
 _solved: OrderedDict[str, Run] = OrderedDict()
@@ -49,8 +49,17 @@ class Proportional:
             )
         E = scene.material.E
         unit = replace(scene, material=in_proportion(scene.material, 1 / E))
-        run = _at_unit(self.inner, unit, t, inputs)
-        traces = {n: replace(x, y=E * x.y) if _is_force(n, x, scene) else x
+        key = _key(self.inner, unit, t, inputs)
+        if key not in _solved:
+            start = perf_counter()
+            stepper = self.inner.prepare(build(unit))
+            setup = perf_counter() - start
+            _solved[key] = march("", stepper, t, inputs, np.arange(len(t)), setup)
+            while len(_solved) > _KEPT:
+                _solved.popitem(last=False)
+        _solved.move_to_end(key)
+        run = _solved[key]
+        traces = {n: replace(x, y=E * x.y) if x.unit == scene.force_unit and ".force" in n else x
                   for n, x in run.traces.items()}  # fmt: skip
         return replace(run, traces=traces)
 
@@ -63,23 +72,6 @@ def in_proportion(m: Material, factor: float) -> Material:
         ogden_mu=tuple(factor * mu for mu in c.ogden_mu),
     )  # fmt: skip
     return replace(m, E=factor * m.E, coefficients=coefficients)
-
-
-def _is_force(name: str, trace: Trace, scene: Scene) -> bool:
-    return trace.unit == scene.force_unit and ".force" in name
-
-
-def _at_unit(inner: Scheme, scene: Scene, t: Floats, inputs: Floats) -> Run:
-    key = _key(inner, scene, t, inputs)
-    if key not in _solved:
-        start = perf_counter()
-        stepper = inner.prepare(build(scene))
-        setup = perf_counter() - start
-        _solved[key] = march("", stepper, t, inputs, np.arange(len(t)), setup)
-        while len(_solved) > _KEPT:
-            _solved.popitem(last=False)
-    _solved.move_to_end(key)
-    return _solved[key]
 
 
 def _key(inner: Scheme, scene: Scene, t: Floats, inputs: Floats) -> str:

@@ -9,14 +9,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.incompressible import keep_volumes
+from validate.fem.assembly.volume_constraints import keep_volumes
 from validate.fem.system import Responses, System
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
-from validate.solve.candidates import Asked, Rival, StillBody
 from validate.solve.dynamic.linear import InertialStepper, reactions
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.stepping import Rates, Stepping
+from validate.solve.study_entries import Asked, Rival, Stepping, StillBody
 from validate.solve.types import Ending, State, Stepper
 
 # --- Steppers that superpose response columns: what all linear quasi-static schemes share.
@@ -107,7 +106,11 @@ class QuasiStatic:
     def steppings() -> tuple[Stepping, ...]:
         """One map that remembers nothing."""
         words = "statics: independent of the last step"
-        return (Stepping("quasi_static", words, "consistent", _still, order=0.0),)
+        return (
+            Stepping(
+                "quasi_static", words, "consistent", lambda r: np.zeros((len(r.x), 1, 1)), order=0.0
+            ),
+        )
 
     @staticmethod
     def candidates(asked: Asked) -> tuple[Rival, ...]:
@@ -151,7 +154,3 @@ class QuasiStaticStepper(InertialStepper):
     def field(self, state: State) -> Floats:
         """Displacements (n, d) m of all nodes."""
         return np.reshape(state.inner, self.scene.mesh.nodes.shape)
-
-
-def _still(r: Rates) -> Floats:
-    return np.zeros((len(r.x), 1, 1))

@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.laws.stretch_response import response
+from validate.fem.laws.plane_stress import response
 from validate.scene.meshless import MaterialPoint
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import Outcome, Run, Trace

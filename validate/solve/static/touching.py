@@ -22,7 +22,6 @@ from validate.fem.assembly.loads import nodal_integrals
 from validate.fem.system import System
 from validate.scene.contact import RigidContact
 from validate.scene.places import facets_of, kind_of, nodes_of
-from validate.scene.scene import Scene
 
 Bools = NDArray[np.bool_]
 OPEN, SLIP, STICK = 0, 1, 2
@@ -72,7 +71,11 @@ class Candidates:
 def candidates(system: System) -> Candidates:
     """Return the nodes of all contacts; quadratic faces by the middles of their edges."""
     scene, mesh = system.scene, system.scene.mesh
-    nodes = [_touching(scene, part) for part in scene.contacts]
+    nodes = []
+    for part in scene.contacts:
+        facets = facets_of(mesh, part.facets)
+        quadratic = kind_of(part.facets) == "faces" and facets.shape[1] == 6
+        nodes.append(np.unique(facets[:, 3:]) if quadratic else nodes_of(mesh, part.facets))
     areas = [scene.thickness * nodal_integrals(mesh, part.facets) for part in scene.contacts]
     counts = [len(n) for n in nodes]
     every = np.concatenate([*nodes, np.zeros(0, dtype=np.int64)])
@@ -90,13 +93,6 @@ def candidates(system: System) -> Candidates:
         tuple(first + movers[p.name] if p.name in movers else -1 for p in scene.contacts),
         tuple(nodes_of(mesh, part.facets) for part in scene.contacts),
     )
-
-
-def _touching(scene: Scene, part: RigidContact) -> Ints:
-    facets = facets_of(scene.mesh, part.facets)
-    if kind_of(part.facets) == "faces" and facets.shape[1] == 6:
-        return np.unique(facets[:, 3:])
-    return nodes_of(scene.mesh, part.facets)
 
 
 @dataclass(frozen=True)

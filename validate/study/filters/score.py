@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from validate.arrays import Floats
-from validate.compare.track import rmse, track_error
+from validate.compare.force_error import rmse, track_error
 from validate.estimate.consistency import Consistency, nis_consistency
 from validate.study.filters.withheld_errors import Innovations, PredictionErrors, Withheld
 

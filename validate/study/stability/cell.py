@@ -14,7 +14,7 @@ from scipy.linalg import eigh, eigvalsh
 from validate.arrays import Floats
 from validate.engine.worker_cache import Kept
 from validate.errors import ComparisonError, ValidateError
-from validate.fem.assembly.mixed import mixed_static
+from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.locking import locking_of
 from validate.fem.system import System, build, mass_of
 from validate.pipeline.ladder.default import body_of
@@ -23,7 +23,7 @@ from validate.pipeline.run.job import Job
 from validate.scene.scene import Scene
 from validate.solve.explicit.linear import ExplicitLinear, stable_step
 from validate.solve.schemes import steppings_for
-from validate.solve.stepping import Stepping
+from validate.solve.study_entries import Stepping
 from validate.study.stability.plan import StabilityCell
 from validate.study.stability.precision import Drift, Rounding, drift, rounding
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 
 from validate.arrays import Floats
 from validate.fem.system import System
-from validate.solve.stepping import Rates, Stepping
+from validate.solve.study_entries import Rates, Stepping
 
 STEPS = 1000  # of an explicit run in both precisions
 _FORMS = (True, False)  # in positions, in velocities

@@ -19,7 +19,7 @@ from validate.pipeline.ladder.ladder import StabilityBody
 from validate.pipeline.run.job import job_of
 from validate.pipeline.run.named_run import study_folder
 from validate.solve.schemes import steppings
-from validate.solve.stepping import Stepping
+from validate.solve.study_entries import Stepping
 from validate.study.stability.cell import SchemeResult, Stepped, open_bench, run_cell
 from validate.study.stability.plan import StabilityCell, stability_cells
 

@@ -1,12 +1,34 @@
-"""Taylor-Hood elements (displacements quadratic, pressure linear): a locking-free reference.
+"""Volume constraints: Taylor-Hood elements, exact volume at nu = 0.5, a volume penalty.
 
+Taylor-Hood elements (displacements quadratic, pressure linear) are a locking-free reference.
 Find u, p: 2 mu (e(u), e(v)) - (p, div v) = f(v), (div u, q) + (p/lambda, q) = 0; stable and of
-second order in p up to nu -> 1/2 (Taylor & Hood 1973; Boffi, Brezzi & Fortin 2013, ch. 8). P2-P1
-on simplices, Q2-Q1 on bricks, on the scene's own mesh.
+second order in p up to nu -> 1/2 (Taylor & Hood 1973; Boffi, Brezzi & Fortin 2013, ch. 8). P2-P1 on
+simplices, Q2-Q1 on bricks, on the scene's own mesh.
+
+Linear statics at nu = 0.5: augmented Lagrangian on mixed cells, exact volume. Find u and pressures
+p, of their own in every cell: a(u, v) + (p, theta(v)) = f(v), theta(u) = 0, theta the projected
+volume strain (`fem.assembly.assemble`). K holds a and a finite penalty r theta^T theta; each
+iteration adds r theta to p (Uzawa's, on the penalised problem: Fortin & Glowinski 1983, ch. 1). The
+error shrinks by about mu / r an iteration, so that the limit is that of the saddle system and of
+the penalty in nothing.
+
+The penalty acts along the face normals of every cell: Picinbono, Delingette & Ayache (2001), as
+paper 002 tells it (section VI.B): a low Poisson ratio, and at each node of an element a force along
+the normal of the opposite face that resists a change of the element's volume. With the volume
+strain theta of a cell, its slopes g_a = -A_a n_a / (d V) (area and outward normal of the face
+opposite to node a) and a weight k Pa there are two readings:
+
+- area-weighted normals, f_a = -k V theta g_a: the gradient of the energy k V theta^2 / 2, and so
+  exactly a Lame constant lambda that is raised by k;
+- unit normals, f_a = -k V theta s g_a/|g_a|, s the mean of the |g_a|: all nodes of a cell are
+  pushed alike. The forces of a cell that is not regular then neither add up to zero nor come from
+  an energy: the matrix is not symmetric, and the body gains momentum and energy from nothing.
+
+Departures: paper 002 prints no law; the force is linear in theta, as the rest of its model is.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy import sparse
@@ -31,7 +53,16 @@ from skfem.helpers import ddot, div, sym_grad
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import lame_constants, library_mesh
+from validate.fem.assembly.assemble import (
+    divergence,
+    lame_constants,
+    library_mesh,
+    mean_divergence,
+    rows_of_cells,
+    shape_gradients,
+)
+from validate.fem.linear_solvers.factor import Factor, Fronts
+from validate.fem.system import System
 from validate.scene.places import Place, facets_of, kind_of
 from validate.scene.scene import Load, Pressure, Scene, Weight
 
@@ -153,3 +184,76 @@ def _force(scene: Scene, load: Load | Weight | Pressure, domain: Any, basis: Bas
     side = FacetBasis(domain, basis.elem, facets=facets, intorder=4)
     f = asm(LinearForm(pushed), side, by=1.0)
     return np.asarray(f / float(np.sum(side.dx)))
+
+
+_KEPT = 1e-11  # volume strain over the displacement gradient that counts as none
+_ITERATIONS = 50
+
+
+def keep_volumes(
+    system: System, factor: Factor | Fronts, columns: Floats, loads: Floats
+) -> tuple[Floats, Floats]:
+    """Displacements (N, k + l) m per unit input that keep every cell with nu = 0.5, and the nodal
+    forces (N, k + l) N of its pressures.
+
+    `columns` are those of the penalty alone, drives first, `loads` (N, l) N. Raises `SceneError`
+    where what is prescribed changes the volume.
+    """
+    scene, free = system.scene, system.free
+    D, weights = mean_divergence(scene)
+    kept = scene.per_cell(lambda m: m.incompressible) > 0
+    bulk = lame_constants(scene)[0] + 2 / 3 * lame_constants(scene)[1]
+    r = scene.thickness * (np.where(kept, bulk, 0.0)[:, None] * weights).ravel()
+    push, D = sparse.csr_array(D.T * r), D[np.repeat(kept, weights.shape[1])]
+    size = float(np.ptp(scene.mesh.nodes, axis=0).max())
+    strain = np.abs(columns).max(axis=0) / size
+    forces = np.hstack([np.zeros((len(columns), columns.shape[1] - loads.shape[1])), loads])
+    u, total = columns.copy(), np.zeros((push.shape[1], columns.shape[1]))
+    rows = np.flatnonzero(np.repeat(kept, weights.shape[1]))
+    for _ in range(_ITERATIONS):
+        theta = D @ u
+        worst = np.abs(theta).max(axis=0)
+        held = push @ total
+        if (worst <= _KEPT * strain).all():
+            return u, held
+        total[rows] += theta
+        held = push @ total
+        left = forces - held - system.K @ u
+        u[free] += factor.solve(left[free])
+    raise SceneError(
+        f"nu = 0.5: the cells change their volume by {worst.max():.1e} of it per unit input "
+        f"after {_ITERATIONS} iterations; the held and driven nodes allow no motion of "
+        "constant volume: free a face, or use nu <= 0.4999"
+    )
+
+
+Normals = Literal["area", "unit"]
+
+
+def volume_penalty(scene: Scene, weight: float, normals: Normals = "area") -> sparse.csr_array:
+    """P (N, N) N/m: the penalty's forces on the nodes are -P u. `weight` is k in Pa.
+
+    Raises `SceneError` for a negative weight, plane stress, whose cells may thin out, and cells
+    other than linear simplices.
+    """
+    if not (np.isfinite(weight) and weight >= 0):
+        raise SceneError(f"penalty of {weight:g} Pa on a change of volume: expected at least 0")
+    if scene.plane == "stress":
+        raise SceneError(
+            "in plane stress the thickness is free: use the penalty in plane strain or 3-D"
+        )
+    if scene.mesh.order != 1:
+        raise SceneError(
+            f"a penalty along face normals supports linear cells, not {scene.mesh.kind}"
+        )
+    B, volumes = divergence(scene.mesh)
+    scale = sparse.diags_array(scene.thickness * weight * volumes)
+    along = B if normals == "area" else _unit_rows(scene)
+    return sparse.csr_array(along.T @ scale @ B)
+
+
+def _unit_rows(scene: Scene) -> sparse.csr_array:
+    """Rows (e, N) of the inward normals, all as long as the mean slope of their cell, 1/m."""
+    slopes = shape_gradients(scene.mesh)
+    lengths: Floats = np.linalg.norm(slopes, axis=2, keepdims=True)
+    return rows_of_cells(scene.mesh, slopes / lengths * lengths.mean(axis=1, keepdims=True))

@@ -1,13 +1,17 @@
-"""Answer of an external simulator: `answer.json` and its fields, read from untrusted files.
+"""Job and answer of an external simulator (docs/external-simulators.md).
 
 Everything is checked: sizes and shapes before memory is allocated, mesh and times against the job,
 law and parameters against the request, and forces against each other.
+
+A job is `job.json` and `mesh.vtu`; the answer is `answer.json` and its fields, files that nobody
+trusts.
 """
 
 import json
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +19,137 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.errors import RecordingError, UsageError, ValidateError
+from validate.errors import RecordingError, SceneError, UsageError, ValidateError
+from validate.fem.assembly.loads import hung_masses
+from validate.fem.system import System, build
 from validate.files import npz_arrays
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.scene.scene import Weight
-from validate.solve.external.job import ExternalJob
+from validate.scene.laws import law_kind
+from validate.scene.material import Material
+from validate.scene.mesh_files.vtu import CELL_TYPES, write_vtu
+from validate.scene.scene import Scene, Weight
 from validate.solve.external.program import plain
+
+JOB_SCHEMA = "validate-external-job/1"
+
+
+@dataclass(frozen=True)
+class ExternalJob:
+    """Job that was written: `document` is the JSON, `inputs` (nt, k) are those at `times` s."""
+
+    system: System
+    times: Floats
+    inputs: Floats
+    document: Mapping[str, Any]
+
+    @property
+    def scene(self) -> Scene:
+        return self.system.scene
+
+
+def write_job(
+    folder: Path, scene: Scene, t: Floats, inputs: Floats, inertia: bool, tolerance: float
+) -> ExternalJob:
+    """Write mesh and job; raises `SceneError` for what a job does not carry."""
+    mesh = scene.mesh
+    if mesh.kind not in CELL_TYPES:
+        raise SceneError(f"an external simulator accepts {', '.join(CELL_TYPES)}, not {mesh.kind}")
+    parts = ("regions", "foundations", "membranes", "contacts", "tracked", "tools")
+    odd = [name for name in parts if getattr(scene, name)]
+    if odd:
+        raise SceneError(
+            f"a job for an external simulator cannot contain {' or '.join(odd)}; "
+            "remove them from the scene"
+        )
+    if len(t) == 0 or t[0] < 0 or (np.diff(t) <= 0).any():
+        raise SceneError(
+            f"{len(t)} times for an external simulator: expected at least one, "
+            "from 0 s on, increasing"
+        )
+    write_vtu(scene.mesh, folder / "mesh.vtu")
+    digest = sha256((folder / "mesh.vtu").read_bytes()).hexdigest()
+    system = build(scene)
+    t, inputs = np.asarray(t, dtype=np.float64), np.asarray(inputs, dtype=np.float64)
+    first = [] if t[0] == 0 else [0.0]
+    document = {
+        "schema": JOB_SCHEMA,
+        "units": "SI",
+        "mesh": {
+            "file": "mesh.vtu",
+            "sha256": digest,
+            "kind": scene.mesh.kind,
+            "nodes": len(scene.mesh.nodes),
+            "cells": len(scene.mesh.cells),
+        },
+        "material": asked_material(scene, inertia),
+        "inertia": inertia,
+        "times": t.tolist(),
+        "instants": [*first, *t.tolist()],
+        **_parts(system, inputs, len(first)),
+        "tolerance": tolerance,
+    }
+    (folder / "job.json").write_text(json.dumps(document, indent=1, allow_nan=False), "utf-8")
+    return ExternalJob(system, t, inputs, document)
+
+
+def asked_material(scene: Scene, inertia: bool) -> dict[str, Any]:
+    """Law and parameters that the job turns on, each of which the answer must echo."""
+    m, kind = scene.material, law_kind(scene.material.law)
+    found: dict[str, Any] = {"law": m.law, "E": m.E, "nu": m.nu}
+    if inertia or any(isinstance(part, Weight) for part in scene.loads):
+        found["rho"] = _density(m)
+    if inertia:
+        found |= {"mass_damping": m.mass_damping, "stiffness_damping": m.stiffness_damping}
+    if scene.masses:
+        found["hung"] = sum(part.mass for part in scene.masses)
+    names = (*kind.coefficients, *(("volumetric",) if kind.volumetric else ()))
+    values = {name: getattr(m.coefficients, name) for name in names}
+    return found | {n: list(v) if isinstance(v, tuple) else v for n, v in values.items()}
+
+
+def _density(material: Material) -> float:
+    if material.rho is None:
+        raise SceneError(
+            "an external simulator with inertia or weight needs a density; give material.rho"
+        )
+    return material.rho
+
+
+def _parts(system: System, inputs: Floats, before: int) -> dict[str, Any]:
+    """What is held still, drives, loads and weights, with what each is at the instants.
+
+    Before the first time a drive is at rest, and a load has its first value: it is switched on.
+    """
+    scene = system.scene
+    still = np.setdiff1d(system.held, np.flatnonzero(system.moves.any(axis=1)))
+    drives = []
+    for j, drive in enumerate(scene.drives):
+        rows = np.flatnonzero(system.moves[:, j])
+        y = [*[0.0] * before, *inputs[:, j].tolist()]
+        drives.append(
+            {"name": drive.name, **_unknowns(rows), "per_unit": system.moves[rows, j].tolist(),
+             "history": y}
+        )  # fmt: skip
+    loads: list[dict[str, Any]] = []
+    weights: list[dict[str, Any]] = []
+    for j, load in enumerate(scene.loads):
+        y = inputs[:, len(drives) + j].tolist()
+        named = {"name": load.name, "history": [*y[:1] * before, *y]}
+        if isinstance(load, Weight):
+            weights.append(named | {"direction": list(load.direction)})
+            continue
+        forces = system.loads[:, j].reshape(-1, 3)
+        nodes = np.flatnonzero(forces.any(axis=1))
+        loads.append(named | {"nodes": nodes.tolist(), "forces": forces[nodes].tolist()})
+    kg = hung_masses(scene)[::3]
+    nodes = np.flatnonzero(kg)
+    return {"held": _unknowns(still), "drives": drives, "loads": loads, "weights": weights,
+            "masses": {"nodes": nodes.tolist(), "kg": kg[nodes].tolist()}}  # fmt: skip
+
+
+def _unknowns(rows: Any) -> dict[str, list[int]]:
+    return {"nodes": (rows // 3).tolist(), "components": (rows % 3).tolist()}
+
 
 # --- The fields of an answer: `fields.npz`, or .vtu files listed in `fields.pvd`.
 
@@ -73,7 +202,11 @@ def _arrays(path: Path, job: ExternalJob) -> dict[str, NDArray[Any]]:
     except RecordingError as error:
         raise NoAnswerError(plain(str(error))) from None
     wanted = [name for name in ("t", "u", "reactions") if name in found]
-    return {name: _number_array(found[name], name) for name in wanted}
+    for name in wanted:
+        if found[name].dtype.kind not in "fiu":
+            kind = found[name].dtype
+            raise NoAnswerError(f"fields.npz: {name} of type {kind}, expected numbers")
+    return {name: found[name].astype(np.float64) for name in wanted}
 
 
 def _shaped(found: dict[str, NDArray[Any]], file: str, job: ExternalJob) -> dict[str, NDArray[Any]]:
@@ -86,12 +219,6 @@ def _shaped(found: dict[str, NDArray[Any]], file: str, job: ExternalJob) -> dict
         if array.shape != shape or k > len(job.times):
             raise NoAnswerError(f"{file}: {name} of shape {array.shape}, expected {shape}")
     return found
-
-
-def _number_array(array: NDArray[Any], name: str) -> Floats:
-    if array.dtype.kind not in "fiu":
-        raise NoAnswerError(f"fields.npz: {name} of type {array.dtype}, expected numbers")
-    return array.astype(np.float64)
 
 
 def regular(path: Path, most: int) -> Path:
@@ -139,7 +266,14 @@ class ExternalAnswer:
 
 def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
     """Raise `NoAnswerError` with the reason where there is no answer to this job."""
-    said = _document(folder)
+    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
+    try:
+        said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
+    known = (ANSWER_SCHEMA, _FORMER_SCHEMA)
+    if not isinstance(said, dict) or said.get("schema") not in known:
+        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
     name = (
         f"{_text(said, 'name') or 'external simulator'} {_text(said, 'version') or '(no version)'}"
     )
@@ -154,11 +288,19 @@ def read_answer(folder: Path, job: ExternalJob) -> ExternalAnswer:
         raise NoAnswerError("answer.json: mesh_sha256 differs from that of the job's mesh.vtu")
     arrays = fields_of(folder, job)
     u, reactions, step = arrays["u"], arrays.get("reactions"), _times_done(arrays["t"], job, state)
-    finite = np.all([_usable(a) for a in (u, reactions) if a is not None], axis=0)
+    # Of every time (k,): all numbers are finite, and none beyond what can be squared and summed.
+    with np.errstate(invalid="ignore"):
+        sound = [np.abs(a) < _HUGE for a in (u, reactions) if a is not None]
+    finite = np.all([of.all(axis=(1, 2)) for of in sound], axis=0)
     if not finite.all():
         step = int(np.argmin(finite))
         state, why = "diverged", f"no finite field at step {step}" + (f"; {why}" if why else "")
-    setup, seconds = _seconds(said, step)
+    # Set-up and steps, as it says; zero and None where it says nothing usable
+    setup, each = said.get("setup_s"), said.get("step_s")
+    setup = float(setup) if setup is not None and _is_time(setup) else 0.0
+    seconds = None
+    if isinstance(each, list) and all(map(_is_time, each)) and len(each) >= step:
+        seconds = np.array(each[:step], dtype=np.float64)
     reactions = None if reactions is None else reactions[:step]
     findings = (
         *_limits(said), *echoed(job.document["material"], said.get("used")),
@@ -190,19 +332,6 @@ def _same(asked: Any, used: Any) -> bool:
     return a.shape == b.shape and bool(np.allclose(a, b, rtol=_ECHO, atol=0.0))
 
 
-def _document(folder: Path) -> dict[str, Any]:
-    raw = regular(folder / "answer.json", _JSON_BYTES).read_bytes()
-    try:
-        said = json.loads(raw.decode("utf-8"), parse_constant=_no_number)
-    except (ValueError, RecursionError) as error:
-        raise NoAnswerError(f"answer.json: not valid JSON ({plain(str(error))})") from None
-    if not isinstance(said, dict) or said.get("schema") not in (
-        ANSWER_SCHEMA, _FORMER_SCHEMA,
-    ):  # fmt: skip
-        raise NoAnswerError(f"answer.json: not an object of schema '{ANSWER_SCHEMA}'")
-    return said
-
-
 def _no_number(text: str) -> float:
     raise ValueError(f"{text} is not a number in JSON")
 
@@ -223,13 +352,6 @@ def _limits(said: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _usable(values: Floats) -> NDArray[np.bool_]:
-    """Of every time (k,): whether all its numbers are finite, and none beyond what can be squared
-    and summed."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((np.abs(values) < _HUGE).all(axis=(1, 2)))
-
-
 def _times_done(t: Floats, job: ExternalJob, state: str) -> int:
     """How many of the job's times were done: all of them, or the first ones if it gave up."""
     asked = job.times[: len(t)]
@@ -242,15 +364,6 @@ def _times_done(t: Floats, job: ExternalJob, state: str) -> int:
             f"fields.npz: {len(t)} of {len(job.times)} times, although its state is 'finished'"
         )
     return len(t)
-
-
-def _seconds(said: Mapping[str, Any], steps: int) -> tuple[float, Floats | None]:
-    """Set-up and steps, as it says; zero and None where it says nothing usable."""
-    setup, each = said.get("setup_s"), said.get("step_s")
-    ready = float(setup) if setup is not None and _is_time(setup) else 0.0
-    if not isinstance(each, list) or not all(map(_is_time, each)) or len(each) < steps:
-        return ready, None
-    return ready, np.array(each[:steps], dtype=np.float64)
 
 
 def _is_time(value: Any) -> bool:
