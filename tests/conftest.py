@@ -24,6 +24,7 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
     os.environ.setdefault("VALIDATE_SHARED_DATA", str(_data))
 
 import pytest
+from hypothesis import settings
 from matplotlib.figure import Figure
 
 from validate.compare.result import Result
@@ -36,6 +37,9 @@ LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 # Groups that take minutes begin first: a short one ends each process.
 FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_notebooks.py", "tree")
+# The same examples each time, and no test judges the time that it takes.
+settings.register_profile("validate", deadline=None, derandomize=True)
+settings.load_profile("validate")
 BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
 _DRAW = Figure.draw
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import here, refused
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from report_samples import CHECK, small_result
 
@@ -38,7 +38,6 @@ from validate.report.views.bars import bar
 PAGE = Path("report.html")
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 4)), max_size=6))
 def test_blocks_share_a_screen_and_count_what_is_left_out(sizes: list[tuple[int, int]]) -> None:
     blocks = [

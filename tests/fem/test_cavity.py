@@ -39,7 +39,7 @@ def test_volume_of_a_box_is_exact(kind: Kind) -> None:
 
 
 @kinds
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(arrays(float, (3, 3), elements=st.floats(-3, 3)))
 def test_affine_maps_scale_the_volume_by_the_determinant(kind: Kind, A: np.ndarray) -> None:
     mesh, surface = box(kind)
@@ -119,7 +119,7 @@ def test_load_is_in_balance_and_pushes_the_wall_outward(kind: Kind) -> None:
 
 
 @kinds
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(arrays(float, 3, elements=st.floats(-3, 3)), st.integers(0, 2**31))
 def test_volume_form_gives_the_volume_of_any_combination(
     kind: Kind, z: np.ndarray, seed: int

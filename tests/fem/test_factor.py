@@ -37,7 +37,7 @@ def grid_laplacian(n: int) -> tuple[sparse.csr_array, np.ndarray]:
     return sparse.csr_array(A), places.astype(float)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.integers(0, 2**31), st.integers(1, 150), st.integers(1, 3))
 def test_solves_random_definite_systems(seed: int, nodes: int, per_node: int) -> None:
     A = random_spd(seed, nodes, per_node)
@@ -139,7 +139,7 @@ def test_nearly_incompressible_material_still_factorises() -> None:
         assert found == pytest.approx(x, abs=1e-14 / (1 - 2 * nu))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.integers(0, 2**31), st.integers(1, 400), st.integers(1, 3), st.booleans())
 def test_nested_dissection_is_a_permutation(seed: int, n: int, d: int, level: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -151,7 +151,7 @@ def test_nested_dissection_is_a_permutation(seed: int, n: int, d: int, level: bo
     assert sum(found.children) == len(found.stops) - 1  # one tree: all parts but the last are taken
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.integers(0, 2**31), st.integers(1, 300), st.integers(1, 3), st.booleans())
 def test_fronts_solve_as_the_sparse_factor_does(
     seed: int, nodes: int, per_node: int, apart: bool

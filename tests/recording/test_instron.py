@@ -138,7 +138,7 @@ def test_every_dress_gives_the_same_si_arrays(dress: Dress, tmp_path: Path) -> N
     sign=st.sampled_from([1.0, -1.0]),
     blanks=st.booleans(),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_dress_locale_and_sign_do_not_matter(
     tmp_path_factory: pytest.TempPathFactory, **choice: object
 ) -> None:
@@ -149,7 +149,7 @@ def test_dress_locale_and_sign_do_not_matter(
 
 
 @given(unit=st.sampled_from([("kN", 1e3), ("mN", 1e-3), ("N", 1.0)]), scale=st.floats(0.1, 50))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 def test_force_scales_with_its_unit(
     tmp_path_factory: pytest.TempPathFactory, unit: tuple[str, float], scale: float
 ) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -66,7 +66,6 @@ def test_one_flipped_bit_is_found(tmp_path: Path) -> None:
             inspect_recording(path)
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.lists(st.integers(0, LAST_NS), max_size=20).map(sorted))
 def test_any_times_in_order(tmp_path_factory: pytest.TempPathFactory, times: list[int]) -> None:
     path = tmp_path_factory.mktemp("times") / "made.mcap"

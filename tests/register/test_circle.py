@@ -15,7 +15,7 @@ def circle(centre, radius, k, first=0.0):
     return np.array(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(1e-3, 0.05), st.integers(6, 80),
     st.floats(0, 6),

@@ -104,7 +104,7 @@ def test_predicted_tre_by_hand():
     np.testing.assert_allclose(scaled - out, each * np.diag([h**2 / a**2, 0, 0]), atol=1e-15)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_tre_is_fitzpatricks_formula_in_any_frame(seed):
     rng = np.random.default_rng(seed)

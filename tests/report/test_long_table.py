@@ -65,7 +65,7 @@ ROWS = st.tuples(*(VALUES[kind] for kind in column_types().values())).map(LongRo
 
 
 @given(st.lists(ROWS, max_size=6))
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_written_is_read_back_exactly(
     form: str, tmp_path_factory: pytest.TempPathFactory, rows: list[LongRow]
 ) -> None:

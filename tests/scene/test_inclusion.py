@@ -69,7 +69,7 @@ def test_projection_moves_radially() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     st.floats(0.027, 0.033),
     st.floats(0.0215, 0.0235),
@@ -88,7 +88,7 @@ def test_off_centre_inclusions_give_positive_cells_and_a_closed_wall(
     assert 0.6 * capsule.volume < hole < capsule.volume
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(
     st.floats(0.010, 0.050),
     st.floats(0.010, 0.035),

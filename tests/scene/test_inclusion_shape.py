@@ -16,7 +16,7 @@ def sphere(pose: np.ndarray, r: float = 6e-3, step: float = 1e-3) -> SlicedShape
     return SlicedShape(pose, z, np.zeros((len(z), 2)), radii, np.array([-r, r]))
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(st.integers(0, 10_000))
 def test_a_sphere_of_slices_is_a_sphere_wherever_it_lies(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -261,7 +261,7 @@ def test_rows_added_and_removed_leave_no_trace(small: Condensed) -> None:
     assert one[1] == pytest.approx(two[1], rel=1e-9)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.floats(0.05, 0.9), st.floats(-0.003, 0.003))
 def test_a_point_between_nodes_moves_as_asked(share: float, by: float) -> None:
     small = _phantom()

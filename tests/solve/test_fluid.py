@@ -160,7 +160,7 @@ def test_plate_work_and_fluid_work_are_strain_energy() -> None:
 # The exact pressure
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-0.02, 0.03), st.floats(-0.02, 0.03))
 def test_exact_pressure_keeps_the_volume_from_any_start(first: float, second: float) -> None:
     r = phantom_responses()

@@ -244,7 +244,7 @@ def test_the_consistent_force_is_the_slope_of_the_energy() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(st.floats(-0.004, 0.004), st.floats(-0.008, 0.002)), min_size=3,
                 max_size=8))  # fmt: skip
 def test_the_hand_never_gets_more_than_it_gave(corners: list[tuple[float, float]]) -> None:
@@ -352,7 +352,7 @@ def test_settings_without_sense_are_refused(made, words: str) -> None:  # type: 
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(0.05, 0.95), st.floats(0.05, 0.95), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_a_path_enters_a_box_where_geometry_says(u: float, v: float, a: float, b: float) -> None:
     """Down through the upper face of a unit cube, from obliquely above."""

@@ -302,7 +302,7 @@ def report_(out: Path | None) -> None:
 @click.argument("name", default="")
 @click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
 def open_(name: str, out: Path | None) -> None:
-    """Open a report in the browser; without NAME the page over all runs.
+    """Open a report in the browser; without NAME the overview.
 
     \b
     Example:
@@ -370,7 +370,7 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 def export_(
     run: Path, junit: Path | None, latex: Path | None, figures: Path | None, *, force: bool
 ) -> None:
-    """Write a stored run as JUnit XML, LaTeX, or vector figures.
+    """Write a stored run as JUnit XML, LaTeX or figures.
 
     \b
     Example:

@@ -34,6 +34,7 @@ _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch 
 _FAR = 3.0  # shares of the limit that a track shows; what lies beyond ends in an arrow
 _COLOURS = {"good enough": "good", "not distinguishable": "good", "not good enough": "bad",
             "differs": "bad"}  # fmt: skip
+_LONG = 420  # letters of a sentence that are shown at once: four lines
 #: Sections that a reader opens: how the numbers came about, and long lists.
 CLOSED = ("discrimination", "body", "scores", "registration", "recording", "parameters", "made",
           "published")  # fmt: skip
@@ -97,10 +98,13 @@ def page(
         {f"intervals_{i.name}": forest(i, links) for e in shown for i in e.exhibit.intervals},
     )
     body = next((p for p in first if p.name.startswith(("render_", "cut"))), None)
+    view = body_view(result)
+    if view is not None:  # it shows what another picture of the body would
+        first = [p for p in first if p is body or p.name == _CHECKS]
     return _template("report.html").render(
         result=result, exhibits=shown, created=created, colour=colour, word=word, first=first,
         above=[picture.name for picture in first], cost=cost(result), live=live,
-        first_body=body, view=body_view(result), closed=CLOSED,
+        first_body=body, view=view, closed=CLOSED, long=len(result.sentence) > _LONG,
     )  # fmt: skip
 
 
