@@ -52,7 +52,7 @@ def test_statics_of_a_swing_is_inertia() -> None:
 
 def test_a_lag_is_the_clock() -> None:
     found = changed(motions(swing(T)), measured=motions(swing(T - 0.02)).measured)
-    words = "the recorded motion comes +19.6 ms later than the simulated one"
+    words = "the recorded motion comes 19.6 ms later than the simulated one"
     assert first(found) == ("clock", words)
 
 

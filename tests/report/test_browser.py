@@ -191,6 +191,17 @@ def test_the_slider_moves_the_body(browser: str, report: Path, tmp_path: Path) -
             "difference from stiff <cube> / mm"} <= set(found["colours"])  # fmt: skip
 
 
+def test_two_methods_stand_side_by_side(browser: str, report: Path, tmp_path: Path) -> None:
+    action = """const [method, beside] = document.querySelectorAll(".viewer select");
+      const names = () => [...document.querySelectorAll(".viewer .titles b")].map(b => b.innerText);
+      const choose = (one, value) => { one.value = value; one.dispatchEvent(new Event("change")); };
+      found.alone = names(); choose(beside, "1"); found.two = names();
+      choose(method, "1"); found.same = names();"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["alone"] == found["same"] == []
+    assert found["two"] == ["soft <cube>", "stiff <cube>"]
+
+
 def test_a_table_sorts_filters_and_unfolds(browser: str, tmp_path: Path) -> None:
     action = """const table = document.querySelector("table.sortable");
       const names = () => [...table.tBodies[0].rows].filter(r => getComputedStyle(r).display

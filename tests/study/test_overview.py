@@ -57,6 +57,18 @@ def test_shares_of_limits_over_the_runs_are_a_curve(reports: Path) -> None:
     assert float(rows[0][3]) == pytest.approx(abs(check.value) / check.limit)
 
 
+def test_a_quick_run_is_called_so_and_fitted_checks_take_no_share(reports: Path) -> None:
+    result = small_result()
+    fitted = replace(result.checks[0], name="force.max@fit", value=9.0, acceptance="fitted",
+                     validation="fitted")  # fmt: skip
+    first = replace(result.methods[0], checks=(*result.methods[0].checks, fitted))
+    quick = replace(result, methods=(first, *result.methods[1:]), quick=True)
+    write_report(quick, reports / "cube+quick-1", created=SECOND)
+    one = next(s for s in stored(reports) if s.folder == "cube+quick-1")
+    assert one.verdict == "good enough (quick run)"
+    assert share(one.runs[-1]) == share(stored(reports)[0].runs[0])
+
+
 def test_the_overview_is_no_run_of_its_own(reports: Path) -> None:
     write_overview(reports)
     assert [s.folder for s in stored(reports)] == ["cube", "ball"]
@@ -65,7 +77,7 @@ def test_the_overview_is_no_run_of_its_own(reports: Path) -> None:
 
 def test_open_finds_the_page(reports: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("click.launch", opened.append)
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
     assert here("open", "cube", "--out", str(reports))[0] == 0
     assert here("open", "--out", str(reports))[0] == 0
     assert opened == [

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from validate.commands.display import relative, say
-from validate.commands.show import shown_of
+from validate.commands.show import folder_of, shown_of
 from validate.errors import UsageError
 from validate.files import safe_name
 from validate.places import try_file, try_folder, write_whole
@@ -18,9 +18,13 @@ from validate.study.stored_runs.score_comparison import read_table
 
 
 def export(
-    run: Path, junit_file: Path | None, latex_file: Path | None, figures: Path | None = None
+    name: str, junit_file: Path | None, latex_file: Path | None, figures: Path | None = None
 ) -> None:
-    """Write the requested exports; raises `UsageError` where none is requested."""
+    """Write the requested exports of a report folder or a run's name.
+
+    Raises `UsageError` where none is requested, or no such run is stored.
+    """
+    run = folder_of(name, None)
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted and figures is None:

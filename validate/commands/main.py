@@ -360,7 +360,7 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 
 
 @cli.command("export")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run")
 @click.option("--junit", type=FILE, help="Write checks and published figures as JUnit XML.")
 @click.option("--latex", type=FILE, help="Write checks as a LaTeX tabular.")
 @click.option(
@@ -368,7 +368,7 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 )
 @FORCE
 def export_(
-    run: Path, junit: Path | None, latex: Path | None, figures: Path | None, *, force: bool
+    run: str, junit: Path | None, latex: Path | None, figures: Path | None, *, force: bool
 ) -> None:
     """Write a stored run as JUnit XML, LaTeX or figures.
 
@@ -379,7 +379,7 @@ def export_(
     """
     from validate.commands import export as exporting
 
-    require_new((file for file in (junit, latex) if file is not None), (run,), force=force)
+    require_new((file for file in (junit, latex) if file is not None), (Path(run),), force=force)
     exporting.export(run, junit, latex, figures)
 
 

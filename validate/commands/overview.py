@@ -1,8 +1,7 @@
 """`validate report` and `validate open`: the page over all runs, and pages in the browser."""
 
+import webbrowser
 from pathlib import Path
-
-import click
 
 from validate.catalogue import experiment_files, reports_of
 from validate.commands.display import relative, say
@@ -38,4 +37,5 @@ def open_page(name: str, out: Path | None) -> None:
         told = f"; {nearest_names(name, known)}" if known else f"; `validate run {name}` makes it"
         raise UsageError(f"no report of '{name}' below {reports}{told}")
     say(f"page: {relative(page)}")
-    click.launch(page.resolve().as_uri())
+    if not webbrowser.open(page.resolve().as_uri()):
+        say("no browser was found here; open the page in one")

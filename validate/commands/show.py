@@ -25,7 +25,7 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
 
     Raises `UsageError` for a run or a name that is not there.
     """
-    folder = _folder(run, reports)
+    folder = folder_of(run, reports)
     table = read_table(folder, *NOT_SHOWN)
     found = {name: (form, exhibit) for name, form, exhibit in shown_of(folder, table)}
     for name in names:
@@ -47,7 +47,7 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
             screen.print(line, markup=False, soft_wrap=True)
 
 
-def _folder(run: str, reports: Path | None) -> Path:
+def folder_of(run: str, reports: Path | None) -> Path:
     """A report folder: as a path, or below the reports of an experiment."""
     if (Path(run) / MARK).is_file() or Path(run).is_file():
         return Path(run)

@@ -28,7 +28,7 @@ def write_loose(
     created = datetime.now(UTC).isoformat(timespec="seconds")
 
     def fill(fresh: Path) -> None:
-        fill_page(result, document, created, ("open", band), fresh)
+        fill_page(result, document, created, ("plain", band), fresh)
 
     return replace_folder(folder, fill, ()) / "report.html"
 

@@ -89,7 +89,7 @@ INCLUSION = NewKind(
     "inclusion",
     "a block with a fluid-filled inclusion between plates",
     "outlines, a stage (m) and markers with records 'inclusion' and 'marker_layout'",
-    "linear FEM",
+    "FEM",
     "new_inclusion.py.txt",
     _fits,
     _asks,

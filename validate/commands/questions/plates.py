@@ -257,7 +257,7 @@ PLATES = NewKind(
     "plates",
     "a body between the plates or grips of a testing machine",
     "signals 'displacement' (m) and 'force' (N)",
-    "linear FEM",
+    "FEM",
     "new_force.py.txt",
     _fits,
     _asks,

@@ -216,7 +216,8 @@ def _clock(found: Difference, shown: RecordedMotion | None) -> Cause | None:
     lag = lags[best]
     return Cause(
         "clock", shares[best],
-        f"the recorded motion comes {1e3 * lag:+.3g} ms later than the simulated one",
+        f"the recorded motion comes {1e3 * abs(lag):.3g} ms "
+        f"{'later' if lag > 0 else 'earlier'} than the simulated one",
         "`validate align` the files, or set motion.start; tap the body once so that both record it",
     )  # fmt: skip
 

@@ -20,8 +20,14 @@ from validate.report.scenes import gl
 from validate.report.scenes.body import drive_direction, indenters_at, opening_plane, plates_at
 from validate.report.scenes.loads import held
 from validate.report.scenes.skin import SurfacePart, skins
-from validate.report.sections.observations import finished, markers_seen, outline_seen
-from validate.report.views.numbers import significant, spaced
+from validate.report.sections.observations import (
+    drive,
+    driven,
+    finished,
+    markers_seen,
+    outline_seen,
+)
+from validate.report.views.numbers import significant, spaced, with_unit
 from validate.scene.scene import Scene
 
 _MM = 1e3
@@ -95,6 +101,9 @@ def _frames(method: MethodResult, most: int) -> _Frames:
     run = method.run
     times = run.t[run.at]
     labels = [f"t = {significant(t)} s" for t in times.tolist()]
+    if method.registered and method.registered[0].drives:
+        unit, moved = drive(method.registered[0]).unit, driven(method.registered[0], times)
+        labels = [f"{with_unit(q, unit)}, {t}" for q, t in zip(moved.tolist(), labels, strict=True)]
     if method.registered:
         for i, instant in enumerate(held(method.registered[0], run)):
             if instant.hold is not None:
@@ -142,6 +151,7 @@ def _method(
         simulated = np.array([seen.simulated(run.u[i]) for i in own])
         found["markers"] = {
             "names": list(seen.names),
+            "rest": _packed(_MM * _three(seen.rest), "<f4"),
             "measured": _packed(_MM * _three(measured), "<f4"),
             "simulated": _packed(_MM * _three(simulated), "<f4"),
         }

@@ -105,8 +105,9 @@
         value: (u, v) => shown(v), points: { show: false } });
       tables.push([low < high ? [low, high] : [low], low < high ? [level.y, level.y] : [level.y]]);
     }
+    const padded = (u, from, to) => [from - 0.05 * (to - from || 1), to + 0.05 * (to - from || 1)];
     const scale = axis => {
-      if (axis === "y" && found.linear) return { distr: 4, asinh: found.linear };
+      if (axis === "y" && found.linear) return { distr: 4, asinh: found.linear, range: padded };
       return found.log.includes(axis) ? { distr: 3 } : {};
     };
     const axis = label => ({ label, stroke: ink, grid: { stroke: style("--line"), width: 1 },
@@ -168,7 +169,7 @@
 
     // What is shown.
     const state = { method: 0, other: -1, frame: largest(methods[0]), by: "displacement",
-      markers: true, arrows: 1, outline: true, edges: false, cut: Boolean(view.cut), scale: 1 };
+      markers: true, arrows: magnified(), outline: true, edges: false, through: false, cut: Boolean(view.cut), scale: 1 };
 
     function unpacked(m) {
       const nodes = numbers(m.nodes, Float32Array);
@@ -176,7 +177,7 @@
       const shares = ({ top, shares }) => Float32Array.from(numbers(shares, Int16Array), v => v * top / STEPS);
       const fields = Object.fromEntries(Object.entries(m.fields).map(([name, f]) => [name, shares(f)]));
       const markers = m.markers && { names: m.markers.names,
-        measured: numbers(m.markers.measured, Float32Array), simulated: numbers(m.markers.simulated, Float32Array) };
+        rest: numbers(m.markers.rest, Float32Array), measured: numbers(m.markers.measured, Float32Array), simulated: numbers(m.markers.simulated, Float32Array) };
       const outlines = m.outlines && m.outlines.map(o => ({
         measured: numbers(o.measured, Float32Array), simulated: numbers(o.simulated, Float32Array) }));
       return { ...m, packed: m.nodes, nodes, triangles, u: shares(m.u), fields, markers, outlines };
@@ -191,6 +192,13 @@
         if (here >= top) [best, top] = [f, here];
       }
       return best;
+    }
+
+    function magnified() { // 1, 2, 5 or 10: the longest arrow is at most 8 % of the body
+      const m = methods.find(m => m.markers);
+      let top = 0;
+      for (let f = 0; m && f < frames; f++) for (const e of errors(m, f)) if (e > top) top = e;
+      return [10, 5, 2].find(by => by * top <= 0.08 * view.size) ?? 1;
     }
 
     const length = (a, i) => Math.hypot(a[i], a[i + 1], a[i + 2]);
@@ -221,7 +229,8 @@
       if (!ranges.has(by)) {
         let low = Infinity, high = -Infinity;
         for (const m of methods) {
-          if (by === "error" ? !m.markers : m.fields && by.includes(" / ") && !m.fields[by]) continue;
+          if (by === "error" ? !m.markers : by.includes(" / ") && !m.fields[by]) continue;
+          if (by.startsWith("difference ") && methods[Number(by.slice(11))].packed !== m.packed) continue;
           for (let f = 0; f < frames; f++) {
             for (const v of by === "error" ? errors(m, f) : values(m, by, f)) {
               if (v < low) low = v;
@@ -250,7 +259,7 @@
       scene.add(new THREE.AmbientLight("#ffffff", 1.7), light);
       const place = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
       const tint = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
-      const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
+      const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide, flatShading: true });
       const lines = new THREE.LineBasicMaterial({ color: "#303030", transparent: true, opacity: 0.45 });
       const parts = m.triangles.map(index => {
         const geometry = new THREE.BufferGeometry();
@@ -262,7 +271,7 @@
         const wire = new THREE.LineSegments(edges, lines);
         scene.add(new THREE.Mesh(geometry, material), wire);
         wire.frustumCulled = scene.children.at(-2).frustumCulled = false;
-        return { geometry, wire };
+        return { wire };
       });
       const tools = view.tools.map(t => {
         const geometry = new THREE.BufferGeometry();
@@ -275,7 +284,7 @@
         return { solid, shifts: numbers(t.shifts, Float32Array) };
       });
       const k = m.markers ? m.markers.names.length : 0;
-      const radius = 0.009 * view.size * Math.min(1, Math.sqrt(60 / Math.max(k, 1)));
+      const radius = 0.006 * view.size * Math.min(1, Math.sqrt(60 / Math.max(k, 1)));
       const balls = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, 14, 10),
         new THREE.MeshLambertMaterial({ color: "#ffffff" }), Math.max(k, 1));
       const cones = new THREE.InstancedMesh(new THREE.CylinderGeometry(0, 0.55 * radius, 1, 10),
@@ -302,7 +311,8 @@
     function fill(p) {
       const { m } = p, f = state.frame, n = m.nodes.length / 3;
       for (let i = 0; i < 3 * n; i++) p.place.array[i] = m.nodes[i] + state.scale * m.u[3 * f * n + i];
-      const plain = state.by === "error" || (state.by.includes(" / ") && !m.fields[state.by]);
+      const of = state.by.startsWith("difference ") && methods[Number(state.by.slice(11))];
+      const plain = state.by === "error" || (state.by.includes(" / ") && !m.fields[state.by]) || (of && of.packed !== m.packed);
       const [low, high] = range(state.by);
       if (plain) {
         const grey = new THREE.Color(GREY);
@@ -313,15 +323,15 @@
       }
       p.place.needsUpdate = p.tint.needsUpdate = true;
       p.material.clippingPlanes = p.lines.clippingPlanes = state.cut && plane ? [plane] : [];
-      for (const { geometry, wire } of p.parts) {
-        geometry.computeVertexNormals();
-        wire.visible = state.edges;
-      }
+      for (const { wire } of p.parts) wire.visible = state.edges;
+      p.material.transparent = state.through;
+      p.material.opacity = state.through ? 0.35 : 1;
+      p.material.depthWrite = !state.through;
       for (const { solid, shifts } of p.tools) {
-        solid.position.set(...shifts.subarray(3 * f, 3 * f + 3));
+        solid.position.set(...shifts.subarray(3 * f, 3 * f + 3).map(v => state.scale * v));
       }
       points(p, f, low, high);
-      const outline = state.outline && m.outlines;
+      const outline = state.outline && state.scale === 1 && m.outlines; // it has no points to scale
       for (const name of ["measured", "simulated"]) {
         p[name].visible = Boolean(outline);
         if (outline) {
@@ -341,8 +351,9 @@
       const found = errors(m, f);
       for (let i = 0; i < k; i++) {
         const at = 3 * (f * k + i);
-        const end = new THREE.Vector3(...m.markers.measured.subarray(at, at + 3));
-        const start = new THREE.Vector3(...m.markers.simulated.subarray(at, at + 3));
+        const rest = new THREE.Vector3(...m.markers.rest.subarray(3 * i, 3 * i + 3));
+        const moved = place => new THREE.Vector3(...place.subarray(at, at + 3)).sub(rest).multiplyScalar(state.scale).add(rest);
+        const end = moved(m.markers.measured), start = moved(m.markers.simulated);
         const there = Number.isFinite(found[i]);
         mover.position.copy(there ? end : start);
         mover.quaternion.identity();
@@ -415,7 +426,8 @@
     function draw() {
       const width = canvas.clientWidth, height = canvas.clientHeight;
       if (!width) return;
-      const two = state.other >= 0 ? [state.method, state.other] : [state.method];
+      const two = state.other >= 0 && state.other !== state.method ? [state.method, state.other] : [state.method];
+      titles.replaceChildren(...(two.length > 1 ? two.map(i => make("b", {}, methods[i].label)) : []));
       const w = width / two.length, aspect = w / height;
       const tall = 1.06 * Math.max(held[1], held[0] / aspect);
       Object.assign(camera, { left: -tall * aspect, right: tall * aspect, top: tall, bottom: -tall });
@@ -436,7 +448,8 @@
       fill(panes[state.method]);
       if (state.other >= 0) fill(panes[state.other]);
       const [low, high] = range(state.by);
-      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high));
+      const arrows = methods[state.method].markers && state.markers && state.arrows > 1 ? `arrows ${state.arrows} times as long` : "";
+      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high), " ", arrows);
       output.textContent = view.labels[state.frame];
       canvas.setAttribute("aria-label", `${methods[state.method].label} at ${view.labels[state.frame]}, `
         + `coloured by ${names.get(state.by)}; drag or Shift and arrow keys turn it, arrow keys move it`);
@@ -448,7 +461,7 @@
     if (methods.some(m => m.markers)) names.set("error", "marker error / mm");
     for (const m of methods) for (const name of Object.keys(m.fields)) names.set(name, name);
     methods.forEach((m, i) => {
-      if (i !== 0 && m.packed === methods[0].packed) names.set(`difference ${i}`, `difference from ${m.label} / mm`);
+      if (methods.some((other, j) => j !== i && other.packed === m.packed)) names.set(`difference ${i}`, `difference from ${m.label} / mm`);
     });
     const select = (label, options, chosen, change) => {
       const one = make("select", {}, ...options.map(([value, text]) => make("option", { value: String(value) }, text)));
@@ -462,7 +475,7 @@
       return make("label", {}, one, ` ${label}`);
     };
     const output = make("output", {});
-    const legend = make("div", { class: "legend" });
+    const legend = make("div", { class: "legend" }), titles = make("div", { class: "titles" });
     const slider = make("input", { type: "range", min: "0", max: String(frames - 1), step: "1", "aria-label": "load or time" });
     slider.value = String(state.frame);
     slider.addEventListener("input", () => { state.frame = Number(slider.value); update(); });
@@ -487,10 +500,11 @@
       v => { state.scale = Number(v); }));
     if (methods.some(m => m.markers)) {
       more.append(tick("measured markers", "markers"), select("Arrows", [[1, "true"], [2, "2 times"], [5, "5 times"],
-        [10, "10 times"], [0, "none"]], 1, v => { state.arrows = Number(v); }));
+        [10, "10 times"], [0, "none"]], state.arrows, v => { state.arrows = Number(v); }));
     }
     if (methods.some(m => m.outlines)) more.append(tick("outlines", "outline"));
     if (view.cut) more.append(tick("cut open", "cut"));
+    if (!view.flat) more.append(tick("see through", "through"));
     more.append(tick("mesh edges", "edges"), again, save);
     const words = ["Black: measured; orange arrows point to it from the simulated place. Grey: plates and tools."];
     if (!methods.some(m => m.markers || m.outlines)) words[0] = "The body as simulated.";
@@ -498,7 +512,7 @@
     if (view.part) words.push(view.part);
     if (view.left_out.length) words.push(`Not in this view: ${view.left_out.join(", ")}.`);
     const text = make("figcaption", {}, words.join(" "));
-    const viewer = make("div", { class: "viewer" }, canvas, legend, row, choice,
+    const viewer = make("div", { class: "viewer" }, titles, canvas, legend, row, choice,
       make("details", {}, make("summary", {}, "More of the view"), more, text));
     figure.prepend(viewer);
     figure.classList.add("live");

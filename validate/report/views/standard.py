@@ -23,7 +23,8 @@ _CHECKS = View(
     "the rms error, noise removed (0: below noise). u_val² = u_D² (measurement) + u_num² (mesh, "
     "step) + u_input² (declared ranges, and a filter's claimed error), standard uncertainties. "
     "Acceptance: E ± 2 u_val against the limit; good enough inside, not good enough outside, "
-    "undecided where it straddles. Validation: differs where E ± 2 u_val excludes zero. Margin: "
+    "undecided where it straddles. Validation: differs where E ± 2 u_val excludes zero; of many "
+    "points, where one lies beyond the largest noise expected among so many. Margin: "
     "limit minus (|E| + 2 u_val). Fitted (data used for identification) and same model (recording "
     "made by the model) are not evidence.",
 )  # fmt: skip

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
+from validate.compare.verdict import NO_EVIDENCE
 from validate.errors import UsageError
 from validate.report.stored.run_changes import PastRun, Since, history, since
 from validate.report.stored.tables import report_folders
@@ -29,8 +30,9 @@ class StoredRun:
 
     @property
     def verdict(self) -> str:
-        """The word over all checks."""
-        return self.runs[-1].verdict.partition(";")[0]
+        """The word over all checks, and whether the run was a quick one."""
+        quick = " (quick run)" if self.runs[-1].line.get("quick") else ""
+        return f"{self.runs[-1].verdict.partition(';')[0]}{quick}"
 
     @property
     def changed(self) -> str:
@@ -55,8 +57,10 @@ def stored(reports: Path) -> tuple[StoredRun, ...]:
 
 
 def share(run: PastRun) -> float | None:
-    """Return the largest |E| over its limit of a run's checks; None where none has a limit."""
-    shares = [abs(c.value) / c.limit for c in run.checks if c.value is not None and c.limit]
+    """Return the largest |E| over its limit of a run's checks that are evidence; None where none
+    has a limit."""
+    judged = (c for c in run.checks if c.verdict not in NO_EVIDENCE)
+    shares = [abs(c.value) / c.limit for c in judged if c.value is not None and c.limit]
     return max(shares, default=None)
 
 
@@ -98,7 +102,7 @@ def _table(found: Sequence[StoredRun]) -> NumberTable:
     rows = tuple(
         (
             TableCell(s.folder, emphasis="strong", link=f"../{s.folder}/report.html"),
-            TableCell(s.verdict, emphasis=WORDS.get(s.verdict, "")),
+            TableCell(s.verdict, emphasis=WORDS.get(s.verdict.partition(" (")[0], "")),
             s.runs[-1].verdict.partition("; evidence: ")[2],
             share(s.runs[-1]),
             s.runs[-1].created[:16].replace("T", " "),
@@ -110,7 +114,8 @@ def _table(found: Sequence[StoredRun]) -> NumberTable:
              "changed since the run before")  # fmt: skip
     return NumberTable(
         "runs", "The last run of every folder", heads, rows,
-        "A share of the limit above 1 fails for its value alone; the verdict counts 2 u_val, too. "
+        "Evidence: checks on data that neither calibrated nor made the model. A share of the limit "
+        "(of those checks) above 1 fails for its value alone; the verdict counts 2 u_val, too. "
         "Bias and scatter over all of them: validate summary.",
     )  # fmt: skip
 
