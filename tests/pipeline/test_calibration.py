@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calibrating import NU, OPEN, OPENED, E, Sensed, known
+from command_line import here
 
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
@@ -235,3 +236,22 @@ def test_a_declared_range_of_what_was_identified_gives_way_to_its_covariance() -
 
 def _inputs(result: Result) -> list[float]:
     return [c.u_input for c in result.checks if c.name == "force@0.3mm"]
+
+
+AS_FILE = """
+from dataclasses import replace
+from calibrating import OPEN
+EXPERIMENT = replace(OPEN, name="opened")
+"""
+
+
+@pytest.mark.parametrize("command", ["check", "study coverage"])
+def test_other_commands_identify_by_the_same_cells(command: str, tmp_path: Path) -> None:
+    """`check` where cells of a run are stored, and a coverage study."""
+    (tmp_path / "opened.py").write_text(AS_FILE, "utf-8")
+    out = tmp_path / "reports"
+    (out / "opened" / "cells").mkdir(parents=True)
+    quick = ("--quick",) if command.startswith("study") else ()
+    code, _, err = here(*command.split(), "opened.py", *quick, "--out", str(out), cwd=tmp_path)
+    assert code in (0, 1), err
+    assert list(out.glob("opened/study-identify*/cells/*.json"))

@@ -14,6 +14,7 @@ from validate.commands.screen import Passage, check_passages, rows, sentences, s
 from validate.compare.result import KINDS, Result
 from validate.engine.execution import CELLS
 from validate.engine.pool import Pool
+from validate.library.run_report import by_cells
 from validate.pipeline.checks.motion_summary import described
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
@@ -53,7 +54,9 @@ def check(
                 own = reports_of(experiment.path, out) / experiment.name
                 store = own if (own / CELLS).is_dir() and not fresh else Path(empty)
                 by = InStore(experiment, Options({}), store, pool)
-                content = _content(compare(experiment, Options({}), report, by=by))
+                place = out if store == own else Path(empty)
+                identify = by_cells(experiment, Options({}), place, report, pool)
+                content = _content(compare(experiment, Options({}), report, identify, by))
         motion = described(experiment)
         held = _document(content, declared=bool(experiment.published))
         found.append({**held, "motion": motion})

@@ -66,7 +66,7 @@ def reported_run(
         try_results(folder, (STUDIES, CELLS))
         store = reports_of(experiment.path, out) / experiment.name
         by = InStore(plain, options, store, pool)
-        identify = _identify(experiment, options, out, report, pool)
+        identify = by_cells(experiment, options, out, report, pool)
         result = compare(experiment, options, report, identify, by)
         if before := kept_report(result, folder, made_by, vtu=vtu):
             words = f"{by.words}, the report of {before} is unchanged"
@@ -90,10 +90,10 @@ def warn_of_units(experiment: Experiment, options: Options) -> None:
         LOG.warning(line)
 
 
-def _identify(
+def by_cells(
     experiment: Experiment, options: Options, out: Path | None, report: Report, pool: Pool
 ) -> Identify:
-    """What stands open is identified as `validate identify` does, on the same kept cells."""
+    """Return what identifies as `validate identify` does, on the same stored cells below `out`."""
     if not experiment.calibrations:
         return here
     from validate.study.identify.study import beside

@@ -13,7 +13,7 @@ from validate.compare.verdict import Accept, Sensitivity, Statistic, errors_of
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
 from validate.identify.identification import Identification
-from validate.pipeline.calibration.calibrated import here
+from validate.pipeline.calibration.calibrated import Identify, here
 from validate.pipeline.calibration.problem import Problem
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.experiment import Experiment
@@ -125,15 +125,15 @@ class Opening:
         return self.found[number] if number in self.found else here(number, problem)
 
 
-def opened_here(job: Job) -> tuple[CoverageBench, Opening]:
-    """Identifies once; the opening spares workers that."""
+def opened_here(job: Job, identify: Identify = here) -> tuple[CoverageBench, Opening]:
+    """Identify once, by `identify`; the opening spares workers that."""
     found: dict[int, Identification] = {}
 
-    def identify(number: int, problem: Problem) -> Identification:
-        found[number] = here(number, problem)
+    def once(number: int, problem: Problem) -> Identification:
+        found[number] = identify(number, problem)
         return found[number]
 
-    out = set_out(*_judged(job), identify=identify)
+    out = set_out(*_judged(job), identify=once)
     out.road.start(out.found.recordings)
     return CoverageBench(out.road), Opening(key_of(job, "opening"), found)
 

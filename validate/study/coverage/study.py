@@ -15,8 +15,10 @@ from validate.engine.cell import Plan, Where
 from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.store import key_of
 from validate.errors import ComparisonError, UsageError
+from validate.pipeline.calibration.calibrated import here
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
+from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.job import job_of
 from validate.pipeline.run.named_run import study_folder
 from validate.study.coverage.bench import AllStated, Stated, opened_here, run_terms
@@ -39,6 +41,7 @@ from validate.study.coverage.plan import (
     draws_of,
 )
 from validate.study.coverage.worlds import Study, finished, kept, place, read_worlds
+from validate.study.identify.study import beside
 
 KIND = "coverage"
 
@@ -88,7 +91,9 @@ def coverage(
         raise UsageError(f"{draws} draws of {noise:g} times the noise: at least {BLOCK}, above 0")
     job = job_of(found, values, quick)
     start = perf_counter()
-    bench, opening = opened_here(job)
+    options = Options(dict(values or {}), (), quick)
+    identify = beside(found, options, out, report, where) if found.calibrations else here
+    bench, opening = opened_here(job, identify)
     opened = perf_counter() - start
     accepted = [
         m
