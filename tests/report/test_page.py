@@ -9,6 +9,7 @@ import pytest
 from report_samples import BLIND, CHECK, bare_result, sections_of, small_result
 
 from validate.compare.effects import Change
+from validate.compare.exhibit import Exhibit
 from validate.compare.result import Result
 from validate.compare.verdict import Acceptance, Validation
 from validate.report.exhibits import DrawnExhibit, draw_all
@@ -134,6 +135,16 @@ def test_notices_only_where_they_apply(anchor: str) -> None:
     told = replace(plain, quick=True, twin_notice="It is a twin.", kind="same model")
     assert f'id="{anchor}"' not in empty(plain)
     assert f'id="{anchor}"' in empty(told)
+
+
+def test_first_sections_of_an_experiment_are_open_and_all_of_a_study() -> None:
+    own = tuple(Exhibit(f"own{i}", f"Own {i}", ("Some words.",)) for i in range(5))
+    result = replace(small_result(), exhibits=own)
+    whole = page(result, draw_all(result, own), CREATED, band(result))
+    study = replace(result, methods=())
+    loose = page(study, draw_all(study, own), CREATED, ("plain", "Study"))
+    opened = [re.findall(r'<details open>\s*<summary><h2 id="(\w+)"', t) for t in (whole, loose)]
+    assert opened == [["own0", "own1", "own2"], [e.anchor for e in own]]
 
 
 def test_names_are_escaped() -> None:

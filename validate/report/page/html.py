@@ -38,6 +38,7 @@ _LONG = 420  # letters of a sentence that are shown at once: four lines
 #: Sections that a reader opens: how the numbers came about, and long lists.
 CLOSED = ("discrimination", "body", "scores", "registration", "recording", "parameters", "made",
           "published")  # fmt: skip
+_OPEN = 3  # of an experiment's own sections; its others are opened by their reader
 #: Pictures of the first screen, by name: the body with what was measured, else the body.
 _BODY = ("render_markers", "render_deformed", "cut", "markers", "outlines")
 _CHECKS = "intervals_limits"
@@ -101,10 +102,12 @@ def page(
     view = body_view(result)
     if view is not None:  # it shows what another picture of the body would
         first = [p for p in first if p is body or p.name == _CHECKS]
+    own = [e.anchor for e in result.exhibits] if result.methods else []
     return _template("report.html").render(
         result=result, exhibits=shown, created=created, colour=colour, word=word, first=first,
         above=[picture.name for picture in first], cost=cost(result), live=live,
-        first_body=body, view=view, closed=CLOSED, long=len(result.sentence) > _LONG,
+        first_body=body, view=view, closed=(*CLOSED, *own[_OPEN:]),
+        long=len(result.sentence) > _LONG,
     )  # fmt: skip
 
 
