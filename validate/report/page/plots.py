@@ -12,7 +12,7 @@ from validate.report.charts.axes import levels
 from validate.report.charts.line_styles import styled
 from validate.report.charts.style import HasMethods
 
-_MOST = 600  # points of a series; of more, the lowest and the highest of equal parts
+_MOST = 400  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
 
