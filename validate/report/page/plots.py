@@ -12,9 +12,10 @@ from validate.report.charts.axes import levels
 from validate.report.charts.line_styles import styled
 from validate.report.charts.style import HasMethods
 
-_MOST = 400  # points of a series; of more, the lowest and the highest of equal parts
+_MOST = 800  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
+_SHOWN = 4  # digits of y: as many as the page shows
 
 
 def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
@@ -62,9 +63,9 @@ def _points(
     series: Series, order: Ints
 ) -> tuple[list[float | None], dict[str, list[float | None]]]:
     keep = order[_peaks(series.y[order])]
-    found = {"y": _numbers(series.y[keep])}
+    found = {"y": _numbers(series.y[keep], _SHOWN)}
     if series.upper is not None:
-        found["upper"] = _numbers(series.upper[keep])
+        found["upper"] = _numbers(series.upper[keep], _SHOWN)
     return _numbers(series.x[keep]), found
 
 
@@ -77,9 +78,9 @@ def _peaks(y: Floats) -> Ints:
     return np.unique([0, *found, len(y) - 1])
 
 
-def _numbers(values: Floats) -> list[float | None]:
-    return [_number(v) for v in values.tolist()]
+def _numbers(values: Floats, digits: int = _DIGITS) -> list[float | None]:
+    return [_number(v, digits) for v in values.tolist()]
 
 
-def _number(value: float) -> float | None:
-    return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+def _number(value: float, digits: int = _DIGITS) -> float | None:
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None
