@@ -12,12 +12,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from PIL import Image
 from report_samples import CHECK, bare_result, small_result
 from tracking_samples import tracking_result
 
-from validate.compare.exhibit import Exhibit, NumberTable
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.compare.result import Result
 from validate.report.write import write_report
 from validate.study.loose_page import write_loose
@@ -127,7 +129,7 @@ def empty() -> Result:
 
 def of_runs(folder: Path) -> Path:
     """A page without a run of its own, as studies, comparisons and summaries write it."""
-    rows = tuple((f"run {i}", float(30 - i)) for i in range(30))
+    rows = tuple((f"Run {i}", float(30 - i)) for i in range(30))
     table = NumberTable("rates", "Rates of runs", ("run", "rate / Hz"), rows)
     exhibit = Exhibit("runs", "Runs", ("Thirty of them.",), (table,))
     told = ("runs", "Stored runs", "this folder", "30 runs are stored.")
@@ -202,6 +204,85 @@ def test_two_methods_stand_side_by_side(browser: str, report: Path, tmp_path: Pa
     assert found["two"] == ["soft <cube>", "stiff <cube>"]
 
 
+# `picture` is what Save PNG gives; `choose` picks an option of a select by its label.
+PICTURES = """let saved = "";
+  HTMLAnchorElement.prototype.click = function () { saved = this.href; };
+  const all = selector => [...document.querySelectorAll(selector)];
+  const save = all(".viewer button").find(b => b.textContent === "Save PNG");
+  const picture = () => { save.click(); return saved; };
+  const tell = (one, kind) => one.dispatchEvent(new Event(kind));
+  const set = (one, value) => { one.value = value; tell(one, "change"); tell(one, "input"); };
+  const choose = (text, label) => { const found = all(".viewer option").find(o =>
+      o.textContent === text && o.closest("label").textContent.startsWith(label));
+    set(found.closest("select"), found.value); };
+  const slider = document.querySelector(".viewer input[type=range]");"""
+
+
+def two_bodies() -> Result:
+    """The second method is pressed half as much again."""
+    first, other = small_result().methods
+    run = replace(other.run, u=1.5 * other.run.u)
+    return replace(small_result(), methods=(first, replace(other, runs=(run, run))))
+
+
+def opened_cavity() -> Result:
+    """A body with a cavity, which begins opened."""
+    scene = phantom_scene(phantom_mesh(COARSE_GRID))
+    method = small_result().methods[0]
+    u = np.zeros((2, len(scene.mesh.nodes), 3))
+    u[1, :, 2] = 0.05 * scene.mesh.nodes[:, 0]
+    run = replace(method.run, u=u)
+    return replace(small_result(), methods=(replace(method, scene=scene, runs=(run, run)),))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("result", [two_bodies, tracking_result, opened_cavity])
+def test_every_control_changes_the_picture(
+    browser: str, tmp_path: Path, result: Callable[[], Result]
+) -> None:
+    action = f"""{PICTURES}
+      found.same = picture() === picture();
+      found.idle = [];
+      for (const one of all(".viewer select, .viewer input")) {{
+        const before = picture(), value = one.value, box = one.type === "checkbox";
+        const at = one.parentElement.textContent.startsWith("beside") ? 2 : 1;
+        if (box) one.click(); else set(one, one === slider ? 0 : one.options[at].value);
+        if (picture() === before) found.idle.push(one.parentElement.textContent);
+        if (box) one.click(); else set(one, value);
+      }}"""
+    found, _ = look(browser, of(result())(tmp_path / "report"), tmp_path, 1280, action)
+    assert found["same"] is True
+    assert found["idle"] == []
+
+
+@pytest.mark.slow
+def test_tools_move_with_scaled_displacements(browser: str, report: Path, tmp_path: Path) -> None:
+    """Displacements of nought are the body at rest, its plates with it."""
+    action = f"""{PICTURES} choose("difference from stiff <cube> / mm", "Colour");
+      choose("none", "Displacements"); const still = picture();
+      choose("true", "Displacements"); found.moved = picture() !== still;
+      set(slider, 0); found.rest = picture() === still;"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["moved"] is True
+    assert found["rest"] is True
+
+
+@pytest.mark.slow
+def test_all_ways_of_a_curve_are_hidden_together(browser: str, tmp_path: Path) -> None:
+    x = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
+    chart = Chart("ways", "To and fro", "x / mm", "y / N", (Series("pressed", x, x + 1),))
+    own = Exhibit("ways", "Ways", charts=(chart,))
+    page = of(replace(small_result(), exhibits=(own,)))(tmp_path / "report")
+    action = """const figure = document.getElementById("figure-chart_ways");
+      const rows = [...figure.querySelectorAll(".u-series")].slice(1);
+      found.shown = rows.map(r => getComputedStyle(r).display !== "none");
+      rows[0].querySelector(".u-label").parentElement.click(); await wait(50);
+      found.off = rows.map(r => r.classList.contains("u-off"));"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    assert found["shown"] == [True, False]  # one name in the legend
+    assert found["off"] == [True, True]
+
+
 def test_a_table_sorts_filters_and_unfolds(browser: str, tmp_path: Path) -> None:
     action = """const table = document.querySelector("table.sortable");
       const names = () => [...table.tBodies[0].rows].filter(r => getComputedStyle(r).display
@@ -213,11 +294,11 @@ def test_a_table_sorts_filters_and_unfolds(browser: str, tmp_path: Path) -> None
       const field = document.querySelector(".filter");
       field.value = "RUN 2"; field.dispatchEvent(new Event("input")); found.filtered = names();"""
     found, _ = look(browser, of_runs(tmp_path / "runs"), tmp_path, 1280, action)
-    assert found["first"] == [f"run {i}" for i in range(8)]
+    assert found["first"] == [f"Run {i}" for i in range(8)]
     assert sorted((found["down"], found["up"])) == [
-        [f"run {i}" for i in range(8)], [f"run {i}" for i in range(29, 21, -1)]
+        [f"Run {i}" for i in range(8)], [f"Run {i}" for i in range(29, 21, -1)]
     ]  # fmt: skip
-    assert set(found["filtered"]) == {f"run {i}" for i in (2, *range(20, 30))}
+    assert set(found["filtered"]) == {f"Run {i}" for i in (2, *range(20, 30))}
 
 
 @pytest.mark.slow
