@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from distributed import Client
 from distributed.scheduler import KilledWorker
 from engine_samples import Waited, Waiting, waiting
 
@@ -155,3 +156,16 @@ def test_what_a_worker_died_of_is_done_here_and_values_keep_their_order() -> Non
     assert client.done == [1, 5]
     with pytest.raises(ZeroDivisionError):
         cluster.side_by_side(client, divmod, 17, [1, 0])()
+
+
+@pytest.mark.parametrize("shared", [(), (1, (2,)), {}, [3], "one", {"a": 1}])
+def test_what_is_shared_arrives_whole_on_real_workers(shared: object) -> None:
+    """Dask scatters a tuple, list or dictionary item by item, and none of an empty one."""
+    with Client(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as client:
+        assert cluster.side_by_side(client, _both, shared, [1, 2])() == [(shared, 1), (shared, 2)]
+
+
+def _both(shared: object, item: int) -> tuple[object, int]:
+    return shared, item

@@ -93,7 +93,7 @@ def side_by_side(
     client: Any, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
 ) -> Callable[[], list[Any]]:
     """Begin `function(shared, item)` of every item on all workers, each as soon as one is free."""
-    there = client.scatter(shared, broadcast=True, hash=False)
+    (there,) = client.scatter([shared], broadcast=True, hash=False)  # a tuple would be divided
     sent = [client.submit(function, there, item, pure=False, retries=0) for item in items]
 
     def finished() -> list[Any]:
