@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from shutil import copytree
 from types import SimpleNamespace
@@ -293,24 +294,27 @@ def test_exit_codes_of_known_errors_interrupts_and_bugs(
 
 
 def test_check_shows_every_figure_and_fails_when_one_moves(
-    monkeypatch: pytest.MonkeyPatch, phantom_result: Result
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, phantom_result: Result
 ) -> None:
+    asked = ("check", "--fresh", "fluid_phantom", "--out", str(tmp_path))
     monkeypatch.setattr(checking, "compare", lambda *_, **__: phantom_result)
-    code, out, _ = here("check", "--fresh", "fluid_phantom", "--json")
+    code, out, _ = here(*asked, "--json")
     found = json.loads(out)[0]
     assert (code, found["holds"], len(found["published"])) == (0, True, 48)
     assert sum(p["result"] for p in found["published"]) == 14
-    printed = here("check", "--fresh", "fluid_phantom")[1].splitlines()
+    printed = here(*asked)[1].splitlines()
     assert printed[0] == "fluid_phantom: holds; the verdict is good enough."
-    assert len(printed) <= 25
-    whole = here("check", "--fresh", "fluid_phantom", "--verbose")[1]
+    assert len(printed) <= 26
+    page = (tmp_path / "published" / "report.html").read_text("utf-8")
+    assert all(escape(p["name"]) in page for p in found["published"])
+    whole = here(*asked, "--verbose")[1]
     assert all(p["name"] in " ".join(whole.split()) for p in found["published"])
     moved = replace(phantom_result.published[0], expected=1.0)
     spoiled = replace(phantom_result, published=(moved,))
     monkeypatch.setattr(checking, "compare", lambda *_, **__: spoiled)
-    assert here("check", "--fresh", "fluid_phantom")[0] == 1
+    assert here(*asked)[0] == 1
     monkeypatch.setattr(checking, "compare", lambda *_, **__: replace(phantom_result, published=()))
-    assert here("check", "--fresh", "fluid_phantom")[0] == 1  # nothing compared
+    assert here(*asked)[0] == 1  # nothing compared
 
 
 def test_check_of_an_experiment_without_printed_figures_rests_on_its_checks(
@@ -338,10 +342,11 @@ def test_check_fails_by_name_for_a_printed_figure_that_nothing_computes(
         f"EXPERIMENT = Experiment(published=({figure},),",
     )
     file.write_text(text, "utf-8")
-    done, out, _ = here("check", str(file), "--json")
+    asked = ("check", str(file), "--out", str(tmp_path / "out"))
+    done, out, _ = here(*asked, "--json")
     (found,) = json.loads(out)[0]["published"]
     assert (done, found["name"], found["fault"]) == (code, "the printed error", fault)
-    assert "the printed error" in here("check", str(file))[1]
+    assert "the printed error" in here(*asked)[1]
 
 
 @pytest.mark.parametrize(

@@ -92,8 +92,8 @@ def test_a_line_lies_where_its_share_is() -> None:
         {"a": "#markers"},
     )  # fmt: skip
     far, near = found.lines
-    assert (far.label, far.beyond, far.colour, far.link) == ("b", True, "bad", "")
-    assert (near.label, near.beyond, near.link) == ("a", False, "#markers")
+    assert (far.label, far.beyond, far.colour, far.link) == ("b", "below", "bad", "")
+    assert (near.label, near.beyond, near.link) == ("a", "", "#markers")
     zero, one = found.zero, found.within[0] + found.within[1]
     assert near.at == pytest.approx(zero + 0.5 * (one - zero), abs=0.02)
     assert near.low == pytest.approx(zero + 0.25 * (one - zero), abs=0.02)

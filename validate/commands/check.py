@@ -1,6 +1,7 @@
 """`validate check`: published figures and declared verdicts against current results."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,8 +24,10 @@ from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder
 from validate.pipeline.run.pipeline import compare
 from validate.report.long_table import long_table
+from validate.report.stored.folder import try_results
 from validate.report.stored.json_values import members
 from validate.report.stored.store import check_members, figure_members, overall_members
+from validate.study.stored_runs.published_page import FOLDER, write_published
 
 Json = dict[str, Any]
 
@@ -40,9 +43,12 @@ def check(
     detail: Detail = "screen",
 ) -> int:
     """Check every figure and verdict of matching stored runs, else of new ones, which leave no
-    report; `fresh`: nothing that is stored is used. 0 when no figure moved and every verdict is the
-    declared one."""
+    report, and write the page of printed figures; `fresh`: nothing that is stored is used. 0 when
+    no figure moved and every verdict is the declared one."""
     found: list[Json] = []
+    figures: list[Json] = []
+    reports = reports_of(None, out)
+    try_results(reports / FOLDER, ())
 
     def one(experiment: Experiment) -> bool:
         content = None if fresh else _stored(experiment, out)
@@ -60,6 +66,7 @@ def check(
         motion = described(experiment)
         held = _document(content, declared=bool(experiment.published))
         found.append({**held, "motion": motion})
+        figures.append(_figures(experiment, content, holds=held["holds"]))
         if not as_json:
             _show(content, found[-1], detail)
         return bool(found[-1]["holds"])
@@ -68,9 +75,21 @@ def check(
         found.append({"experiment": name, "holds": False, "error": why})
 
     code = each(names, named, one, failed)
+    page = write_published(reports, figures)
+    if page and not as_json:
+        say(f"printed figures: {relative(page)}")
     if as_json:
         print(json.dumps(found, ensure_ascii=False, indent=1, allow_nan=False))
     return code
+
+
+def _figures(experiment: Experiment, content: Json, *, holds: bool) -> Json:
+    """What the page of printed figures shows of an experiment."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return {
+        "experiment": experiment.name, "title": experiment.title, "source": content["source"],
+        "checked": content["created"] or now, "holds": holds, "published": content["published"],
+    }  # fmt: skip
 
 
 def _stored(experiment: Experiment, out: Path | None) -> Json | None:

@@ -220,7 +220,7 @@ class Intervals:
     """values (k,) ± halves (k,) each with its limit (k,), all in the unit of its line, NaN = none.
 
     `texts` are the numbers as read, `answers` what follows from them, `quantities` what each line
-    compares (empty: not told).
+    compares (empty: not told), `across` what is divided by the limits.
     """
 
     name: str
@@ -233,6 +233,7 @@ class Intervals:
     answers: tuple[str, ...]
     caption: str = ""
     quantities: tuple[str, ...] = ()
+    across: str = "error ± 2 u_val over its limit"
 
     def __post_init__(self) -> None:
         shape, fail = (len(self.labels),), ComparisonError

@@ -124,6 +124,7 @@ def _home(value: Any) -> ModuleType | None:
     return sys.modules.get(name) if isinstance(name, str) else None
 
 
+@cache
 def _is_users(file: Path) -> bool:
     """Whether a module is neither of this package, of Python nor installed."""
     ours = (PACKAGE, Path(sys.prefix), Path(sys.base_prefix))

@@ -65,6 +65,8 @@ def reported_run(
     with locked(folder), progress(experiment.name) as report:
         try_results(folder, (STUDIES, CELLS))
         store = reports_of(experiment.path, out) / experiment.name
+        if not options.quick and not any((store / CELLS).glob("*")):
+            pool.begin()  # much is left to do: workers start while this process loads
         by = InStore(plain, options, store, pool)
         identify = by_cells(experiment, options, out, report, pool)
         result = compare(experiment, options, report, identify, by)

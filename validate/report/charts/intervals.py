@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from validate.arrays import Floats
 from validate.compare.exhibit import Intervals, Picture
 from validate.report.charts.style import MEASURED, NOISE, PALETTE, WIDTH, Drawing, draw
+from validate.report.views.view_filling import WORDS
 
 _LINE, _ROOM = 0.3, 1.0  # inches of a line, of title and axis
 _LETTERS = 34  # of a label in one line
 _MOST = 40  # lines of one picture: those nearest to their limit
 _FAR = 3.0  # shares of the limit; what lies beyond is an arrow
-_COLOURS = {"good enough": PALETTE[2], "not distinguishable": PALETTE[2],
-            "not good enough": PALETTE[1], "differs": PALETTE[1]}  # fmt: skip
+_COLOURS = {"good": PALETTE[2], "bad": PALETTE[1]}
 
 
 def picture(shown: Intervals) -> Picture:
@@ -53,7 +53,7 @@ def shares(shown: Intervals) -> tuple[Floats, Floats, str]:
     by = shown.limits if limited else shown.halves
     with np.errstate(divide="ignore", invalid="ignore"):
         share, half = shown.values / by, shown.halves / by
-    of = "error ± 2 u_val over its limit" if limited else "error over 2 u_val"
+    of = shown.across if limited else "error over 2 u_val"
     return np.nan_to_num(share, nan=0.0, posinf=np.inf, neginf=-np.inf), np.nan_to_num(half), of
 
 
@@ -64,7 +64,7 @@ def _fill(figure: Figure, shown: Intervals) -> None:
     ax.axvspan(-1, 1, color=NOISE, zorder=0)
     ax.axvline(0, color=MEASURED, linewidth=0.8)
     for y, i in enumerate(order):
-        colour = _COLOURS.get(shown.answers[i], PALETTE[4])
+        colour = _COLOURS.get(WORDS.get(shown.answers[i], ""), PALETTE[4])
         ends = np.clip([share[i] - half[i], share[i] + half[i]], -_FAR, _FAR)
         ax.plot(ends, [y, y], color=colour, linewidth=2.2, solid_capstyle="butt")
         inside = abs(share[i]) <= _FAR

@@ -29,11 +29,10 @@ from validate.report.page.body_view import body_view
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
 from validate.report.views.numbers import with_unit
+from validate.report.views.view_filling import WORDS
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
 _FAR = 3.0  # shares of the limit that a track shows; what lies beyond ends in an arrow
-_COLOURS = {"good enough": "good", "not distinguishable": "good", "not good enough": "bad",
-            "differs": "bad"}  # fmt: skip
 _LONG = 420  # letters of a sentence that are shown at once: four lines
 #: Sections that a reader opens: how the numbers came about, and long lists.
 CLOSED = ("discrimination", "body", "scores", "registration", "recording", "parameters", "made",
@@ -47,14 +46,15 @@ _CHECKS = "intervals_limits"
 @dataclass(frozen=True)
 class Line:
     """One check on its track: the interval from `low` on, `wide` long, and its value `at`, in % of
-    the track; `link` to the picture of what was compared."""
+    the track; a value `beyond` the track lies "above" or "below" it; `link` to the picture of what
+    was compared."""
 
     label: str
     link: str
     low: float
     wide: float
     at: float
-    beyond: bool
+    beyond: str
     text: str
     answer: str
     colour: str
@@ -146,8 +146,8 @@ def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
             found.labels[i].removeprefix(prefix),
             links.get(found.quantities[i], "") if found.quantities else "",
             low := place(share[i] - half[i]), round(place(share[i] + half[i]) - low, 2),
-            place(share[i]), bool(abs(share[i]) > far), found.texts[i], found.answers[i],
-            _COLOURS.get(found.answers[i], "open"),
+            place(share[i]), _beyond(share[i], far), found.texts[i], found.answers[i],
+            WORDS.get(found.answers[i], "open"),
         )
         for i in order.tolist()
     )  # fmt: skip
@@ -156,6 +156,10 @@ def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
     within = (start, round(place(1.0) - start, 2))
     told = f"{prefix.removesuffix(': ')}. {found.caption}" if prefix else found.caption
     return Forest(name, found.title, told, of, within, place(0.0), lines)
+
+
+def _beyond(share: float, far: float) -> str:
+    return "" if abs(share) <= far else "above" if share > 0 else "below"
 
 
 def _links(result: Result, exhibits: Iterable[DrawnExhibit]) -> dict[str, str]:
