@@ -23,8 +23,6 @@ _ACCEPTANCE = {
     "not good enough": ("not good enough", True),
     "undecided": ("undecided", True),
     "nothing compared": ("compared nothing", True),
-    "fitted": ("fitted, no evidence", False),
-    "same model": ("of the same model, no evidence", False),
 }
 _VALIDATION = {
     "differs": ("differ from zero", True),
@@ -57,8 +55,9 @@ def figures_sentence(published: tuple[Published, ...]) -> str:
 
 
 def _of(method: MethodResult, kind: Kind) -> str:
-    """One method: how many checks have which answer to both questions."""
-    required = [c for c in method.checks if c.acceptance != "no requirement"]
+    """One method: how many checks have which answer to both questions. A requirement on data that
+    calibrated or made the model is none that could be met."""
+    required = [c for c in method.checks if c.acceptance in _ACCEPTANCE]
     told = []
     if required:
         told.append(_counted(required, lambda c: c.acceptance, _ACCEPTANCE, "requirements"))
