@@ -4,6 +4,7 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from shutil import copyfile
 from types import SimpleNamespace
 
 import numpy as np
@@ -432,3 +433,17 @@ def test_a_prediction_of_a_few_samples_is_no_evidence(tmp_path: Path) -> None:
     assert code == 2
     assert "window 'beyond'" in output
     assert "10 are needed to check a prediction" in output
+
+
+def test_the_kind_may_be_answered_where_the_recording_leaves_no_choice(
+    tmp_path: Path, project_root: Path
+) -> None:
+    copyfile(project_root / "recordings" / "kf_cube.mcap", tmp_path / "cube.mcap")
+    (kind,) = (k.name for k in fitting(read_recording(tmp_path / "cube.mcap")))
+    asked = ("new", "a", "--from", "cube.mcap", "--questions", "--answers", "a.toml")
+    (tmp_path / "a.toml").write_text(f'experiment = "{kind}"', "utf-8")
+    listed = in_folder(tmp_path, *asked)
+    assert listed[0] == 0
+    assert "left out" not in listed[1]
+    (tmp_path / "a.toml").write_text('experiment = "inclusion"', "utf-8")
+    assert f"fits {kind} only" in in_folder(tmp_path, *asked)[1]

@@ -46,6 +46,18 @@ def test_every_folder_is_a_row_that_leads_to_its_report(reports: Path) -> None:
     assert [run["folder"] for run in document["runs"]] == ["cube", "ball"]
 
 
+def test_a_first_run_with_other_parameters_is_told_beside_the_declared_one(reports: Path) -> None:
+    result = small_result()
+    other = tuple(
+        replace(p, default=3e4) if p.path == "material.E" else p for p in result.parameters
+    )
+    write_report(replace(result, parameters=other), reports / "cube+E", created=SECOND)
+    write_report(replace(result, name="cone", parameters=other), reports / "cone+E", created=SECOND)
+    changed = {s.folder: s.changed for s in stored(reports)}
+    assert changed["cube+E"] == "first run; against cube: material.E: 20000 Pa -> 30000 Pa"
+    assert changed["cone+E"] == "first run"  # of which no declared run is stored
+
+
 def test_shares_of_limits_over_the_runs_are_a_curve(reports: Path) -> None:
     write_overview(reports)
     with (reports / "overview" / "tables" / "chart_trend.csv").open() as file:

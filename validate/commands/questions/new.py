@@ -61,10 +61,10 @@ def new(
     if not questions:
         require_new((path,), (source, *((answers,) if answers else ())), force=force)
         try_folder(path, _LARGEST)
-    given = read_answers(answers) if answers else {}
     recording = read_recording(source)
     ask_back(recording)
     kinds = fitting(recording)
+    given = _without_settled(kinds, read_answers(answers) if answers else {})
     asks = partial(_asked, kinds, recording, path.parent)
     if questions:
         click.echo(listed(asks, given))
@@ -161,6 +161,19 @@ def _asked(
         if which.key not in found:
             return (which,)
     return _chosen(kinds, found).asks(recording, folder, found)
+
+
+def _without_settled(kinds: Sequence[NewKind], given: Answers) -> Answers:
+    """Return the answers without that to a question that the recording answers alone.
+
+    Raises `UsageError` where it answers otherwise."""
+    if len(kinds) > 1 or "experiment" not in given:
+        return given
+    if given["experiment"] != kinds[0].name:
+        raise UsageError(
+            f'experiment = "{given["experiment"]}": this recording fits {kinds[0].name} only'
+        )
+    return {key: answer for key, answer in given.items() if key != "experiment"}
 
 
 def _chosen(kinds: Sequence[NewKind], found: Answers) -> NewKind:

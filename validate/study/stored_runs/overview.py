@@ -20,9 +20,14 @@ _NAMED = 3  # changed parameters and moved checks that are named
 
 @dataclass(frozen=True)
 class StoredRun:
-    """All runs of a report folder, the oldest first; the last one is what the folder holds."""
+    """All runs of a report folder, the oldest first; the last one is what the folder holds.
+
+    `base` is the last run of the experiment as it is declared, of whose parameters these are
+    changes; None where it is not stored or is this one.
+    """
 
     runs: tuple[PastRun, ...]
+    base: PastRun | None = None
 
     @property
     def folder(self) -> str:
@@ -36,8 +41,12 @@ class StoredRun:
 
     @property
     def changed(self) -> str:
-        """What changed since the run before, in words."""
-        return change(since(*self.runs[-2:])) if len(self.runs) > 1 else "first run"
+        """What changed since the run before, in words; of a first run, against `base`."""
+        if len(self.runs) > 1:
+            return change(since(*self.runs[-2:]))
+        if self.base is None:
+            return "first run"
+        return f"first run; against {self.base.folder}: {change(since(self.base, self.runs[-1]))}"
 
 
 def stored(reports: Path) -> tuple[StoredRun, ...]:
@@ -52,7 +61,11 @@ def stored(reports: Path) -> tuple[StoredRun, ...]:
             by_folder.setdefault(run.folder, []).append(run)
     if not by_folder:
         raise UsageError(f"no stored run below {reports}; `validate run fluid_phantom` makes one")
-    found = [StoredRun(tuple(runs)) for runs in by_folder.values()]
+    last = {folder: runs[-1] for folder, runs in by_folder.items()}
+    found = [
+        StoredRun(tuple(runs), last.get(folder.partition("+")[0]) if "+" in folder else None)
+        for folder, runs in by_folder.items()
+    ]
     return tuple(sorted(found, key=lambda s: s.runs[-1].created, reverse=True))
 
 
