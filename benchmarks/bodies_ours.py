@@ -15,7 +15,7 @@ from validate.pipeline.bodies.measured import measured_body, solid
 from validate.pipeline.checks.numerical_uncertainty import Refined
 from validate.pipeline.experiment.experiment import Experiment, Variant
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Markers, Recording, Signal, Source
 from validate.register.markers.markers import Together, observe_markers
 from validate.register.markers.quality import as_declared
@@ -107,11 +107,11 @@ def recording(body: Drawn) -> Recording:
 def judged(body: Drawn, truth: list[float]) -> Judged:
     """The error of the nominal mesh, and what the family of meshes says of it."""
     made = experiment(body, truth)
-    road = Road(made, made.methods, made.parameters, None, quick=True)
-    road.recordings = (recording(body),)
+    runs = ExperimentRuns(made, made.methods, made.parameters, None, quick=True)
+    runs.recordings = (recording(body),)
     assert made.uncertainty is not None
-    (residual,) = road.varied(Variant("solid")).residuals.values()
-    found = Refined(road, made.uncertainty, "solid").of(residual, np.inf)["mesh"]
+    (residual,) = runs.varied(Variant("solid")).residuals.values()
+    found = Refined(runs, made.uncertainty, "solid").of(residual, np.inf)["mesh"]
     assert found is not None
     answer = np.reshape(truth, (-1, residual.values.shape[1]))
     return Judged(rms(residual.values), rms(answer), found)

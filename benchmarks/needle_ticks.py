@@ -26,7 +26,7 @@ from validate.fem.system import build
 from validate.pipeline import load
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Built
-from validate.pipeline.live import Lived, RecordedPath, live, prepared, realtime
+from validate.pipeline.live import LiveRun, RecordedPath, live, prepared, realtime
 from validate.pipeline.live.clock import quiet
 from validate.scene.tool import Needle
 from validate.solve.haptic.needle import NeedleLoop, NeedleStepper
@@ -56,7 +56,7 @@ def head(deadline: float) -> None:
     print(f"{'microseconds':44} {'ticks':>7} {names}  longest   met {1e6 * deadline:.0f} us / %")
 
 
-def run_live(method: str, seconds: float) -> Lived:
+def run_live(method: str, seconds: float) -> LiveRun:
     made = prepared(load("needle_pocket"), Options({}), method)
     t, x = made.path.t - made.path.t[0], made.path.x
     times = int(np.ceil(seconds / t[-1]))

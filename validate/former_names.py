@@ -98,6 +98,8 @@ FORMER = {
 FORMER_MEMBERS: Mapping[str, Mapping[str, str]] = {
     "estimate": {"FilterpyGuest": "FilterpyFilter"},
     "estimate.filterpy.filters": {"FilterpyGuest": "FilterpyFilter"},
+    "pipeline.experiment.experiment": {"Told": "ReportAdditions"},
+    "pipeline.run.method_run": {"Followed": "MethodRun"},
     "solve.external.exchange": {"GuestAnswer": "ExternalAnswer", "GuestJob": "ExternalJob"},
     "solve.external.scheme": {"Guest": "ExternalSimulator", "GuestLetGo": "ExternalLetGo"},
     "solve.external.suite": {"check_guest": "check_simulator"},

@@ -1,4 +1,4 @@
-"""The road of `async_block`: a square or a cube touched in the middle of a face.
+"""Pipeline of `async_block`: a square or a cube touched in the middle of a face.
 
 The recording is the whole solve's on the same mesh, as in the paper: a point contact's force
 depends on the mesh, so no finer body can judge it. It can only repeat itself; what regions cost is
@@ -12,7 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.run.method_run import Cases
 from validate.recording.types import Recording
@@ -61,7 +61,7 @@ def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
     return {"dt": own.dt, "spring": own.probe.spring}
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """Force, phase and ticks of every method, and at which size regions pay."""
     tree, main = cast(Tree, parameters), cases[""]
     p: HapticTest = tree.settings
@@ -84,7 +84,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
     scene = _BUILT(None, tree)
     swing = p.probe.depth * np.sin(2 * np.pi * p.probe.highest * t)
     energies = energy_table(f"Energy at {p.probe.highest:g} Hz.", scene, rivals, swing)
-    return Told(
+    return ReportAdditions(
         (
             Exhibit("ticks", "Time and error of regions", _TICK_WORDS, (forces,)),
             Exhibit("energy", "Energy of borders", (ENERGY,), (energies,)),

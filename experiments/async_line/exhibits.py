@@ -15,9 +15,9 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, Heat, NumberTable
 from validate.fem.critical import lanczos_step
 from validate.fem.system import build
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.solve.regions.scheme import AsyncRegions
 
 from .methods import LINE
@@ -87,7 +87,7 @@ _SHORT, _NEAR = 10, 3  # free nodes and primary layers of the bar whose stabilit
 _RATIOS = (1, 2, 5, 10, 20, 50, 100, 200)
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """Both tables, the oracle beside, energies of borders, and growth over the step ratio."""
     tree, main = cast(Tree, parameters), cases[""]
     middle = tree.settings.probe.seconds / 2
@@ -116,7 +116,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         (_impedances(tree, main), energy),
         heats=(maps,),
     )
-    return Told((tables, bounds), {**numbers, **more, **sentences})
+    return ReportAdditions((tables, bounds), {**numbers, **more, **sentences})
 
 
 _BORDERS = (
@@ -162,7 +162,7 @@ def _table_2(tree: Tree) -> tuple[NumberTable, dict[str, float]]:
     return NumberTable("table_2", title, heads, tuple(rows)), numbers
 
 
-def _impedances(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
+def _impedances(tree: Tree, main: Mapping[str, MethodRun]) -> NumberTable:
     """Peak force by frequency of the chirp, against the continuous bar's impedance."""
     p = tree.settings
     rise = (p.probe.highest - p.probe.lowest) / p.probe.seconds
@@ -181,7 +181,7 @@ def _impedances(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
                        tuple(rows))  # fmt: skip
 
 
-def _energies(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
+def _energies(tree: Tree, main: Mapping[str, MethodRun]) -> NumberTable:
     """The first tenth of the chirp's time, at its highest frequency."""
     p = tree.settings
     t: Floats = p.dt * np.arange(1, round(min(4.0, p.probe.seconds) / p.dt) + 1, dtype=np.float64)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, NumberTable
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Scene
 from validate.solve.regions.krylov import TouchedKrylov
 from validate.solve.regions.scheme import AsyncRegions
@@ -24,7 +24,7 @@ ENERGY = (
 
 
 def force_table(
-    name: str, title: str, main: Mapping[str, Followed], middle: float, within: float
+    name: str, title: str, main: Mapping[str, MethodRun], middle: float, within: float
 ) -> tuple[NumberTable, dict[str, float]]:
     """Peak (in `middle` +- `within` s), error, phase and ticks of every method, and as numbers."""
     runs = {key: f.run for key, f in main.items() if f.run.finished}

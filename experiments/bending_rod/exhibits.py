@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases
 from validate.scene.geometries.box import box
@@ -60,7 +60,7 @@ _SEEN = 180  # steps: 6 s, beyond the first crossing on every mesh
 _MOVING = 4.0  # s: until here the rod falls
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """All exhibits of the rod, and the numbers of its printed figures."""
     p, main = cast(Tree, parameters), cases[""]
     progress("errors over time")
@@ -94,7 +94,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "shapes", "Deformed shapes", maps=tuple(shape_maps(main, ("implicit", "quasi_static"), 1.0))
     )
     mesh = _mesh_error(finer, mesh_words(finer, errors))
-    return Told((shown, shapes, switches, still, dip, _limits(p), mesh, *more), numbers)
+    return ReportAdditions((shown, shapes, switches, still, dip, _limits(p), mesh, *more), numbers)
 
 
 def _words(errors: Mapping[str, Errors]) -> tuple[str, ...]:

@@ -7,9 +7,9 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
 from validate.pipeline.exhibits.standard import error_at
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.markers.markers import MarkerObservation
 from validate.register.signals import SignalObservation
 
@@ -28,7 +28,7 @@ _KINETIC = 0.01  # of the strain energy, after the first tenth of the ramp
 _NU = (0.45, 0.49, 0.499, 0.4995)
 
 
-def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> Told:
+def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """Signal against noise, ranking where there is one, elements, inertia, force readings."""
     main = cases[""]
     explicit = main["nfem"]
@@ -59,7 +59,7 @@ def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> Told:
         (_inertia_words(tree.settings.clock.scale, share),),
         (_forces(main), locked, readings, limits, _cards(tree, main)),
     )
-    return Told((signals, elements), numbers)
+    return ReportAdditions((signals, elements), numbers)
 
 
 def _inertia_words(scale: float, share: float | None) -> str:
@@ -73,7 +73,7 @@ def _inertia_words(scale: float, share: float | None) -> str:
     )
 
 
-def kinetic_share(followed: Followed) -> float | None:
+def kinetic_share(followed: MethodRun) -> float | None:
     """Largest kinetic over strain energy after the first tenth; None for a run that ended early."""
     if not followed.whole:
         return None
@@ -96,12 +96,12 @@ def _noise_words(cases: Cases) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _seen(followed: Followed, probe: str) -> bool:
+def _seen(followed: MethodRun, probe: str) -> bool:
     moved, sd = _motion(followed, probe)
     return moved > _SEEN * sd
 
 
-def _motion(followed: Followed, probe: str) -> tuple[float, float]:
+def _motion(followed: MethodRun, probe: str) -> tuple[float, float]:
     """Largest true displacement m of a probe, and the tracker's sd m."""
     sd = next((m.sd for m in followed.seen.of(MarkerObservation)), 0.0)
     return float(np.linalg.norm(followed.truth.probes[probe], axis=1).max()), sd
@@ -124,7 +124,7 @@ def _noise_table(cases: Cases) -> NumberTable:
     )
 
 
-def _ranking(main: Mapping[str, Followed], force: float) -> NumberTable:
+def _ranking(main: Mapping[str, MethodRun], force: float) -> NumberTable:
     """Methods by their error at B, which no filter is given."""
     errors = {
         f.label: (error_at(f, "node_B", "z"), error_at(f, "node_A", "z"))
@@ -145,7 +145,7 @@ def _ranking(main: Mapping[str, Followed], force: float) -> NumberTable:
     )
 
 
-def _forces(main: Mapping[str, Followed]) -> NumberTable:
+def _forces(main: Mapping[str, MethodRun]) -> NumberTable:
     """Force at the end by element, for bodies that the plate moves, beside what was measured."""
     rows: list[tuple[Entry, ...]] = []
     for f in main.values():
@@ -168,7 +168,7 @@ def _end(t: Floats, y: Floats) -> float:
     return float(slope * t[-1] + offset)
 
 
-def _cards(tree: Tree, main: Mapping[str, Followed]) -> NumberTable:
+def _cards(tree: Tree, main: Mapping[str, MethodRun]) -> NumberTable:
     """The force of the accepted element for every material card: proportional to the modulus."""
     shear = {
         "paper": (22_081.0, "printed, paper 003"),

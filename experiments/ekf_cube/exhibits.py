@@ -9,7 +9,7 @@ from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.run.method_run import Cases
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
@@ -37,7 +37,7 @@ INTEGRATORS = (
 )
 
 
-def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """Rates over the size of the mesh, both readings of the force, critical steps, locking."""
     scene = cases[""]["nfem"].body
     progress("rates of 6 to 105 456 tetrahedra")
@@ -64,4 +64,4 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> Told:
         ("The printed force, step and element each change the result more than the filter does.",),
         (readings, limits, locked),
     )
-    return Told((model, rates_exhibit(rates)), numbers)
+    return ReportAdditions((model, rates_exhibit(rates)), numbers)

@@ -10,7 +10,7 @@ from validate.compare.exhibit import Entry, NumberTable
 from validate.fem.critical import critical_step
 from validate.fem.locking import locking_factor
 from validate.fem.system import build as build_system
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Load, Scene
 from validate.solve.march import march
 from validate.solve.static.newton import StaticNewton
@@ -83,7 +83,7 @@ def locking_table(scene: Scene, values: tuple[float, ...]) -> NumberTable:
     )
 
 
-def fields_apart(methods: Mapping[str, Followed], names: tuple[str, str]) -> float:
+def fields_apart(methods: Mapping[str, MethodRun], names: tuple[str, str]) -> float:
     """Largest distance of two methods' fields at the last common frame over the largest
     displacement of the second there; NaN where one of them was not run, or ended early."""
     if any(name not in methods or not methods[name].whole for name in names):

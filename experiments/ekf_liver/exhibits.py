@@ -5,9 +5,9 @@ import numpy as np
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.report.scenes.node_sets import node_sets_picture
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene
@@ -31,7 +31,7 @@ _NAMED = {
 }
 
 
-def tell_liver(tree: Tree, cases: Cases, progress: Progress) -> Told:
+def tell_liver(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """Node sets, both readings of the force, critical steps, locking, and how near two fields are.
 
     The filter's field is held against the plain one's, as the paper's Figs. 3 (b) and (c) are.
@@ -57,7 +57,7 @@ def tell_liver(tree: Tree, cases: Cases, progress: Progress) -> Told:
         "duration": float(main["nfem"].seen.t[-1]),
         "fields_apart": fields_apart(main, ("ekf_held", "nfem")),
     }
-    return Told((sets_exhibit(scene, body), model), numbers)
+    return ReportAdditions((sets_exhibit(scene, body), model), numbers)
 
 
 def sets_exhibit(scene: Scene, body: str) -> Exhibit:
@@ -92,7 +92,7 @@ def _sets_table(scene: Scene) -> NumberTable:
                        tuple(rows))  # fmt: skip
 
 
-def _ramp_words(plain: Followed, readings: NumberTable) -> str:
+def _ramp_words(plain: MethodRun, readings: NumberTable) -> str:
     """How much of the static answer the ramp reaches at A."""
     static, end = readings.rows[0][2], float(plain.reference("node_A")[-1, 2])
     share = ""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases
 
@@ -12,7 +12,7 @@ from .other_laws import laws_exhibit
 from .updates import pressed, several_exhibit, updates_exhibit
 
 
-def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
+def tell(p: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """All exhibits of the block, and the numbers of its printed figures."""
     progress("pressure against volume")
     curves = []
@@ -34,4 +34,6 @@ def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
     shapes = shapes_exhibit(p, plate)
     numbers |= {"off.line": first.off, "P70": float(first.fixed[0]), "P130": float(first.fixed[-1]),
                 **kept(p, plate)}  # fmt: skip
-    return Told((curve_exhibit(curves), shapes, updates, several, laws_exhibit(p), exact), numbers)
+    return ReportAdditions(
+        (curve_exhibit(curves), shapes, updates, several, laws_exhibit(p), exact), numbers
+    )

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.markers.displacements import DisplacementObservation
 
 from .box import GelIndentation, Same, load
@@ -27,7 +27,7 @@ def tell(
     *,
     methods: Mapping[str, Method],
     home: Path,
-) -> Told:
+) -> ReportAdditions:
     """Tables and maps of the particles judged, and the ratios of prediction to floor. `methods`
     are those of the lower box; `home` is the experiment's folder."""
     whose, box = Same(load(tree, home)[0]), tree.scene.body
@@ -41,15 +41,17 @@ def tell(
         _calibrated(in_lower(whose, tree, methods), between(whose, box)),
         _linked(whose, tree.settings, home, progress),
     )
-    return Told(shown, {f"ratio.{n}": rms(e) / rms(judged.floor) for n, e in errors.items()})
+    return ReportAdditions(
+        shown, {f"ratio.{n}": rms(e) / rms(judged.floor) for n, e in errors.items()}
+    )
 
 
-def _errors(followed: Followed) -> Floats:
+def _errors(followed: MethodRun) -> Floats:
     (seen,) = followed.registered[0].of(DisplacementObservation)
     return seen.simulated(followed.run.u[-1]) - seen.u
 
 
-def _inside(judged: GelErrors, which: str, main: Mapping[str, Followed]) -> Exhibit:
+def _inside(judged: GelErrors, which: str, main: Mapping[str, MethodRun]) -> Exhibit:
     unknown = (
         "Displacement alone identifies the Poisson ratio and no modulus: every force has an "
         "unknown unit."

@@ -8,7 +8,7 @@ from validate.compare.convergence import Richardson, richardson
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.published import Claim, Figure
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.run.method_run import MAIN, Cases
 from validate.scene.geometries.specification import Box
@@ -25,7 +25,7 @@ _ORDER = 3.0  # of quadratic cells
 _MM = 1e3
 
 
-def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
+def tell(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """The converged drop with its interval on meshes graded in two ways, dolfinx's own meshes."""
     main = cases[MAIN]
     progress("the converged value")
@@ -46,7 +46,9 @@ def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
     )
     head = ("grading / 1", "cells across a quarter", "drop / mm")
     table = NumberTable("converged", "Quadratic hexahedra, finer and finer", head, tuple(rows))
-    return Told((Exhibit("converged", "The converged drop", (words,), tables=(table,)),), numbers)
+    return ReportAdditions(
+        (Exhibit("converged", "The converged drop", (words,), tables=(table,)),), numbers
+    )
 
 
 def _converged(tree: Tree, grading: float) -> tuple[dict[int, float], Richardson]:

@@ -11,10 +11,10 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable
 from validate.compare.force_error import HeldForce
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.live import Lived, RecordedPath, live
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.live import LiveRun, RecordedPath, live
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.haptic.loop import NAMES, HapticLoop, HapticStepper, between_answers
@@ -53,12 +53,12 @@ class Felt:
         return np.asarray(self.held.given[:, 2])
 
 
-def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
+def tell(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """All exhibits, of the methods that came to the end of the path."""
     main = cases[""]
     felt = felt_by(main)
     if not felt:
-        return Told()
+        return ReportAdditions()
     progress("periods")
     reference = felt[REFERENCE]
     periods = _periods_exhibit(reference)
@@ -67,10 +67,10 @@ def tell(tree: Tree, cases: Cases, progress: Progress) -> Told:
     numbers = {f"peak.{name}": share_off(f) for name, f in felt.items()}
     numbers |= {f"least.{name}": f.held.least for name, f in felt.items()}
     force = _force_exhibit(felt, _shape(main[REFERENCE], reference))
-    return Told((force, _energy_exhibit(felt, main[REFERENCE]), periods, ticks), numbers)
+    return ReportAdditions((force, _energy_exhibit(felt, main[REFERENCE]), periods, ticks), numbers)
 
 
-def felt_by(main: Mapping[str, Followed]) -> dict[str, Felt]:
+def felt_by(main: Mapping[str, MethodRun]) -> dict[str, Felt]:
     """By method, what was felt along the whole path; nothing without the reference."""
     whole = {name: f for name, f in main.items() if f.whole}
     if REFERENCE not in whole:
@@ -79,7 +79,7 @@ def felt_by(main: Mapping[str, Followed]) -> dict[str, Felt]:
     return {name: _felt(f, true) for name, f in whole.items()}
 
 
-def _felt(followed: Followed, true: Floats) -> Felt:
+def _felt(followed: MethodRun, true: Floats) -> Felt:
     run = followed.run
     x = np.column_stack([run.traces[f"{TOOL}.{a}"].y for a in AXES])
     dt = float(np.median(np.diff(run.t)))
@@ -88,7 +88,7 @@ def _felt(followed: Followed, true: Floats) -> Felt:
     return Felt(followed.label, run.t, held, run.traces[f"{TOOL}.jump"].y, 1 / (dt * float(apart)))
 
 
-def _forces(followed: Followed) -> Floats:
+def _forces(followed: MethodRun) -> Floats:
     return np.column_stack([followed.run.traces[f"{TOOL}.force.{a}"].y for a in AXES])
 
 
@@ -153,7 +153,7 @@ def _chart(name: str, title: str, felt: Mapping[str, Felt], around: float | None
     return Chart(name, title, "time / s", "force / N", tuple(lines))
 
 
-def _shape(followed: Followed, felt: Felt) -> NodeMap:
+def _shape(followed: MethodRun, felt: Felt) -> NodeMap:
     """The body at the output frame of the largest force."""
     run, mesh = followed.run, followed.body.mesh
     k = int(np.argmax(felt.up[run.at]))
@@ -168,7 +168,7 @@ def _shape(followed: Followed, felt: Felt) -> NodeMap:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-def _energy_exhibit(felt: Mapping[str, Felt], reference: Followed) -> Exhibit:
+def _energy_exhibit(felt: Mapping[str, Felt], reference: MethodRun) -> Exhibit:
     stored = float(reference.run.traces["energy.strain"].y.max())
     rows: list[tuple[Entry, ...]] = []
     for f in felt.values():
@@ -270,7 +270,7 @@ def _counted(held: HeldForce) -> tuple[float, ...]:
 # --- ticks ----------------------------------------------------------------------------------------
 
 
-def _ticks_exhibit(tree: Tree, reference: Followed) -> Exhibit:
+def _ticks_exhibit(tree: Tree, reference: MethodRun) -> Exhibit:
     """The live loop along the path, against the clock: quantiles of its ticks."""
     scene, seen = reference.body, reference.seen
     given = sets(tree, seen)
@@ -296,13 +296,13 @@ def _ticks_exhibit(tree: Tree, reference: Followed) -> Exhibit:
     )
 
 
-def _lived_row(name: str, done: Lived, dt: float) -> tuple[Entry, ...]:
+def _lived_row(name: str, done: LiveRun, dt: float) -> tuple[Entry, ...]:
     late, work = TickTimes(done.late), TickTimes(done.work)
     times = (_MICRO * q for q in (*late.quantiles, *work.quantiles))
     return (name, len(done.late), _PERCENT * late.missed(dt) / len(done.late), *times)
 
 
-def _pace(scene: Scene, reference: Followed, dt: float) -> str:
+def _pace(scene: Scene, reference: MethodRun, dt: float) -> str:
     """What a tick of simulation takes, beside its step and the critical one."""
     run = reference.run
     assert run.seconds is not None

@@ -1,9 +1,9 @@
 """A tool at 1 kHz on the liver of paper 003, simulated at a rate of its own (section 3.5).
 
 St. Venant-Kirchhoff tissue by central difference reads the tool every n-th tick and answers a
-period later; in between the force is held, or extrapolated in time by a line or a parabola. Told
-are errors, energy created, passivity and ticks against the clock; `validate live haptic_liver` runs
-it live. A path of your own: `--set recording=FILE`.
+period later; in between the force is held, or extrapolated in time by a line or a parabola. It
+reports errors, energy created, passivity and ticks against the clock; `validate live haptic_liver`
+runs it live. A path of your own: `--set recording=FILE`.
 """
 
 from validate.compare.verdict import Accept

@@ -18,8 +18,8 @@ from validate.estimate.measurements import measurements
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
+from validate.pipeline.run.method_run import Cases, MethodRun
 
 SEEDS = 50
 VARIANCES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # mm^2
@@ -30,7 +30,7 @@ _SEED = 1000  # of the first repetition
 _SETTLING = 100  # steps in which gains that do not decay have settled
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """NRMSE over 50 noise seeds for every Q and both recursions, and the oracle's table."""
     found = {
         (Q, recursion): _nrmse(parameters, cases[""]["kf_printed"], Q, recursion, progress)
@@ -47,11 +47,11 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "nrmse.without_q": float(exact.mean()),
         "uncertain.steps": _uncertain_steps(parameters, cases[""]["kf_printed"]),
     }
-    return Told((_oracle(),), numbers, tuple(_rows(found, raw)))
+    return ReportAdditions((_oracle(),), numbers, tuple(_rows(found, raw)))
 
 
 def _nrmse(
-    parameters: Any, followed: Followed, Q: float, recursion: str, progress: Progress
+    parameters: Any, followed: MethodRun, Q: float, recursion: str, progress: Progress
 ) -> Floats:
     """NRMSE (seeds,) at the measured node, along z, of the filter as printed."""
     progress(f"{SEEDS} seeds, Q = {Q:g} mm2, {recursion}")
@@ -66,7 +66,7 @@ def _nrmse(
 
 
 def _printed(
-    parameters: Any, followed: Followed, system: System, Q: float, recursion: str
+    parameters: Any, followed: MethodRun, system: System, Q: float, recursion: str
 ) -> DisplacementStepper:
     """The filter as printed, seen at the observed node at every step."""
     settings = ModalKf(
@@ -78,7 +78,7 @@ def _printed(
     return settings.prepare(system, every)
 
 
-def _uncertain_steps(parameters: Any, followed: Followed) -> float:
+def _uncertain_steps(parameters: Any, followed: MethodRun) -> float:
     """Steps after which the claimed sd of the observed node stays within 1 % of its last."""
     system = build_system(followed.body)
     stepper = _printed(parameters, followed, system, PRINTED, "prior")
@@ -92,7 +92,7 @@ def _uncertain_steps(parameters: Any, followed: Followed) -> float:
     return float(away[-1] + 1) if len(away) else 0.0
 
 
-def _noisy(followed: Followed) -> Floats:
+def _noisy(followed: MethodRun) -> Floats:
     """Measurements z (seeds, nt, 3) m of the observed node at every step."""
     clean = followed.truth.probes["node_A"]
     rng = np.random.default_rng(_SEED)
@@ -100,14 +100,14 @@ def _noisy(followed: Followed) -> Floats:
     return clean + float(np.sqrt(PRINTED * _MM2)) * noise
 
 
-def _z_row(system: System, followed: Followed) -> Floats:
+def _z_row(system: System, followed: MethodRun) -> Floats:
     """Row (1, N) that reads the observed node's z."""
     point = next(p.point for p in followed.scene.probes if p.name == "node_A")
     weights = barycentric_rows(system.scene.mesh, np.array([point])).weights.toarray()
     return np.asarray(np.kron(weights, np.array([[0.0, 0.0, 1.0]])))
 
 
-def _raw(parameters: Any, followed: Followed) -> Floats:
+def _raw(parameters: Any, followed: MethodRun) -> Floats:
     """NRMSE (seeds,) of the measurement itself."""
     reference = followed.truth.probes["node_A"][:, 2]
     off = _noisy(followed)[..., 2] - reference

@@ -7,9 +7,9 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.laws.plane_stress import response
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.register.registration import Registered
 
 from .calibration import words_of
@@ -30,17 +30,17 @@ _PAIRS = 4  # of laws, in sentences
 _MEGA = 1e5  # Pa: stresses from here on are shown in MPa
 
 
-def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     """Ranking, its sentences, and every mode with all laws."""
     p: Multimode = tree.settings
     tell("ranks the laws by prediction")
     runs = cases[MAIN]
     seen = next(iter(runs.values())).registered
     if len(seen) == 1:
-        return Told()  # nothing is predicted
+        return ReportAdditions()  # nothing is predicted
     found = ranked(p, runs, {name: as_card(name) for name in runs})
     if not found:
-        return Told()
+        return ReportAdditions()
     roles = ["identified on these points", *(["predicted"] * (len(seen) - 1))]
     charts = [
         _plane(p, one, found, role) if mode_of(one) == "biaxial" else _mode(p, one, found, role)
@@ -55,7 +55,7 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
     )
     numbers = {f"predicted.{one.method}": one.predicted.value for one in found}
     numbers |= {f"fitted.{one.method}": one.fit.value for one in found}
-    return Told((exhibit,), numbers)
+    return ReportAdditions((exhibit,), numbers)
 
 
 def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
@@ -84,7 +84,7 @@ def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def left_out(runs: Iterable[Followed]) -> tuple[str, ...]:
+def left_out(runs: Iterable[MethodRun]) -> tuple[str, ...]:
     """The laws that are not ranked, each with its reason."""
     ends = ((f.label, next((r.outcome for r in f.runs if not r.finished), None)) for f in runs)
     return tuple(f"{label} is not ranked: {end.why}." for label, end in ends if end)

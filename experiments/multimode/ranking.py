@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.register.observation import EVERYTHING
 from validate.register.registration import Registered
 from validate.register.signals import StressObservation
@@ -66,7 +66,7 @@ class RankedLaw:
 
 
 def ranked(
-    p: Multimode, runs: Mapping[str, Followed], laws: Mapping[str, LawCard]
+    p: Multimode, runs: Mapping[str, MethodRun], laws: Mapping[str, LawCard]
 ) -> list[RankedLaw]:
     """The laws that ran to the end, the one that predicts best first."""
     done = {n: f for n, f in runs.items() if all(run.finished for run in f.runs)}
@@ -114,7 +114,7 @@ def _readings(p: Multimode, seen: Sequence[Registered]) -> list[Floats]:
     return found
 
 
-def _ranked(p: Multimode, followed: Followed, law: LawCard, readings: list[Floats]) -> RankedLaw:
+def _ranked(p: Multimode, followed: MethodRun, law: LawCard, readings: list[Floats]) -> RankedLaw:
     seen = followed.registered
     base = [errors(p, law, one) for one in seen]
     slopes = _slopes(p, law, seen, base)

@@ -17,7 +17,7 @@ from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compared
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.scene.mesh import Mesh
 from validate.solve.explicit.linear import ExplicitLinear, stable_step
 from validate.solve.march import march
@@ -89,7 +89,7 @@ def errors_of(
     return Errors(label or one.method, t, values, tuple(refused))
 
 
-def errors_on(case: Mapping[str, Followed], names: Sequence[str], methods: Sequence[str],
+def errors_on(case: Mapping[str, MethodRun], names: Sequence[str], methods: Sequence[str],
               frames: Sequence[int] | None = None) -> dict[str, Errors]:  # fmt: skip
     """Metrics of a case's methods against its truth, on the truth's mesh."""
     first = next(iter(case.values()))
@@ -193,7 +193,7 @@ SWITCHED = (
 )
 
 
-def switches_exhibit(case: Mapping[str, Followed], dimension: int) -> tuple[Exhibit, float]:
+def switches_exhibit(case: Mapping[str, MethodRun], dimension: int) -> tuple[Exhibit, float]:
     """Lumping and restriction apart, and how many times the restriction's E_i is lumping's at
     2 s."""
     some = next(iter(case.values())).run
@@ -301,7 +301,7 @@ def stable_of(
 # --- shapes --------------------------------------------------------------------------------------
 
 
-def shape_maps(case: Mapping[str, Followed], methods: Sequence[str], t: float) -> list[NodeMap]:
+def shape_maps(case: Mapping[str, MethodRun], methods: Sequence[str], t: float) -> list[NodeMap]:
     """The deformed body of methods at a time, coloured by the length of its displacement."""
     found = []
     for name in methods:

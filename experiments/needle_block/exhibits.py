@@ -12,9 +12,9 @@ from validate.compare.shapes.pair import Common
 from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.scene.material import Material
 from validate.scene.scene import PlaneState, Scene
 from validate.solve.dynamic.linear import elastic_forces
@@ -68,7 +68,7 @@ _SETTLING = {**FIVE, "implicit_lumped_full": SWITCHES["implicit_lumped_full"]}
 _SWEPT = (10, 20, 30)  # cells a side
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """All exhibits of the needle's block, and the numbers of its printed figures."""
     p, main = cast(Tree, parameters), cases[""]
     progress("errors over time")
@@ -102,7 +102,7 @@ def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
         "limit.lagged": stable_of(_block(30, "MP2", "strain"), "consistent", "lagged"),
         **counts, **ends, **mesh_numbers, **rule_numbers, **found,
     }  # fmt: skip
-    return Told(
+    return ReportAdditions(
         (shown, _shapes(main), switches, prostate, still, limits, swept, mesh, rules, *more),
         numbers,
     )
@@ -137,13 +137,13 @@ def _peaks(line: Series) -> int:
 # --- shapes --------------------------------------------------------------------------------------
 
 
-def _shapes(main: Mapping[str, Followed]) -> Exhibit:
+def _shapes(main: Mapping[str, MethodRun]) -> Exhibit:
     maps = shape_maps(main, ("implicit", "quasi_static"), 0.5)
     maps += shape_maps(main, ("implicit", "explicit_lumped"), 2.0)
     return Exhibit("shapes", "Deformed shapes", (), (), (_side(main, 0.5),), tuple(maps))
 
 
-def _side(main: Mapping[str, Followed], t: float) -> Chart:
+def _side(main: Mapping[str, MethodRun], t: float) -> Chart:
     """Where the free side is: between two of its lines lies the area that E_s counts."""
     lines = []
     for name in ("implicit", *RIVALS):

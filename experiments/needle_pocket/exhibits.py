@@ -6,9 +6,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
 from validate.solve.haptic.rates import DEVICE_HZ, QUANTILES, TickTimes
@@ -21,7 +21,7 @@ _PAPER = "paper"
 _PERCENT = 100.0
 
 
-def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
+def tell(p: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     """All exhibits of the needle, and the numbers of its printed figures."""
     main = cases[""]
     progress("volume and updates")
@@ -33,13 +33,13 @@ def tell(p: Tree, cases: Cases, progress: Progress) -> Told:
     shapes = Exhibit("tension", "Compression and tension", _shape_words(p), (), (),
                      tuple(_shapes(main)))  # fmt: skip
     exhibits = (shapes, scope, ticks, loop, energy, *_given(main))
-    return Told(exhibits, {**numbers, **met, **lost, **back})
+    return ReportAdditions(exhibits, {**numbers, **met, **lost, **back})
 
 
 # --- volume, updates, contact: the scope of Fig. 10 -----------------------------------------------
 
 
-def _scope(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
+def _scope(main: Mapping[str, MethodRun]) -> tuple[Exhibit, dict[str, float]]:
     wet = {k: f for k, f in main.items() if f"{POCKET}.volume_ratio" in f.run.traces}
     off = {k: _PERCENT * (f.run.traces[f"{POCKET}.volume_ratio"].y - 1) for k, f in wet.items()}
     volume = Chart(
@@ -75,7 +75,7 @@ def _scope(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
     return Exhibit("scope", "Volume and updates", words, (table,), (volume, updates)), numbers
 
 
-def _counted(followed: Followed, off: Floats | None) -> tuple[Entry, ...]:
+def _counted(followed: MethodRun, off: Floats | None) -> tuple[Entry, ...]:
     traces = followed.run.traces
     made = traces["updates"].y
     of = (traces[f"{TOOL}.{k}"].y.sum() for k in ("contact", "changed", "clipped"))
@@ -89,7 +89,7 @@ def _counted(followed: Followed, off: Floats | None) -> tuple[Entry, ...]:
 # --- times ----------------------------------------------------------------------------------------
 
 
-def _ticks(main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
+def _ticks(main: Mapping[str, MethodRun]) -> tuple[Exhibit, dict[str, float]]:
     """Times of ticks against the deadline, changes of contact apart."""
     deadline = 1 / DEVICE_HZ
     rows: list[tuple[Entry, ...]] = []
@@ -131,7 +131,7 @@ def _shape_words(p: Tree) -> tuple[str, ...]:
     )
 
 
-def _shapes(main: Mapping[str, Followed]) -> list[NodeMap]:
+def _shapes(main: Mapping[str, MethodRun]) -> list[NodeMap]:
     found = []
     for name in ("p2_exact", _PAPER):
         followed = main.get(name)
@@ -143,7 +143,7 @@ def _shapes(main: Mapping[str, Followed]) -> list[NodeMap]:
     return found
 
 
-def _shape(name: str, followed: Followed, what: str, k: int, force: float) -> NodeMap:
+def _shape(name: str, followed: MethodRun, what: str, k: int, force: float) -> NodeMap:
     run, mesh = followed.run, followed.body.mesh
     unit = "N/m" if mesh.dimension == 2 else "N"
     cut = ", cut at the needle" if mesh.dimension == 3 else ""
@@ -172,7 +172,7 @@ def half(mesh: Mesh, u: Floats, z: float) -> tuple[Mesh, Floats]:
 # --- a live loop replayed -------------------------------------------------------------------------
 
 
-def _given(main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
+def _given(main: Mapping[str, MethodRun]) -> tuple[Exhibit, ...]:
     """How far each method is from the force that a live loop gave, where the recording has it."""
     rows: list[tuple[Entry, ...]] = []
     for followed in main.values():

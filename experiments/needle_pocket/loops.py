@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Scene
 from validate.solve.haptic.needle import NeedleLoop
 from validate.solve.haptic.rates import DEVICE_HZ
@@ -112,7 +112,7 @@ def hysteresis_exhibit(p: Tree, scene: Scene) -> tuple[Exhibit, dict[str, float]
     return Exhibit("hysteresis", "Force hysteresis", words, (table,), (chart,)), numbers
 
 
-def energy_exhibit(p: Tree, main: Mapping[str, Followed]) -> tuple[Exhibit, dict[str, float]]:
+def energy_exhibit(p: Tree, main: Mapping[str, MethodRun]) -> tuple[Exhibit, dict[str, float]]:
     """Energy taken less stored along the recorded path: what is left was lost where it let go."""
     per = "/m" if p.scene.body.space == "plane" else ""
     lines: list[Series] = []

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
-from validate.pipeline.experiment.experiment import Progress, Told
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.tables.npz_points import read_points
@@ -22,14 +22,14 @@ _UNKNOWN = (
 )
 
 
-def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     """Contraction over stretch, the parts of the strip, the tracker against its stage."""
     tell("compares the tracker with its stage")
     own: Strip = tree.settings
     path = recorded(tree, Path(__file__).parent)
     tracker = stage_exhibit(path.parent, own.stage)
     shown = (_contraction(cases), _parts(own, path))
-    return Told((*shown, *((tracker,) if tracker else ())))
+    return ReportAdditions((*shown, *((tracker,) if tracker else ())))
 
 
 def _contraction(cases: Cases) -> Exhibit:

@@ -8,8 +8,8 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.identify.recorded_motion import Ringing, spectrum
-from validate.pipeline.experiment.experiment import Progress, Told
-from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.pipeline.experiment.experiment import Progress, ReportAdditions
+from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 
 from .beam import SETTLED, Resting
 from .settings import FEET, TIPS
@@ -21,19 +21,19 @@ _AXES = "xyz"
 _SHOWN = {"mixed": "simulated, large strain", "ring_down": "simulated, small vibrations"}
 
 
-def tell(parameters: Any, cases: Cases, progress: Progress) -> Told:
+def tell(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditions:
     """From the runs on the recording itself; what did not reach the end is left out."""
     runs = {n: f for n, f in cases[MAIN].items() if n in _SHOWN and f.whole}
     if "mixed" not in runs:
-        return Told()
+        return ReportAdditions()
     swing = runs["mixed"].seen.of(Swing)[0]
-    return Told((_swing(swing, runs), _rest(runs["mixed"])), _printed(runs["mixed"]))
+    return ReportAdditions((_swing(swing, runs), _rest(runs["mixed"])), _printed(runs["mixed"]))
 
 
 # --- the swing ------------------------------------------------------------------------------------
 
 
-def _swing(swing: Swing, runs: Mapping[str, Followed]) -> Exhibit:
+def _swing(swing: Swing, runs: Mapping[str, MethodRun]) -> Exhibit:
     words = (
         f"The first {swing.length:g} s from the release. Deviations are over the measured vertical "
         "peak to peak of each marker; every run is compared from the release that fits it best.",
@@ -45,7 +45,7 @@ def _swing(swing: Swing, runs: Mapping[str, Followed]) -> Exhibit:
                    charts)  # fmt: skip
 
 
-def _ringing(swing: Swing, runs: Mapping[str, Followed]) -> NumberTable:
+def _ringing(swing: Swing, runs: Mapping[str, MethodRun]) -> NumberTable:
     seen = swing.moved[swing.compared]
     found: dict[str, tuple[float | None, Ringing | None]] = {"measured": (None, swing.rung(seen))}
     for name, f in runs.items():
@@ -68,7 +68,7 @@ def _numbers(rung: Ringing | None) -> tuple[Entry, ...]:
     return (rung.frequency, rung.frequency_sd, rung.damping, rung.damping_sd, rung.periods)
 
 
-def _markers(swing: Swing, runs: Mapping[str, Followed]) -> NumberTable:
+def _markers(swing: Swing, runs: Mapping[str, MethodRun]) -> NumberTable:
     rows = []
     for name, f in runs.items():
         off = swing.aligned(f.run)[1] - swing.moved[swing.compared]
@@ -92,7 +92,7 @@ def _deviation(off: Floats, span: float) -> tuple[Entry, ...]:
             len(off))  # fmt: skip
 
 
-def _curves(swing: Swing, runs: Mapping[str, Followed], j: int, axis: int) -> Chart:
+def _curves(swing: Swing, runs: Mapping[str, MethodRun], j: int, axis: int) -> Chart:
     t = swing.t[swing.compared]
     y = swing.moved[swing.compared][:, j, axis]
     seen = np.isfinite(y)
@@ -108,7 +108,7 @@ def _curves(swing: Swing, runs: Mapping[str, Followed], j: int, axis: int) -> Ch
     )  # fmt: skip
 
 
-def _spectra(swing: Swing, runs: Mapping[str, Followed]) -> Chart:
+def _spectra(swing: Swing, runs: Mapping[str, MethodRun]) -> Chart:
     moved = {"measured": swing.moved[swing.compared]}
     moved[_SHOWN["mixed"]] = swing.aligned(runs["mixed"].run)[1]
     late = swing.t[swing.compared] >= swing.ringing
@@ -127,7 +127,7 @@ def _spectra(swing: Swing, runs: Mapping[str, Followed]) -> Chart:
 # --- at rest --------------------------------------------------------------------------------------
 
 
-def _rest(f: Followed) -> Exhibit:
+def _rest(f: MethodRun) -> Exhibit:
     seen = f.seen.of(Resting)[0]
     shown = seen.simulated(f.run.u[-1])
     rows = []
@@ -148,7 +148,7 @@ def _rest(f: Followed) -> Exhibit:
     )  # fmt: skip
 
 
-def _side(f: Followed, seen: Resting, shown: Floats) -> Chart:
+def _side(f: MethodRun, seen: Resting, shown: Floats) -> Chart:
     nodes, u = f.scene.mesh.nodes, f.run.u[-1]
     middle = np.median(np.unique(np.round(nodes[:, 1], 9)))
     series = []
@@ -166,6 +166,6 @@ def _side(f: Followed, seen: Resting, shown: Floats) -> Chart:
                  tuple(series))  # fmt: skip
 
 
-def _printed(f: Followed) -> dict[str, float]:
+def _printed(f: MethodRun) -> dict[str, float]:
     """Displacements m of the markers' feet on the beam at rest, by name and axis."""
     return {f"{foot}.{c}": float(f.run.traces[f"{foot}.{c}"].y[-1]) for foot in FEET for c in _AXES}

@@ -9,9 +9,9 @@ from scipy.stats import t as student
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.pipeline.experiment.experiment import Experiment, Told
+from validate.pipeline.experiment.experiment import Experiment, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
 
@@ -24,7 +24,7 @@ _HEADINGS = (
 )  # fmt: skip
 
 
-def exhibits(tree: Tree, cases: Cases, progress: Any) -> Told:
+def exhibits(tree: Tree, cases: Cases, progress: Any) -> ReportAdditions:
     """Every law's fit beside its prediction, with the interval that the fit leaves."""
     ended = [f for f in cases[MAIN].values() if f.whole]
     rows = {f.label: _row(f) for f in ended}
@@ -38,10 +38,10 @@ def exhibits(tree: Tree, cases: Cases, progress: Any) -> Told:
         note += f" Smallest error of those that reach {reach:.2f} mm: {best}."
     table = NumberTable("laws", "Fitted moduli and their predictions", _HEADINGS,
                         tuple(rows.values()), note)  # fmt: skip
-    return Told((Exhibit("laws", "Prediction of each law", tables=(table,)),))
+    return ReportAdditions((Exhibit("laws", "Prediction of each law", tables=(table,)),))
 
 
-def _row(found: Followed) -> tuple[Any, ...]:
+def _row(found: MethodRun) -> tuple[Any, ...]:
     seen = found.seen.of(SignalObservation)[0]
     force = np.interp(seen.t, found.run.t, found.run.traces["moving.force"].y)
     measured, fitted = seen.y[:, 0], calibrating(found)
@@ -56,7 +56,7 @@ def _row(found: Followed) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def calibrating(found: Followed) -> np.ndarray:
+def calibrating(found: MethodRun) -> np.ndarray:
     """Which steps of the force calibrated (nt,)."""
     seen = found.seen.of(SignalObservation)[0]
     fitted = next(s for s in found.seen.selections if s.label == "fitted")

@@ -10,7 +10,12 @@ from validate.arrays import Floats, rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, Picture, TableCell
 from validate.compare.score import Score
 from validate.errors import RegistrationError
-from validate.pipeline.experiment.experiment import Experiment, Identified, Progress, Told
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    Identified,
+    Progress,
+    ReportAdditions,
+)
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
@@ -163,7 +168,7 @@ def _plus_scores(recording: Recording, p: StylusPhantom, mine: Digitised) -> tup
     return (Score("plus.error", plus[1], "m", len(mine.known), "touched", words),)
 
 
-def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     """Landmark by landmark, the transform, the dwells, and the picture in space."""
     (touched,) = next(iter(cases[MAIN].values())).seen.of(TouchedLandmarks)
     d = touched.digitised
@@ -175,7 +180,7 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
         tables=(_residuals(d), _matrix(d), _dwells(d)),
         pictures=(_picture(d),),
     )
-    return Told((shown,))
+    return ReportAdditions((shown,))
 
 
 def _residuals(d: Digitised) -> NumberTable:

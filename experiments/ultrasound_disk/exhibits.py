@@ -7,7 +7,12 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Picture, Series, TableCell
 from validate.compare.score import Score
-from validate.pipeline.experiment.experiment import Experiment, Identified, Progress, Told
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    Identified,
+    Progress,
+    ReportAdditions,
+)
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
@@ -60,11 +65,11 @@ def identified(
     return Identified(tree, scores, notes, headline)
 
 
-def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
+def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     p: ImagedDisk = tree.settings
     (seen,) = next(iter(cases[MAIN].values())).seen.of(RoundOutlines)
     tell("outlines over the images")
-    return Told((
+    return ReportAdditions((
         Exhibit(
             "disk",
             "The disk in every image",

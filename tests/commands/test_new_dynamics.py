@@ -24,7 +24,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.run.case_solution import solve
-from validate.pipeline.run.method_run import MAIN, Followed
+from validate.pipeline.run.method_run import MAIN, MethodRun
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
 from validate.register.markers.markers import MarkerObservation
@@ -70,12 +70,12 @@ def experiment(here: Path) -> Experiment:
     return load_file(here / "experiments" / "mine.py")
 
 
-def run(of: Experiment, method: str) -> Followed:
+def run(of: Experiment, method: str) -> MethodRun:
     recordings = of.load(of.parameters, folder_of(of))
     return solve(of, recordings, method, of.methods[method], of.parameters)
 
 
-def off(followed: Followed) -> float:
+def off(followed: MethodRun) -> float:
     """Rms m of the markers' residuals, per axis."""
     values = [r.values for r in followed.residuals.values()]
     return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))

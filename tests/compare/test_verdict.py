@@ -218,7 +218,7 @@ def test_rms_of_many_points_is_what_noise_does_not_explain() -> None:
 def test_interval_of_the_rms_is_that_of_the_noncentral_chi_square(
     k: int, c: int, true: float
 ) -> None:
-    """The larger side of the interval, half of it, by another road: its quantiles."""
+    """The larger side of the interval, half of it, computed in another way: by its quantiles."""
     m = k * c
     values = np.zeros((k, c))
     values[:, 0] = np.sqrt(true**2 + c)

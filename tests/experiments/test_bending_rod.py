@@ -1,4 +1,4 @@
-"""The bending rod: its road, the beam beside it, and all its claims (slow)."""
+"""The bending rod: the beam beside it, and all its claims (slow)."""
 
 import numpy as np
 import pytest

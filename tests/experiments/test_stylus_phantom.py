@@ -14,7 +14,7 @@ from validate.parameters import with_values
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.pipeline import compare as road
+from validate.pipeline.run.pipeline import compare
 from validate.register.markers.transform import Similarity
 from validate.register.tools.landmarks import Digitised
 
@@ -107,7 +107,7 @@ def test_the_eight_landmarks_of_the_data_set(shared_data: Path) -> None:
 
 @pytest.mark.slow
 def test_the_road_fits_the_pose_and_judges_what_was_left_out(shared_data: Path) -> None:
-    result = road(experiment("stylus_phantom"), Options({}))
+    result = compare(experiment("stylus_phantom"), Options({}))
     (check,) = result.checks
     assert (check.verdict, check.count) == ("good enough", 8)
     assert check.raw == pytest.approx(0.250e-3, abs=2e-6)

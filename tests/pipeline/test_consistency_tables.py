@@ -13,7 +13,7 @@ from validate.pipeline.checks.consistency import (
     nees_of,
     nis_of,
 )
-from validate.pipeline.run.method_run import Followed, Truth
+from validate.pipeline.run.method_run import MethodRun, Truth
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
@@ -40,7 +40,7 @@ def followed(
     sd: Floats | None = None,
     case: str = "",
     innovation: Floats | None = None,
-) -> Followed:
+) -> MethodRun:
     """A run whose tip is off the truth by `error` (no, 3) and claims `sd` (no, 3) at all frames."""
     at = np.arange(1, STEPS, 2)
     u = np.zeros((len(at), len(MESH.nodes), 3))
@@ -60,10 +60,10 @@ def followed(
         }
     run = Run("kf", T, at, u, traces, Outcome("finished", STEPS), 0.0, None, claimed)
     seen = Registered((SignalObservation("pull", "drives", T, np.ones((STEPS, 1)), "N", 0.0),))
-    return Followed("kf", "filter", case, SCENE, (seen,), (run,), {}, Truth({"tip": path}))
+    return MethodRun("kf", "filter", case, SCENE, (seen,), (run,), {}, Truth({"tip": path}))
 
 
-def rows_of(found: Followed, others: dict[str, Any] | None = None) -> list[dict[str, Any]]:
+def rows_of(found: MethodRun, others: dict[str, Any] | None = None) -> list[dict[str, Any]]:
     shown = consistency_exhibit({"kf": found}, others or {}, ())
     assert shown is not None
     table = shown.tables[0]

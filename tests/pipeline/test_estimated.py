@@ -10,11 +10,11 @@ from test_consistency_tables import STEPS, followed
 from validate.errors import UsageError
 from validate.pipeline import load, run_in_memory
 from validate.pipeline.exhibits.gating import doubt, estimated_exhibit, sentences
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.solve.types import Trace
 
 
-def estimating(left: float, tie: float = 0.0, unit: str = "Pa") -> Followed:
+def estimating(left: float, tie: float = 0.0, unit: str = "Pa") -> MethodRun:
     """A stiffness of 10 to 12 kPa whose sd falls to `left`, beside a load."""
     one = np.ones(STEPS)
     f = followed(one, one)

@@ -7,7 +7,7 @@ from tiny import TINY
 
 from validate.compare.published import Figure
 from validate.compare.result import Result
-from validate.pipeline.experiment.experiment import Told
+from validate.pipeline.experiment.experiment import ReportAdditions
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases
@@ -17,8 +17,8 @@ FIGURE = Figure("frames", "told:frames", 3.0, 0.0, "1", "reproduced", "", "here"
 
 
 def tiny(frames: float, **settings: str) -> Result:
-    def told(tree: Tree, cases: Cases, progress: object) -> Told:
-        return Told((), {"frames": frames})
+    def told(tree: Tree, cases: Cases, progress: object) -> ReportAdditions:
+        return ReportAdditions((), {"frames": frames})
 
     experiment = replace(TINY, exhibits=told, published=(FIGURE,), cases=())
     return compare(experiment, Options(settings))

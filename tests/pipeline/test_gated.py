@@ -4,11 +4,11 @@ import numpy as np
 from test_consistency_tables import STEPS, T, followed
 
 from validate.pipeline.exhibits.gating import gate_exhibit, gate_warnings
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.solve.types import Trace
 
 
-def gated(rejected: slice) -> Followed:
+def gated(rejected: slice) -> MethodRun:
     """A marker that is seen at every second step, and rejected at some of those."""
     far, sd = np.zeros(STEPS), np.zeros(STEPS)
     seen = np.arange(0, STEPS, 2)

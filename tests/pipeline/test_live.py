@@ -22,7 +22,7 @@ from validate.pipeline import load as experiment_named
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.live import (
     Listener,
-    Lived,
+    LiveRun,
     Prepared,
     RecordedPath,
     live,
@@ -81,7 +81,7 @@ def made() -> Prepared:
     return prepared(experiment_named("needle_pocket"), Options(COARSE), "p1_exact")
 
 
-def run(path: RecordedPath, clock: Turned, seconds: float | None = None) -> Lived:
+def run(path: RecordedPath, clock: Turned, seconds: float | None = None) -> LiveRun:
     return live(made().stepper, path, seconds, clock, clock.wait)
 
 
@@ -177,7 +177,7 @@ class Device:
 
 
 def talk(packets: list[bytes], seconds: float, stepper: NeedleStepper | None = None
-         ) -> tuple[Lived, Device]:  # fmt: skip
+         ) -> tuple[LiveRun, Device]:  # fmt: skip
     listener = Listener(*made().reach, 512.0)
     device = Device(listener, packets)
     clock = Turned(device=device)

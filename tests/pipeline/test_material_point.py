@@ -1,4 +1,4 @@
-"""A material point walks the whole road: a stress-stretch record, no mesh, a report."""
+"""A material point passes the whole pipeline: a stress-stretch record, no mesh, a report."""
 
 from dataclasses import replace
 from pathlib import Path

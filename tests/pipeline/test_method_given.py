@@ -26,7 +26,7 @@ from validate.pipeline.plates.choices import Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
 from validate.pipeline.plates.outline import PressedOutline
 from validate.pipeline.run import twin_record
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.recording.types import Recording, Source
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
@@ -162,18 +162,18 @@ def bare(**parts: object) -> SimpleNamespace:
 def test_a_run_without_a_mesh_has_no_body() -> None:
     meshless = Meshless.__new__(Meshless)
     with pytest.raises(SceneError, match="'law' was run on a scene without a mesh"):
-        Followed.body.__get__(SimpleNamespace(scene=meshless, label="law"))
+        MethodRun.body.__get__(SimpleNamespace(scene=meshless, label="law"))
 
 
 def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
     def refuse(variant: object) -> None:
         raise SceneError("a hole without a node")
 
-    road = SimpleNamespace(varied=refuse)
+    runs = SimpleNamespace(varied=refuse)
     own, other = Variant("m"), Variant("m", split=2)
-    assert numerical_uncertainty._solved(road, other) is None  # type: ignore[arg-type]
+    assert numerical_uncertainty._solved(runs, other) is None  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="a hole without a node"):
-        numerical_uncertainty._solved(road, own)  # type: ignore[arg-type]
+        numerical_uncertainty._solved(runs, own)  # type: ignore[arg-type]
 
 
 def test_an_inclusion_without_loads_compares_nothing() -> None:
@@ -215,15 +215,15 @@ def test_meshes_differ_in_size(sizes: tuple[float, ...], refused: bool) -> None:
 
     mesh = SimpleNamespace(size=lambda size: size)
     own = SimpleNamespace(_uncertainty=SimpleNamespace(mesh=mesh))
-    road = SimpleNamespace(parameters=None)
+    runs = SimpleNamespace(parameters=None)
     found = {"mesh": [change(size) for size in sizes]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numerical_uncertainty, "variants", lambda *_: found)
         if refused:
             with pytest.raises(ComparisonError, match="mesh: sizes 1, 1, 1; u_num"):
-                numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+                numerical_uncertainty.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
         else:
-            sizes_found = numerical_uncertainty.Refined._size_of(own, "mesh", road, "fine")  # type: ignore[arg-type]
+            sizes_found = numerical_uncertainty.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
             assert sizes_found == [1.0, 2.0, 4.0]
 
 

@@ -1,4 +1,4 @@
-"""What one road has the other has too: the same tiny block over time and at holds."""
+"""What one kind of pipeline has the other has too: the same tiny block over time and at holds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ from validate.pipeline.experiment.experiment import (
     EffectSpec,
     Experiment,
     Identified,
-    Told,
+    ReportAdditions,
     Uncertainty,
     Variant,
     vary,
@@ -46,14 +46,14 @@ harder = change_of({"material.E": "x 1.3"})
 shifted = change_of({"sd": "x 2"})
 MESHES = vary("body.cells", "x 2 3")
 FINER = Uncertainty(MESHES)
-ROADS = pytest.mark.parametrize("road", [TINY, AT_HOLDS], ids=["over time", "at holds"])
+KINDS = pytest.mark.parametrize("base", [TINY, AT_HOLDS], ids=["over time", "at holds"])
 
 
-def declared(road: Experiment, **more: Any) -> Experiment:
-    """The road with one method, no other case and no twin of the same model."""
-    twin = replace(road.twin, kind="twin") if road.twin else None
-    methods = {"fem": road.methods["fem"]}
-    return replace(road, **{"methods": methods, "cases": (), "twin": twin} | more)
+def declared(base: Experiment, **more: Any) -> Experiment:
+    """The experiment with one method, no other case and no twin of the same model."""
+    twin = replace(base.twin, kind="twin") if base.twin else None
+    methods = {"fem": base.methods["fem"]}
+    return replace(base, **{"methods": methods, "cases": (), "twin": twin} | more)
 
 
 def of(result: Result, name: str) -> MethodResult:
@@ -119,35 +119,35 @@ def test_a_case_that_nobody_can_record_is_refused() -> None:
         compare(declared(TINY, twin=None, uncertainty=FINER, cases=(case,)), Options({}))
 
 
-# --- both roads -----------------------------------------------------------------------------------
+# --- both pipelines -------------------------------------------------------------------------------
 
 
-@ROADS
-def test_effects_and_sensors(road: Experiment) -> None:
+@KINDS
+def test_effects_and_sensors(base: Experiment) -> None:
     """A stiffer model and the same one: the second moves nothing and no sensor sees it.
 
     What is recorded of a sensor moves with the modulus: markers under a force, a force at holds.
     """
-    quantity_, unit = ("force", "N") if road is AT_HOLDS else ("node_B", "m")
+    quantity_, unit = ("force", "N") if base is AT_HOLDS else ("node_B", "m")
     fine = Sensor("a finer one", quantity_, 1e-12)
     effects = (
         EffectSpec("modulus", "30 % stiffer", Variant("fem"), Variant("fem", harder)),
         EffectSpec("nothing", "the same again", Variant("fem"), Variant("fem")),
     )
-    experiment = declared(road, effects=effects, sensors=(fine,), uncertainty=FINER)
+    experiment = declared(base, effects=effects, sensors=(fine,), uncertainty=FINER)
     modulus, nothing = compare(experiment, Options({})).effects
     moved = {c.name: c for c in modulus.changes}
     seen = {c for c in moved if c.startswith(f"{quantity_}@")}
     assert seen <= set(modulus.seen_by)
     assert all(moved[name].unit == unit and moved[name].rms > 0 for name in seen)
-    assert len(seen) == (len(LOADS) if road is AT_HOLDS else 1)
+    assert len(seen) == (len(LOADS) if base is AT_HOLDS else 1)
     assert (nothing.seen_by, nothing.would_see) == ((), ())
     assert "a finer one" in modulus.would_see
     assert compare(experiment, Options({}, quick=True)).effects == ()
 
 
-@ROADS
-def test_identification(road: Experiment) -> None:
+@KINDS
+def test_identification(base: Experiment) -> None:
     """What was identified from the recordings is what the models run with."""
     given: list[int] = []
 
@@ -159,7 +159,7 @@ def test_identification(road: Experiment) -> None:
         known = with_given(tree, {"material.E": 12e3})
         return Identified(known, (score,), ("It was told.",), "E = 12 kPa")
 
-    result = compare(declared(road, identify=identify, uncertainty=FINER), Options({}))
+    result = compare(declared(base, identify=identify, uncertainty=FINER), Options({}))
     assert given == [1]
     assert of(result, "fem").scene.material.E == 12e3
     assert [s.name for s in result.identified] == ["modulus.E"]
@@ -168,49 +168,50 @@ def test_identification(road: Experiment) -> None:
     assert {p.path: p.default for p in result.parameters}["material.E"] == 12e3
 
 
-@ROADS
-def test_bands(road: Experiment) -> None:
-    banded = declared(road, uncertainty=FINER, band="sd")
-    assert of(compare(banded, Options({})), "fem").band == road.parameters.settings.sd
-    bare = declared(road, uncertainty=FINER)
+@KINDS
+def test_bands(base: Experiment) -> None:
+    banded = declared(base, uncertainty=FINER, band="sd")
+    assert of(compare(banded, Options({})), "fem").band == base.parameters.settings.sd
+    bare = declared(base, uncertainty=FINER)
     assert of(compare(bare, Options({})), "fem").band == 0.0
 
 
-@ROADS
-def test_cases(road: Experiment) -> None:
+@KINDS
+def test_cases(base: Experiment) -> None:
     """Scores of another truth carry its name, and a table shows how every method ended on it."""
-    result = compare(replace(declared(road, uncertainty=FINER), cases=road.cases[:1]), Options({}))
+    result = compare(replace(declared(base, uncertainty=FINER), cases=base.cases[:1]), Options({}))
     scores = {s.name for s in of(result, "fem").scores}
     assert {"node_B.rmse", "node_B.rmse@stiff"} <= scores
     (table,) = (t for e in result.exhibits for t in e.tables if t.name == "cases")
     assert [(row[0], row[1], row[-1]) for row in table.rows] == [("stiff", "FEM", "finished")]
 
 
-@ROADS
-def test_own_exhibits_printed_figures_and_captions(road: Experiment) -> None:
+@KINDS
+def test_own_exhibits_printed_figures_and_captions(base: Experiment) -> None:
     chart = Chart("own", "Own", "t / s", "y / m", (Series("y", np.arange(2.0), np.ones(2)),))
     table = NumberTable("counts", "Runs", ("cases / 1",), ((1,),))
 
-    def tell(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> Told:
-        return Told((Exhibit("own", "Own", (), (table,), (chart,)),), {"runs": float(len(cases))})
+    def tell(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> ReportAdditions:
+        exhibit = Exhibit("own", "Own", (), (table,), (chart,))
+        return ReportAdditions((exhibit,), {"runs": float(len(cases))})
 
     figure = Figure("runs", "told:runs", 1.0, 0.0, "1", "reproduced", "", "here")
     experiment = declared(
-        road, uncertainty=FINER, exhibits=tell, published=(figure,),
+        base, uncertainty=FINER, exhibits=tell, published=(figure,),
         captions={"own": "Under the own chart.", "displacement_node_B": "Under a common one."},
     )  # fmt: skip
     result = compare(experiment, Options({}))
     captions = {c.name: c.caption for e in result.exhibits for c in e.charts}
     assert captions["own"] == "Under the own chart."
-    if road is TINY:
+    if base is TINY:
         assert captions["displacement_node_B"] == "Under a common one."
     assert [t.name for e in result.exhibits for t in e.tables if e.anchor == "own"] == ["counts"]
     assert [(p.ours, p.fault) for p in result.published] == [(1.0, "")]
 
 
 @pytest.mark.slow
-@ROADS
-def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -> None:
+@KINDS
+def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(base: Experiment) -> None:
     """The slow one is never built there; u_num is the stand-in's, and the check says so."""
     built: list[tuple[str, int]] = []
 
@@ -218,32 +219,32 @@ def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(road: Experiment) -
         built.append(("slow" if changes else "fast", tree.scene.body.cells[0]))
         return Built()(recording, tree, changes)
 
-    slow = replace(road.methods["fem"], scene={"dilatation": "pointwise"})
-    methods = {"slow": slow, "fast": road.methods["fem"]}
+    slow = replace(base.methods["fem"], scene={"dilatation": "pointwise"})
+    methods = {"slow": slow, "fast": base.methods["fem"]}
     uncertainty = replace(FINER, stand_in={"slow": "fast"})
     experiment = declared(
-        road, build=build, methods=methods, accepted=("slow",), uncertainty=uncertainty,
+        base, build=build, methods=methods, accepted=("slow",), uncertainty=uncertainty,
         reference="fast",
     )  # fmt: skip
     check = compare(experiment, Options({})).checks[-1]
     assert sorted(set(built)) == [("fast", 3), ("fast", 6), ("fast", 9), ("slow", 3)]
     assert check.numerical.endswith("by fast in its place")
-    name = "force@0.3mm" if road is AT_HOLDS else "node_B@all"
-    own = declared(road)
-    same = replace(own, twin=replace(road.twin, kind="same model"))  # type: ignore[type-var]
+    name = "force@0.3mm" if base is AT_HOLDS else "node_B@all"
+    own = declared(base)
+    same = replace(own, twin=replace(base.twin, kind="same model"))  # type: ignore[type-var]
     meshes = [Options({"body.cells": f"{n},{n},{n}"}) for n in "369"]
     answers = [of(compare(same, mesh), "fem").residuals[name].values for mesh in meshes]
     assert check.u_num == pytest.approx(convergence((6, 3, 2), answers, 0, 2.0).u, rel=1e-12)
     assert 0 < check.u_num < np.inf
 
 
-@ROADS
-def test_inputs(road: Experiment) -> None:
+@KINDS
+def test_inputs(base: Experiment) -> None:
     """One standard uncertainty of an input, by the surrogate, is part of u_val."""
     source = vary("material.E", "relative 3 %", "modulus", "E")
     uncertain = replace(FINER, inputs=(source,), surrogate="fem")
-    whole = tuple(replace(a, statistic="rms") for a in road.accept)
-    result = compare(declared(road, uncertainty=uncertain, accept=whole), Options({}))
+    whole = tuple(replace(a, statistic="rms") for a in base.accept)
+    result = compare(declared(base, uncertainty=uncertain, accept=whole), Options({}))
     check = result.checks[-1]
     assert check.u_input > 0
     assert check.u_val == pytest.approx(np.sqrt(check.u_D**2 + check.u_num**2 + check.u_input**2))
@@ -254,20 +255,20 @@ def test_inputs(road: Experiment) -> None:
     assert result.inputs == (Declared("modulus", "E", "assumed"),)
 
 
-@ROADS
-def test_a_quick_run_draws_nothing(road: Experiment) -> None:
+@KINDS
+def test_a_quick_run_draws_nothing(base: Experiment) -> None:
     source = vary("material.E", "relative 3 %", "modulus", "E")
     quick = Options({}, quick=True)
     uncertain = replace(FINER, inputs=(source,), surrogate="fem")
-    assert compare(declared(road, uncertainty=uncertain), quick).joint == ()
+    assert compare(declared(base, uncertainty=uncertain), quick).joint == ()
 
 
 # --- what is compared with nothing ----------------------------------------------------------------
 
 
-@ROADS
-def test_a_marker_that_no_probe_answers_is_a_note(road: Experiment) -> None:
-    (note,) = compare(declared(road, uncertainty=FINER), Options({})).notes
+@KINDS
+def test_a_marker_that_no_probe_answers_is_a_note(base: Experiment) -> None:
+    (note,) = compare(declared(base, uncertainty=FINER), Options({})).notes
     assert note == (
         "markers: f1, f2, f3 compared with nothing, because no probe or trace of the scene "
         "has that name"

@@ -7,7 +7,7 @@ import pytest
 
 from validate.parameters import Parameter
 from validate.pipeline.checks.plausibility import doubts
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.recording.types import Frames, Recording, Signal, Source
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -37,7 +37,7 @@ def said(
     stage = SignalObservation("stage", "drives", T, compared * ramp, "m", 0.0)
     cell = SignalObservation("cell", "validates", T, force * ramp, "N", 0.0, "force", "stage.force")
     seen = Registered((stage, cell))
-    first = Followed("m", "m", "", scene, (seen,), (), {})
+    first = MethodRun("m", "m", "", scene, (seen,), (), {})
     return doubts(parameters, stated, (recording,), first)
 
 
@@ -87,7 +87,7 @@ def test_a_run_doubts_images_beyond_reason() -> None:
     frames = Frames(np.array([0.0]), (image,), (8.0, 8.0), np.eye(4), "probe")
     recording = Recording("r", Source("x", "", 0, "x"), 0, frames={"us": frames})
     stage = SignalObservation("stage", "drives", T, 0 * T[:, None], "m", 0.0)
-    point = Followed(
+    point = MethodRun(
         "m", "m", "", replace(SCENE, drives=()), (Registered((stage,)),), (), {}
     )  # fmt: skip
     (found,) = doubts((), {}, (recording,), point)

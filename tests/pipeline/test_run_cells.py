@@ -24,7 +24,7 @@ from validate.parameters import describe
 from validate.pipeline.calibration.calibrated import middle
 from validate.pipeline.checks.checks import variants_of
 from validate.pipeline.experiment.declaration import decoded, encoded
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.report.export.table_file import stored_table
 
 # private: _PATIENCE, _WORTH: replaced by a small number: a short test.
@@ -38,8 +38,8 @@ STORED = re.compile(r"(\d+) of (\d+) computations were stored")
 def test_parameters_of_every_run_reach_a_worker_as_they_are(name: str) -> None:
     declared = experiment(name)
     parameters = middle(declared, declared.parameters)
-    road = Road(declared, declared.methods, parameters, None, quick=False)
-    wanted = [parameters, *(road.wanted(v).parameters for v in variants_of(road))]
+    runs = ExperimentRuns(declared, declared.methods, parameters, None, quick=False)
+    wanted = [parameters, *(runs.wanted(v).parameters for v in variants_of(runs))]
     for one in [*wanted, *(case.change(parameters) for case in declared.cases)]:
         text = encoded(one, "parameters")
         there = decoded(text, "parameters", declared)
@@ -146,7 +146,7 @@ def adds(parameters, cases, progress):
     shown = Exhibit("added", "Added", ("Words.",), (table,), (Chart("c", "C", "x", "y", (line,)),),
                     pictures=(picture, moves))
     row = RowBlock(LongRow(quantity="gain", unit="1", sd=0.5), np.arange(300.0))
-    return Told((shown,), {"number": 0.25}, (row,))
+    return ReportAdditions((shown,), {"number": 0.25}, (row,))
 
 
 EXPERIMENT = """
@@ -157,7 +157,7 @@ def test_what_an_experiment_adds_is_kept_until_its_runs_or_parameters_change(
 ) -> None:
     path = pulled(tmp_path)
     text = path.read_text("utf-8").replace("EXPERIMENT = ", ADDS, 1)
-    text = text.replace("import Experiment, Twin", "import Experiment, Told, Twin\n"
+    text = text.replace("import Experiment, Twin", "import Experiment, ReportAdditions, Twin\n"
                         "from validate.compare.exhibit import (Animation, Chart, Exhibit, "
                         "NumberTable, Picture, Series, TableCell)\n"
                         "from validate.compare.row import LongRow, RowBlock")  # fmt: skip

@@ -1,4 +1,4 @@
-"""The road of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
+"""Pipeline of experiments over time, on a cube of 27 boxes that is pulled for 30 steps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
@@ -35,7 +35,7 @@ from validate.pipeline.experiment.experiment import (
     Case,
     Experiment,
     MeshLadder,
-    Told,
+    ReportAdditions,
     Twin,
     Uncertainty,
     vary,
@@ -326,8 +326,8 @@ def test_another_model_without_declared_uncertainty_is_refused() -> None:
         run(replace(TINY, twin=Twin(record, truth), cases=()), "fem")
 
 
-def told(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> Told:
-    return Told((), {"cases": float(len(cases))})
+def told(tree: Tree, cases: Cases, progress: Callable[[str], None]) -> ReportAdditions:
+    return ReportAdditions((), {"cases": float(len(cases))})
 
 
 PUBLISHED = (Figure("cases", "told:cases", 3.0, 0.0, "1", "reproduced", "", "here"),)

@@ -94,7 +94,7 @@ def test_first_order_is_one_standard_uncertainty_of_each_input() -> None:
     experiment = SimpleNamespace(
         name="x", uncertainty=declared, accept=(Accept("force", 1.0, "assumed"),)
     )
-    road = SimpleNamespace(experiment=experiment, kind="measured", quick=False, varied=varied)
-    (found,) = joint_inputs(road)  # type: ignore[arg-type]
+    runs = SimpleNamespace(experiment=experiment, kind="measured", quick=False, varied=varied)
+    (found,) = joint_inputs(runs)  # type: ignore[arg-type]
     assert found.first_order == pytest.approx(5.0, rel=1e-12)
     assert found.sampled == pytest.approx(5.0, rel=0.05)

@@ -1,6 +1,9 @@
-"""B-mode images by another road than `validate.twin`: point scatterers, lines of radio-frequency
-echoes, their envelope, and a scan conversion. A linear probe or a sector one, whose image is black
-outside of its fan; the point spread grows away from the focus."""
+"""B-mode images made in another way than by `validate.twin`.
+
+Point scatterers, lines of radio-frequency echoes, their envelope, and a scan conversion. A linear
+probe or a sector one, whose image is black outside of its fan; the point spread grows away from
+the focus.
+"""
 
 from dataclasses import dataclass
 

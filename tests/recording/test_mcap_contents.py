@@ -40,12 +40,12 @@ from validate.recording.mcap.schemas import by_name
 # private: _guarded, _packed, _points, _protobuf: called alone, case by case.
 # private: _ros2: replaced, to bring a case about.
 
-Told = tuple[str, dict[str, Any]]
+ReportAdditions = tuple[str, dict[str, Any]]
 NO_FIELD = ("__msgtype__", "structure_needs_at_least_one_member")
 COMPARED = ("Schema", "Channel", "Message", "Attachment", "Metadata")
 
 
-def ours(path: Path) -> tuple[list[Told], Verified]:
+def ours(path: Path) -> tuple[list[ReportAdditions], Verified]:
     """What this reader finds, in the words of the suite; bytes as numbers."""
     with opened(path) as stream:
         verified = verify(stream, path)
@@ -66,17 +66,17 @@ def ours(path: Path) -> tuple[list[Told], Verified]:
     return found, verified
 
 
-def _schema(s: Any) -> Told:
+def _schema(s: Any) -> ReportAdditions:
     return "Schema", {"id": s.id, "name": s.name, "encoding": s.encoding, "data": list(s.data)}
 
 
-def _channel(c: Any) -> Told:
+def _channel(c: Any) -> ReportAdditions:
     encoding = c.message_encoding if isinstance(c, TheirChannel) else c.encoding
     return "Channel", {"id": c.id, "schema_id": c.schema_id, "topic": c.topic,
                        "message_encoding": encoding, "metadata": dict(c.metadata)}  # fmt: skip
 
 
-def as_text(told: Iterable[Told]) -> list[str]:
+def as_text(told: Iterable[ReportAdditions]) -> list[str]:
     """In one order, numbers as texts as the suite writes them, repeated declarations once."""
     lines = [json.dumps([kind, _texts(held)], sort_keys=True) for kind, held in told]
     once = {line for line in lines if not line.startswith('["Message"')}
@@ -106,9 +106,9 @@ def test_every_record_of_the_conformance_suite_is_what_its_json_says(shared_data
     assert compared == 154 + 14 + 2 * 154  # messages, attachments, a schema and channel each
 
 
-def theirs(path: Path) -> list[Told]:
+def theirs(path: Path) -> list[ReportAdditions]:
     """The same by the reader of MCAP's makers, front to back."""
-    found: list[Told] = []
+    found: list[ReportAdditions] = []
     with path.open("rb") as stream:
         for r in StreamReader(stream).records:
             if isinstance(r, TheirSchema):

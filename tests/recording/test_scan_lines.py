@@ -1,4 +1,4 @@
-"""Outlines in images that another road made: found where there is one, none where there is none,
+"""Outlines in images that another model made: found where there is one, none where there is none,
 and as far off as they say."""
 
 from functools import cache

@@ -1,4 +1,4 @@
-"""The fluid phantom through the whole road on its cheapest methods: outlines and markers drawn."""
+"""The fluid phantom through the whole pipeline, cheapest methods: outlines and markers drawn."""
 
 from dataclasses import replace
 

@@ -267,7 +267,7 @@ def test_dear_wrong_parameters_lie_on_a_line_through_the_one_that_is_solved(
 
 def test_no_rival_is_opened() -> None:
     bench, _ = opened_here(job_of(written("drawn")))
-    assert set(bench.road.methods) == {"fem"}
+    assert set(bench.runs.methods) == {"fem"}
 
 
 def test_worlds_are_parameters() -> None:
@@ -360,12 +360,12 @@ def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(coverage_bench, "in_world", lambda *_: None)
     monkeypatch.setattr(coverage_bench, "solve", lambda *_: ended)
     monkeypatch.setattr(coverage_bench, "reached_end", lambda *_: False)
-    road = SimpleNamespace(experiment=None, parameters=None, recordings=(), settings={"m": None})
+    runs = SimpleNamespace(experiment=None, parameters=None, recordings=(), settings={"m": None})
     cell = SimpleNamespace(world=None, method="m", label="world 3")
     with pytest.raises(ComparisonError, match="world 3: diverged, not finite"):
-        coverage_bench.run_reading(SimpleNamespace(road=road), cell)  # type: ignore[arg-type]
+        coverage_bench.run_reading(SimpleNamespace(runs=runs), cell)  # type: ignore[arg-type]
     monkeypatch.setattr(coverage_bench, "terms_of", lambda *_: ())
-    bench = SimpleNamespace(road=road, followed=lambda method: ended)
+    bench = SimpleNamespace(runs=runs, followed=lambda method: ended)
     with pytest.raises(ComparisonError, match="m: no accepted quantity was compared"):
         coverage_bench.run_terms(bench, cell)  # type: ignore[arg-type]
 
@@ -388,9 +388,9 @@ def test_blocks_of_draws_that_fail_are_counted(monkeypatch: pytest.MonkeyPatch) 
         ("Given", None), ("_draws", SimpleNamespace(records=records)),
     ):  # fmt: skip
         monkeypatch.setattr(coverage_module, name, lambda *_, found=found: found)
-    road = SimpleNamespace(experiment=None)
+    runs = SimpleNamespace(experiment=None)
     study = SimpleNamespace(
-        bench=SimpleNamespace(road=road), draws=9, seed=1, job=None, noise=None, opening=None
+        bench=SimpleNamespace(runs=runs), draws=9, seed=1, job=None, noise=None, opening=None
     )
     with pytest.raises(
         ComparisonError, match=r"kf: 1 of 2 blocks of \d+ draws could not be checked: o"

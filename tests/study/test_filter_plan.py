@@ -15,7 +15,7 @@ from validate.commands.arguments import pairs
 from validate.commands.main import cli
 from validate.engine.cell import Where
 from validate.errors import UsageError
-from validate.pipeline.experiment.experiment import Case, Experiment, Told, vary
+from validate.pipeline.experiment.experiment import Case, Experiment, ReportAdditions, vary
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options, chosen_cases
 from validate.pipeline.run.named_run import run_name
@@ -219,7 +219,9 @@ def test_a_run_of_one_case_has_a_folder_of_its_name(tmp_path: Path) -> None:
     assert names["soft"].startswith("pulled+case_soft-")
     assert len(set(names.values())) == 3
     assert [c.name for c in chosen_cases(more, Options({}))] == ["soft", "stiff"]
-    needs_all = replace(more, exhibits=lambda p, cases, tell: Told(numbers=dict(cases["soft"])))
+    needs_all = replace(
+        more, exhibits=lambda p, cases, tell: ReportAdditions(numbers=dict(cases["soft"]))
+    )
     assert compare(needs_all, Options({}, case="stiff")).methods  # its figures are left out
     with pytest.raises(UsageError, match="no case 'sof' of pulled; nearest: soft"):
         compare(more, Options({}, case="sof"))

@@ -15,7 +15,7 @@ from experiments.needle_block.body import MP1, MP2
 from experiments.needle_block.ladder import NEEDLE_LADDER
 from validate.errors import SceneError, UsageError
 from validate.fem.system import Responses
-from validate.pipeline.bodies.own_body import OwnBody, own_body
+from validate.pipeline.bodies.own_body import ExperimentBody, own_body
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.ladder import default as ladder_default
@@ -39,7 +39,7 @@ def pulled(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def own_phantom(phantom: Experiment) -> OwnBody:
+def own_phantom(phantom: Experiment) -> ExperimentBody:
     return own_body(replace(phantom, identify=None))
 
 
@@ -76,7 +76,7 @@ def test_elements_of_a_quadratic_scene_are_those_of_its_vertices() -> None:
 
 @pytest.mark.slow
 def test_a_parameter_refines_where_it_changes_the_nodes_and_not_the_body(
-    own_phantom: OwnBody,
+    own_phantom: ExperimentBody,
 ) -> None:
     paths = [p.path for p in own_phantom.refining]
     assert paths == ["body.cells"]
@@ -86,7 +86,7 @@ def test_a_parameter_refines_where_it_changes_the_nodes_and_not_the_body(
     assert own_phantom.size(75) > own_phantom.size(100)
 
 
-def test_levels_are_those_that_differ(own_phantom: OwnBody) -> None:
+def test_levels_are_those_that_differ(own_phantom: ExperimentBody) -> None:
     assert own_phantom.levels((100, 101, 75)) == (75, 100)
 
 
@@ -168,7 +168,7 @@ def test_nothing_steps_in_time_without_a_density(phantom: Experiment, tmp_path: 
     assert stability(replace(phantom, identify=None), out=tmp_path) is None
 
 
-def test_a_gains_limit_is_two_over_the_compliance(own_phantom: OwnBody) -> None:
+def test_a_gains_limit_is_two_over_the_compliance(own_phantom: ExperimentBody) -> None:
     """A cavity whose volume is 1 + c P: the loop P <- P + Kp (1 - V) settles to Kp = 2 / c."""
     c, form = 4e-4, np.zeros((1, 3, 3, 3))
     form[0, 0, 0, 0] = 1.0

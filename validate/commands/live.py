@@ -17,7 +17,7 @@ from validate.commands.run import ask_about
 from validate.errors import UsageError
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.live import Listener, Lived, Prepared, live, prepared, written
+from validate.pipeline.live import Listener, LiveRun, Prepared, live, prepared, written
 from validate.pipeline.live import realtime as scheduled
 from validate.pipeline.live.listener import RESYNC
 from validate.places import try_file
@@ -67,7 +67,7 @@ def run(
     return 0
 
 
-def _lived(made: Prepared, seconds: float | None, listen: int | None) -> Lived:
+def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun:
     if listen is None:
         return live(made.stepper, made.path, seconds)
     with closing(Listener(*made.reach, made.stepper.rate, listen)) as source:
@@ -76,7 +76,7 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> Lived:
         return live(made.stepper, source, seconds)
 
 
-def _members(done: Lived, made: Prepared) -> dict[str, Any]:
+def _members(done: LiveRun, made: Prepared) -> dict[str, Any]:
     """What is told, SI."""
     said: dict[str, Any] = {
         "experiment": made.experiment.name, "method": made.method, "source": done.kind,
@@ -96,7 +96,7 @@ def _quantiles(seconds: Floats) -> dict[str, float]:
     return dict(zip(names, TickTimes(seconds).quantiles, strict=True)) | {"n": len(seconds)}
 
 
-def _told(done: Lived, said: dict[str, Any]) -> None:
+def _told(done: LiveRun, said: dict[str, Any]) -> None:
     share = 100 * done.missed / done.ticks if done.ticks else 0.0
     say(f"{said['experiment']}, {said['method']}: {done.ticks} ticks at {done.rate:.4g} Hz, "
         f"{done.missed} missed ({share:.3g} %), {said['answered']} answered")  # fmt: skip

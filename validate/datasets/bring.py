@@ -47,14 +47,14 @@ def csv_of(text: str, function: str, header: str) -> str:
 
 # -------------------------------------------------------------------------------------------------
 
-#: Told bytes done, bytes in all, and the file that comes.
-Told = Callable[[int, int, str], None]
+#: Called with bytes done, bytes in all, and the file that comes.
+ReportAdditions = Callable[[int, int, str], None]
 _CHUNK = 65_536  # bytes between two looks at the progress
 _PATIENCE = 30.0  # s without an answer
 _LEFT_OVER = 86_400.0  # s: a transfer as old as that is of a process that was killed
 
 
-def bring(data_set: DataSet, told: Told) -> tuple[DataFile, ...]:
+def bring(data_set: DataSet, told: ReportAdditions) -> tuple[DataFile, ...]:
     """Brings what is not whole in the cache; returns the files that came.
 
     A file takes its place once its hash is the registered one: a transfer that is cut or changed
@@ -143,7 +143,7 @@ class _Bar:
     pooch counts chunks, not bytes, and a transfer may be compressed: never more than the file.
     """
 
-    def __init__(self, told: Told, before: int, file: DataFile, among: int) -> None:
+    def __init__(self, told: ReportAdditions, before: int, file: DataFile, among: int) -> None:
         self.total = 0  # pooch sets it
         self._told, self._before, self._file, self._among = told, before, file, among
         self._here = 0

@@ -1,8 +1,8 @@
 """Simulated sensors of a twin: stage, outline, pen and load cell, each with its noise.
 
-A twin is made by another and finer model than those it is used to judge, then walks the same road
-as a real recording. Each sensor draws from its own random stream, so that changing one leaves the
-others' noise as it was.
+A twin is made by another and finer model than those it is used to judge, then passes the same
+pipeline as a real recording. Each sensor draws from its own random stream, so that changing one
+leaves the others' noise as it was.
 """
 
 from collections.abc import Mapping

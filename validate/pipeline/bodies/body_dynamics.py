@@ -52,13 +52,13 @@ from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
     Progress,
+    ReportAdditions,
     StepLadder,
-    Told,
     vary,
 )
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.method_run import MAIN, Cases, Followed
+from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.report.sections.motion_words import motion_words, rests
@@ -77,7 +77,9 @@ from validate.solve.static.quasi_static import QuasiStatic
 _POINTS = 1500  # of a chart
 
 
-def motion_exhibit(p: Tree, cases: Cases, tell: Progress, *, shown: RecordedMotion) -> Told:
+def motion_exhibit(
+    p: Tree, cases: Cases, tell: Progress, *, shown: RecordedMotion
+) -> ReportAdditions:
     """Return the recorded motion `shown`, and the runs of its marker where they are compared with
     it."""
     main = cases[MAIN]
@@ -86,7 +88,9 @@ def motion_exhibit(p: Tree, cases: Cases, tell: Progress, *, shown: RecordedMoti
     facts = _facts(shown, modes, assumed_density(p))
     charts = (*_over_time(shown, main), *_spectrum(shown))
     words = f"'{shown.marker}' moves most; along its direction, in the recording's frame."
-    return Told((Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),))
+    return ReportAdditions(
+        (Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),)
+    )
 
 
 def _modes(scene: Scene) -> tuple[float, ...]:
@@ -123,7 +127,7 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> Num
                        ("what", "value", "unit", "note"), tuple(rows))  # fmt: skip
 
 
-def _over_time(shown: RecordedMotion, main: Mapping[str, Followed]) -> tuple[Chart, ...]:
+def _over_time(shown: RecordedMotion, main: Mapping[str, MethodRun]) -> tuple[Chart, ...]:
     """Of the registered marker, since rest: measured, and simulated by every method."""
     found = {name: h for name, f in main.items() for h in f.histories if shown.marker in h.names}
     if not found:

@@ -29,7 +29,7 @@ _SAME = 0.02  # relative: extents and volume of a body with curved faces on two 
 
 
 @dataclass(frozen=True, eq=False)
-class OwnBody:
+class ExperimentBody:
     """The scene that an experiment builds for its first accepted method.
 
     A level is a hundred times the ratio of cells along an edge to those of the experiment's own
@@ -105,7 +105,7 @@ class OwnBody:
             return False
 
 
-def own_body(experiment: Experiment) -> OwnBody:
+def own_body(experiment: Experiment) -> ExperimentBody:
     """With what the experiment identifies from its recordings."""
     found = opened(experiment, experiment.parameters)
     recordings = found.recordings
@@ -116,7 +116,7 @@ def own_body(experiment: Experiment) -> OwnBody:
     )  # fmt: skip
     if identified is not None:
         parameters = identified.parameters
-    return OwnBody(experiment, parameters, recordings[0])
+    return ExperimentBody(experiment, parameters, recordings[0])
 
 
 def meshed(scene: AnyScene) -> Scene:

@@ -28,18 +28,18 @@ from validate.fem.assembly.locate import probe_rows
 from validate.pipeline.checks.consistency import claims_hold
 from validate.pipeline.checks.numerical_uncertainty import Refined, mesh_errors, variants
 from validate.pipeline.experiment.experiment import Change, EffectSpec, Input, Uncertainty, Variant
-from validate.pipeline.run.method_run import Followed
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.method_run import MethodRun
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.outlines.outlines import OutlineObservation
 
 _NO_UNIT = "-"  # of a quantity that no observation has
 
 
-def variants_of(road: Road) -> list[Variant]:
+def variants_of(runs: ExperimentRuns) -> list[Variant]:
     """Every variant that the pipeline will solve on the experiment's own recordings."""
-    wanted = [Variant(name) for name in road.methods]
-    accepted = [name for name in road.experiment.accepted if name in road.methods]
-    uncertainty = road.experiment.uncertainty
+    wanted = [Variant(name) for name in runs.methods]
+    accepted = [name for name in runs.experiment.accepted if name in runs.methods]
+    uncertainty = runs.experiment.uncertainty
     if accepted and uncertainty:
         wanted += [
             v for n in accepted for levels in variants(uncertainty, n).values() for v in levels
@@ -48,10 +48,10 @@ def variants_of(road: Road) -> list[Variant]:
         wanted += [
             i.at(by, 1.0)
             for i in uncertainty.inputs
-            for by in dict.fromkeys(_moved_by(road, uncertainty, i, n) for n in accepted)
+            for by in dict.fromkeys(_moved_by(runs, uncertainty, i, n) for n in accepted)
         ]
-        wanted += _joint_variants(road)
-    return wanted + [v for e in shown_effects(road) for v in (e.one, e.other)]
+        wanted += _joint_variants(runs)
+    return wanted + [v for e in shown_effects(runs) for v in (e.one, e.other)]
 
 
 @dataclass(frozen=True)
@@ -71,44 +71,44 @@ class Terms:
         return as_fitted(check, self.fitted) if self.fitted else check
 
 
-def checks_of(road: Road, mine: Followed) -> tuple[Check, ...]:
+def checks_of(runs: ExperimentRuns, mine: MethodRun) -> tuple[Check, ...]:
     """Return the verdict on everything that the experiment accepts; what compared nothing has
     failed.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
     found: list[Check] = []
-    for accept, terms in terms_of(road, mine):
-        found += [_classed(road, own.judge(mine.residuals[key])) for key, own in terms.items()]
+    for accept, terms in terms_of(runs, mine):
+        found += [_classed(runs, own.judge(mine.residuals[key])) for key, own in terms.items()]
         found += _nothing(accept, mine, terms)
     return tuple(found)
 
 
-def terms_of(road: Road, mine: Followed) -> list[tuple[Accept, dict[str, Terms]]]:
+def terms_of(runs: ExperimentRuns, mine: MethodRun) -> list[tuple[Accept, dict[str, Terms]]]:
     """Return the terms of every accepted residual, by its name.
 
     Raises `ComparisonError` where no uncertainty is declared and the truth is another model.
     """
-    refined = _refined(road, mine.method)
-    inputs, own = _sensitivities(road, mine.method), _own_doubt(mine)
+    refined = _refined(runs, mine.method)
+    inputs, own = _sensitivities(runs, mine.method), _own_doubt(mine)
 
     def terms(key: str, accept: Accept) -> Terms:
         residual, limit = mine.residuals[key], accept.required or inf
         numerical = refined.numerical(residual, limit) if refined else Numerical()
         parts = (*inputs.get(key, []), *own.get(key, []))
-        return Terms(accept, numerical, parts, _served(road, mine, residual))
+        return Terms(accept, numerical, parts, _served(runs, mine, residual))
 
     return [
         (a, {k: terms(k, a) for k, r in mine.residuals.items() if _accepts(a, r)})
-        for a in road.experiment.accept
+        for a in runs.experiment.accept
     ]
 
 
-def _served(road: Road, mine: Followed, residual: Residual) -> str:
+def _served(runs: ExperimentRuns, mine: MethodRun, residual: Residual) -> str:
     """What the data of a residual served for, so that they are no evidence; else ""."""
-    if residual.role == "calibrates" or {residual.name, residual.quantity} & set(road.calibrated):
+    if residual.role == "calibrates" or {residual.name, residual.quantity} & set(runs.calibrated):
         return "these data were used for identification"
-    given = road.settings[mine.method].markers
+    given = runs.settings[mine.method].markers
     if residual.quantity in given:
         return "this marker was given to the filter"
     outlines = [o for o in mine.seen.of(OutlineObservation) if o.name in given]
@@ -117,11 +117,11 @@ def _served(road: Road, mine: Followed, residual: Residual) -> str:
     return ""
 
 
-def _classed(road: Road, check: Check) -> Check:
+def _classed(runs: ExperimentRuns, check: Check) -> Check:
     """The check as what it is: no evidence where the recording is the model's own."""
-    if road.remade:
+    if runs.remade:
         return as_same_model(check, "the recording was simulated again with this run's parameters")
-    if road.kind == "same model":
+    if runs.kind == "same model":
         return as_same_model(check, "recording and checked model are the same model")
     return check
 
@@ -132,52 +132,52 @@ def _accepts(accept: Accept, residual: Residual) -> bool:
     )
 
 
-def _refined(road: Road, name: str) -> Refined | None:
+def _refined(runs: ExperimentRuns, name: str) -> Refined | None:
     """None for a twin of the same model on the same mesh: it has no discretisation error."""
-    uncertainty = _declared(road)
-    return Refined(road, uncertainty, name) if uncertainty else None
+    uncertainty = _declared(runs)
+    return Refined(runs, uncertainty, name) if uncertainty else None
 
 
-def _declared(road: Road) -> Uncertainty | None:
-    experiment = road.experiment
-    if experiment.uncertainty is None and road.kind != "same model":
+def _declared(runs: ExperimentRuns) -> Uncertainty | None:
+    experiment = runs.experiment
+    if experiment.uncertainty is None and runs.kind != "same model":
         raise ComparisonError(f"{experiment.name}: no uncertainty is declared; u_val unknown")
     return experiment.uncertainty
 
 
-def _sensitivities(road: Road, judged: str = "") -> dict[str, list[Sensitivity]]:
+def _sensitivities(runs: ExperimentRuns, judged: str = "") -> dict[str, list[Sensitivity]]:
     """Per residual name: what one standard uncertainty of each input does, by the surrogate.
 
     A `judged` method that was itself calibrated moves what was identified itself: its parameters
     may be none of the surrogate's.
     """
-    uncertainty = _declared(road)
+    uncertainty = _declared(runs)
     found: dict[str, list[Sensitivity]] = {}
     if uncertainty is None or not uncertainty.inputs:
         return found
     for source in uncertainty.inputs:
-        by = _moved_by(road, uncertainty, source, judged)
-        base = road.varied(Variant(by)).residuals
-        moved = road.varied(source.at(by, 1.0)).residuals
+        by = _moved_by(runs, uncertainty, source, judged)
+        base = runs.varied(Variant(by)).residuals
+        moved = runs.varied(source.at(by, 1.0)).residuals
         for key in base.keys() & moved.keys():
             step = replace(base[key], values=difference(moved[key], base[key]), sd=0.0)
             found.setdefault(key, []).append(Sensitivity(source.name, step))
     return found
 
 
-def _moved_by(road: Road, uncertainty: Uncertainty, source: Input, judged: str) -> str:
-    own = source.identified and judged in {c.method for c in road.experiment.calibrations}
+def _moved_by(runs: ExperimentRuns, uncertainty: Uncertainty, source: Input, judged: str) -> str:
+    own = source.identified and judged in {c.method for c in runs.experiment.calibrations}
     return judged if own or (source.each and judged) else uncertainty.surrogate
 
 
-def joint_inputs(road: Road) -> tuple[Joint, ...]:
+def joint_inputs(runs: ExperimentRuns) -> tuple[Joint, ...]:
     """First-order u_input of all that is accepted beside draws of all inputs at once."""
-    parts, variants = _sensitivities(road), _joint_variants(road)
+    parts, variants = _sensitivities(runs), _joint_variants(runs)
     if not parts or not variants:
         return ()
-    base = road.varied(Variant(variants[0].method)).residuals
-    drawn = [road.varied(variant).residuals for variant in variants]
-    accepted = (k for k, r in base.items() if any(_accepts(a, r) for a in road.experiment.accept))
+    base = runs.varied(Variant(variants[0].method)).residuals
+    drawn = [runs.varied(variant).residuals for variant in variants]
+    accepted = (k for k, r in base.items() if any(_accepts(a, r) for a in runs.experiment.accept))
     return tuple(
         joint(base[key], parts[key], seen)
         for key in accepted
@@ -185,10 +185,10 @@ def joint_inputs(road: Road) -> tuple[Joint, ...]:
     )
 
 
-def _joint_variants(road: Road) -> list[Variant]:
+def _joint_variants(runs: ExperimentRuns) -> list[Variant]:
     """The surrogate with all inputs drawn at once; none in a quick run."""
-    uncertainty = road.experiment.uncertainty
-    if road.quick or uncertainty is None or not (uncertainty.inputs and uncertainty.draws):
+    uncertainty = runs.experiment.uncertainty
+    if runs.quick or uncertainty is None or not (uncertainty.inputs and uncertainty.draws):
         return []
     table = joint_draws(uncertainty.draws, len(uncertainty.inputs))
     return [_drawn(uncertainty, row) for row in table]
@@ -213,7 +213,7 @@ def _together(inputs: Sequence[Input], draw: Floats) -> Change:
     return change
 
 
-def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
+def _own_doubt(mine: MethodRun) -> dict[str, list[Sensitivity]]:
     """What a filter itself claims of its error at every probe, as one more input of u_val; nothing
     where its NIS is outside the 95 % band: such a claim does not hold."""
     if mine.run.sd is None or not mine.whole or not claims_hold(mine):
@@ -229,7 +229,7 @@ def _own_doubt(mine: Followed) -> dict[str, list[Sensitivity]]:
     return found
 
 
-def _nothing(accept: Accept, mine: Followed, judged: Collection[str]) -> list[Check]:
+def _nothing(accept: Accept, mine: MethodRun, judged: Collection[str]) -> list[Check]:
     """Checks that compared nothing, in the unit of what they should have compared: of the quantity,
     or of every load that is named and not there."""
     there = [r.load for r in mine.residuals.values() if r.quantity == accept.quantity]
@@ -244,7 +244,7 @@ def _nothing(accept: Accept, mine: Followed, judged: Collection[str]) -> list[Ch
     return [] if judged else [_empty(accept, accept.quantity, why, mine)]
 
 
-def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
+def _empty(accept: Accept, name: str, why: str, mine: MethodRun) -> Check:
     units = {q: unit for seen in mine.seen.compared for q, unit in seen.units.items()}
     return nothing_compared(accept, name, units.get(accept.quantity, _NO_UNIT), why)
 
@@ -252,34 +252,34 @@ def _empty(accept: Accept, name: str, why: str, mine: Followed) -> Check:
 # --- effects --------------------------------------------------------------------------------------
 
 
-def shown_effects(road: Road) -> tuple[EffectSpec, ...]:
+def shown_effects(runs: ExperimentRuns) -> tuple[EffectSpec, ...]:
     """Return the effects whose methods the user runs anyway; none in a quick run.
 
     None either without an accepted method: its u_num and u_input are part of what hides an effect.
     """
-    if road.quick or not set(road.experiment.accepted) & set(road.methods):
+    if runs.quick or not set(runs.experiment.accepted) & set(runs.methods):
         return ()
     return tuple(
-        e for e in road.experiment.effects if {e.one.method, e.other.method} <= set(road.methods)
+        e for e in runs.experiment.effects if {e.one.method, e.other.method} <= set(runs.methods)
     )
 
 
-def effects_of(road: Road, results: tuple[MethodResult, ...]) -> tuple[Effect, ...]:
+def effects_of(runs: ExperimentRuns, results: tuple[MethodResult, ...]) -> tuple[Effect, ...]:
     """Each declared effect against the noise of every sensor."""
-    shown = shown_effects(road)
+    shown = shown_effects(runs)
     if not shown:
         return ()
-    inputs = _sensitivities(road)
+    inputs = _sensitivities(runs)
     accepted = [m for m in results if m.accepted]
-    meshes = [mesh_errors(_refined(road, m.name), m.residuals) for m in accepted]
+    meshes = [mesh_errors(_refined(runs, m.name), m.residuals) for m in accepted]
     return tuple(
         effect(
             e.name,
             e.doc,
-            road.varied(e.one).residuals,
-            road.varied(e.other).residuals,
+            runs.varied(e.one).residuals,
+            runs.varied(e.other).residuals,
             _shared(inputs, meshes, e.itself),
-            road.experiment.sensors,
+            runs.experiment.sensors,
         )
         for e in shown
     )

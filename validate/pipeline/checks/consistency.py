@@ -16,7 +16,7 @@ from validate.estimate.consistency import (
     whiteness,
 )
 from validate.fem.assembly.locate import probe_rows
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 
 _LAGS = 10
 _HELD = 1e-12  # m: a component without error and without doubt is held, and no estimate
@@ -35,7 +35,7 @@ _HEADS = (
 
 
 def consistency_exhibit(
-    main: Mapping[str, Followed], others: Cases, accepted: tuple[str, ...]
+    main: Mapping[str, MethodRun], others: Cases, accepted: tuple[str, ...]
 ) -> Exhibit | None:
     """Tables and the NIS over time; None where no method is a filter that measured anything."""
     found = {n: f for n, f in main.items() if nis_of(f)}
@@ -76,7 +76,7 @@ def consistency_exhibit(
     )
 
 
-def nis_of(followed: Followed) -> Consistency | None:
+def nis_of(followed: MethodRun) -> Consistency | None:
     """NIS of a filter's run; None for a solver, or where nothing was measured."""
     nis, dof = followed.run.traces.get("nis"), followed.run.traces.get("nis.dof")
     if nis is None or dof is None or not dof.y.any():
@@ -84,13 +84,13 @@ def nis_of(followed: Followed) -> Consistency | None:
     return nis_consistency(nis.y, dof.y)
 
 
-def claims_hold(followed: Followed) -> bool:
+def claims_hold(followed: MethodRun) -> bool:
     """Return whether NIS lies within its 95 % band; True for a method without innovations."""
     nis = nis_of(followed)
     return nis is None or nis.band_95.holds(nis.mean)
 
 
-def nees_of(followed: Followed) -> dict[str, Consistency]:
+def nees_of(followed: MethodRun) -> dict[str, Consistency]:
     """NEES by probe: all components over the output frames, error against the filter's own sd."""
     run, mesh = followed.run, followed.scene.mesh
     if run.sd is None or not len(run.at):
@@ -110,7 +110,7 @@ def nees_of(followed: Followed) -> dict[str, Consistency]:
     return found
 
 
-def consistency_scores(followed: Followed) -> tuple[Score, ...]:
+def consistency_scores(followed: MethodRun) -> tuple[Score, ...]:
     """`nis.per_dof` and `<probe>.nees.per_dof` of a filter's run; none for a solver."""
     end = f"@{followed.case}" if followed.case else ""
     words = "over its degrees of freedom; 1 for a consistent filter"
@@ -126,7 +126,7 @@ def consistency_scores(followed: Followed) -> tuple[Score, ...]:
     return tuple(found)
 
 
-def _rows(followed: Followed) -> list[tuple[Entry, ...]]:
+def _rows(followed: MethodRun) -> list[tuple[Entry, ...]]:
     nis = nis_of(followed)
     if nis is None:
         return []
@@ -139,7 +139,7 @@ def _row(what: str, c: Consistency) -> tuple[Entry, ...]:
     return (what, c.mean, band.low, band.high, c.samples, c.dof, c.verdict, c.alarm or "none")
 
 
-def _white_rows(followed: Followed) -> list[tuple[Entry, ...]]:
+def _white_rows(followed: MethodRun) -> list[tuple[Entry, ...]]:
     traces = followed.run.traces
     names = [n for n in traces if n.startswith("innovation.") and not n.endswith(".sd")]
     rows: list[tuple[Entry, ...]] = []
@@ -156,7 +156,7 @@ def _white(w: Whiteness) -> tuple[Entry, ...]:
     return (w.p, float(w.autocorrelation[0]), w.samples, "yes" if w.white else "no")
 
 
-def _chart(followed: Followed) -> Chart:
+def _chart(followed: MethodRun) -> Chart:
     """NIS of every measured step per degree of freedom, with the band of one step."""
     traces, t = followed.run.traces, followed.own_time
     dof = traces["nis.dof"].y

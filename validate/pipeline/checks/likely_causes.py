@@ -20,7 +20,7 @@ from validate.compare.result import MethodResult
 from validate.errors import ValidateError
 from validate.identify.recorded_motion import RecordedMotion, Ringing, recorded_motion
 from validate.pipeline.bodies.first_modes import first_frequencies
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.register.observation import History
 from validate.report.views.numbers import with_unit
 
@@ -319,7 +319,7 @@ def _at(found: Difference, t: Floats) -> Floats:
 # --- of a run -------------------------------------------------------------------------------------
 
 
-def difference_of(followed: Followed, history: History, inertia: bool) -> Difference:
+def difference_of(followed: MethodRun, history: History, inertia: bool) -> Difference:
     """Return a history of a run, beside the body's first mode."""
     try:
         first = first_frequencies(followed.body, 1)[0]

@@ -11,7 +11,7 @@ from validate.compare.convergence import GridConvergence, Numerical, convergence
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError, SceneError
 from validate.pipeline.experiment.experiment import Uncertainty, Variant
-from validate.pipeline.run.runs import Road, Varied
+from validate.pipeline.run.runs import ExperimentRuns, Varied
 
 # Below, differences need no order, and the largest is u: of the largest number compared (rounding),
 # or of the limit (solvers, and points that meshes interpolate apart).
@@ -33,14 +33,14 @@ def variants(uncertainty: Uncertainty, name: str) -> dict[str, list[Variant]]:
 class Refined:
     """Convergence of a method's residuals, by part of u_num; of the meshes and steps that ran."""
 
-    def __init__(self, road: Road, uncertainty: Uncertainty, name: str) -> None:
+    def __init__(self, runs: ExperimentRuns, uncertainty: Uncertainty, name: str) -> None:
         self._uncertainty = uncertainty
         self._stands_in = uncertainty.stand_in.get(name, "")
         self._runs = {
-            part: [_solved(road, v) for v in levels]
+            part: [_solved(runs, v) for v in levels]
             for part, levels in variants(uncertainty, name).items()
         }
-        self._sizes = {part: self._size_of(part, road, name) for part in self._runs}
+        self._sizes = {part: self._size_of(part, runs, name) for part in self._runs}
 
     def of(self, residual: Residual, limit: float) -> dict[str, GridConvergence | None]:
         """By part; None where fewer than two meshes or steps compare the same points."""
@@ -58,11 +58,11 @@ class Refined:
         parts = {part: c.u if c else inf for part, c in found.items()}
         return Numerical(parts, "; ".join(words), deciding)
 
-    def _size_of(self, part: str, road: Road, name: str) -> list[float]:
+    def _size_of(self, part: str, runs: ExperimentRuns, name: str) -> list[float]:
         """m or s of every level, as it is first."""
         mesh = self._uncertainty.mesh
         if part == "mesh" and mesh:
-            changed = [v.change(road.parameters) for v in variants(self._uncertainty, name)[part]]
+            changed = [v.change(runs.parameters) for v in variants(self._uncertainty, name)[part]]
             sizes = [mesh.size(p) for p in changed]
         else:
             own = self._nominal(part)
@@ -123,10 +123,10 @@ class Refined:
         return f"cells of {1e3 * size:.2g} mm ({unknowns:.1g} unknowns)"
 
 
-def _solved(road: Road, variant: Variant) -> Varied | None:
+def _solved(runs: ExperimentRuns, variant: Variant) -> Varied | None:
     """None for a mesh too coarse to hold the body's shape."""
     try:
-        return road.varied(variant)
+        return runs.varied(variant)
     except SceneError:
         if variant == Variant(variant.method):
             raise

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from validate.parameters import Parameter
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 from validate.register.signals import SignalObservation
@@ -27,7 +27,7 @@ def doubts(
     parameters: Sequence[Parameter],
     stated: Mapping[str, float],
     recordings: Sequence[Recording],
-    first: Followed,
+    first: MethodRun,
 ) -> tuple[str, ...]:
     """Return a sentence with the factor for everything implausible; `first` is any method that was
     run."""
@@ -57,7 +57,7 @@ def _of_value(p: Parameter, stated: Mapping[str, float]) -> Iterator[str]:
 
 
 def _of_compression(
-    scene: Scene, drive: Drive, recording: Recording, followed: Followed
+    scene: Scene, drive: Drive, recording: Recording, followed: MethodRun
 ) -> Iterator[str]:
     """Strain and stress between the driven plate and the other end, from the whole recording."""
     along = np.ptp(scene.mesh.nodes @ np.asarray(drive.direction))

@@ -9,8 +9,8 @@ from validate.compare.exhibit import Exhibit, NumberTable, TableCell
 from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.external import external_methods
-from validate.pipeline.run.method_run import Followed
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.method_run import MethodRun
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.solve.external.scheme import ExternalSimulator, changes
 
 _HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptance",
@@ -27,14 +27,14 @@ _WORDS = (
 )
 
 
-def external_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit, ...]:
+def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tuple[Exhibit, ...]:
     """Return the table and the deviations; empty if no external simulator ran."""
-    simulators = external_methods({n: m for n, m in road.methods.items() if n in main})
+    simulators = external_methods({n: m for n, m in runs.methods.items() if n in main})
     if not simulators:
         return ()
-    accepted = [n for n in road.experiment.accepted if n in main][:1]
-    terms = {k: t for n in accepted for _, one in terms_of(road, main[n]) for k, t in one.items()}
-    rows = [r for f in main.values() for r in _rows(f, road.methods[f.method].settings, terms)]
+    accepted = [n for n in runs.experiment.accepted if n in main][:1]
+    terms = {k: t for n in accepted for _, one in terms_of(runs, main[n]) for k, t in one.items()}
+    rows = [r for f in main.values() for r in _rows(f, runs.methods[f.method].settings, terms)]
     said = [(main[n].label, line) for n in simulators for line in _findings(main[n])]
     tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
@@ -43,13 +43,13 @@ def external_exhibits(road: Road, main: Mapping[str, Followed]) -> tuple[Exhibit
     return (Exhibit(_NAME, "External simulators", (_WORDS,), tables=tuple(tables)),)
 
 
-def _findings(simulator: Followed) -> list[str]:
+def _findings(simulator: MethodRun) -> list[str]:
     lines = [w for run in simulator.runs for w in run.said if not w.startswith("external: ")]
     return list(dict.fromkeys(lines))
 
 
 def _rows(
-    f: Followed, settings: Any, terms: Mapping[str, Terms]
+    f: MethodRun, settings: Any, terms: Mapping[str, Terms]
 ) -> list[tuple[TableCell | float | str | None, ...]]:
     """A row a check; one alone where it was not run, or has nothing that is checked."""
     run, external = f.run, isinstance(settings, ExternalSimulator)
@@ -69,7 +69,7 @@ def _rows(
     ]
 
 
-def _rate(f: Followed, settings: Any) -> float | None:
+def _rate(f: MethodRun, settings: Any) -> float | None:
     """Steps a second; of statics only those whose inputs are new count: others are answered by
     what is there."""
     run, handles = f.run, getattr(settings, "handles", None)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series, TableCell
 from validate.pipeline.checks.consistency import nis_of
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 
 # --- What filters found of the model itself: stiffness, supports and loads over time, and
 # whether the markers that they were given can tell them.
@@ -20,7 +20,7 @@ _AXIS = {"Pa": ("kPa", 1e-3)}
 _OF, _BETWEEN = "estimate.", "correlation."
 
 
-def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
+def estimated_exhibit(main: Mapping[str, MethodRun], others: Cases) -> Exhibit | None:
     """None where no filter estimates parameters."""
     runs = [f for f in (*main.values(), *(f for c in others.values() for f in c.values()))
             if parameters_of(f)]  # fmt: skip
@@ -41,21 +41,21 @@ def estimated_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | 
     return Exhibit("estimates", title, told, (table,), charts)
 
 
-def parameters_of(f: Followed) -> tuple[str, ...]:
+def parameters_of(f: MethodRun) -> tuple[str, ...]:
     """Return the names of what a filter's run estimated."""
     ends = [n for n in f.run.traces if n.startswith(_OF) and n.endswith(".left")]
     found = [n.removeprefix(_OF).removesuffix(".left") for n in ends]
     return tuple(found) if len(f.run.t) else ()
 
 
-def sentences(f: Followed) -> tuple[str, ...]:
+def sentences(f: MethodRun) -> tuple[str, ...]:
     """One on every parameter that the markers could not tell."""
     return tuple(
         f"{f.label}, {name}: {said}" for name in parameters_of(f) if (said := doubt(f, name))
     )
 
 
-def doubt(f: Followed, name: str) -> str:
+def doubt(f: MethodRun, name: str) -> str:
     """Why a parameter is not identifiable, or its interval does not hold; empty where both do."""
     nis = nis_of(f)
     if nis and nis.mean > nis.band_999.high:
@@ -70,7 +70,7 @@ def doubt(f: Followed, name: str) -> str:
     return f"{words}; known only together with {other}, correlation {tie:.3f}" if other else words
 
 
-def _tied(f: Followed, name: str) -> tuple[str, float]:
+def _tied(f: MethodRun, name: str) -> tuple[str, float]:
     """The parameter that this one moves with most, and how; none below `TIED`."""
     found = [("", 0.0)]
     for trace in f.run.traces:
@@ -81,11 +81,11 @@ def _tied(f: Followed, name: str) -> tuple[str, float]:
     return most if abs(most[1]) >= TIED else ("", 0.0)
 
 
-def _last(f: Followed, trace: str) -> float:
+def _last(f: MethodRun, trace: str) -> float:
     return float(f.run.traces[trace].y[-1])
 
 
-def _row(f: Followed, name: str) -> tuple[TableCell | str | float, ...]:
+def _row(f: MethodRun, name: str) -> tuple[TableCell | str | float, ...]:
     unit = f.run.traces[_OF + name].unit
     numbers = (_last(f, f"{_OF}{name}{end}") for end in ("", ".low", ".high"))
     shown = (TableCell(v, unit, text=_words(v, unit)) for v in numbers)
@@ -100,7 +100,7 @@ def _words(value: float, unit: str) -> str:
     return f"{factor * value:.5g}{'' if axis == '1' else ' ' + axis}"
 
 
-def _chart(f: Followed, name: str) -> Chart:
+def _chart(f: MethodRun, name: str) -> Chart:
     unit = f.run.traces[_OF + name].unit
     axis, factor = _AXIS.get(unit, (unit, 1.0))
 
@@ -124,7 +124,7 @@ _DRAWN = 3  # rejected looks from which a picture says more than the table
 _MOST = 0.5  # share of rejected looks from which a filter follows itself, not the recording
 
 
-def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
+def gate_exhibit(main: Mapping[str, MethodRun], others: Cases) -> Exhibit | None:
     """None where no filter has a gate."""
     every = [*main.values(), *(f for case in others.values() for f in case.values())]
     gated = [f for f in every if "gate.rejected" in f.run.traces and len(f.run.t)]
@@ -145,7 +145,7 @@ def gate_exhibit(main: Mapping[str, Followed], others: Cases) -> Exhibit | None:
     return Exhibit("gate", "Rejected measurements", words, (table,), charts)
 
 
-def gate_warnings(main: Mapping[str, Followed]) -> tuple[str, ...]:
+def gate_warnings(main: Mapping[str, MethodRun]) -> tuple[str, ...]:
     """Return a sentence on every filter whose gate rejected more looks than it let pass."""
     found = []
     for f in main.values():
@@ -160,20 +160,20 @@ def gate_warnings(main: Mapping[str, Followed]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _markers(f: Followed) -> list[str]:
+def _markers(f: MethodRun) -> list[str]:
     return [n.removeprefix(_FAR) for n in f.run.traces if n.startswith(_FAR)]
 
 
-def _sum(f: Followed, name: str) -> float:
+def _sum(f: MethodRun, name: str) -> float:
     trace = f.run.traces.get(name)
     return 0.0 if trace is None else float(trace.y.sum())
 
 
-def _rejected(f: Followed) -> int:
+def _rejected(f: MethodRun) -> int:
     return int(_sum(f, "gate.rejected"))
 
 
-def _gated_row(f: Followed, marker: str) -> tuple[Entry, ...]:
+def _gated_row(f: MethodRun, marker: str) -> tuple[Entry, ...]:
     far, t = f.run.traces[_FAR + marker].y, f.own_time
     off = far > 0
     looks = int((_passed(f, marker) | off).sum())
@@ -184,14 +184,14 @@ def _gated_row(f: Followed, marker: str) -> tuple[Entry, ...]:
     return (f.case or "recorded", f.label, marker, looks, int(off.sum()), share * looks, *when)
 
 
-def _passed(f: Followed, marker: str) -> NDArray[np.bool_]:
+def _passed(f: MethodRun, marker: str) -> NDArray[np.bool_]:
     """At which steps (nt,) a look of the marker reached the filter."""
     names = [f"innovation.{marker}.{c}.sd" for c in "xyz"]
     found = [f.run.traces[name].y > 0 for name in names if name in f.run.traces]
     return np.asarray(np.any(found, axis=0))
 
 
-def _gated_chart(f: Followed) -> Chart:
+def _gated_chart(f: MethodRun) -> Chart:
     series = []
     for marker in _markers(f):
         far = f.run.traces[_FAR + marker].y

@@ -11,7 +11,7 @@ from validate.compare.row import LongRow, RowBlock
 from validate.pipeline.checks.consistency import consistency_exhibit, nis_of
 from validate.pipeline.exhibits.gating import estimated_exhibit, gate_exhibit
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.run.method_run import Cases, Followed
+from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.markers.markers import MarkerObservation
 
 _MM = 1e3
@@ -20,7 +20,7 @@ _MAPS = 6  # pictures of the mesh in one report
 
 
 def standard_exhibits(
-    experiment: Experiment, main: Mapping[str, Followed], others: Cases
+    experiment: Experiment, main: Mapping[str, MethodRun], others: Cases
 ) -> tuple[Exhibit, ...]:
     """Displacements and errors on the recorded case, other cases, maps, consistency.
 
@@ -39,13 +39,13 @@ def standard_exhibits(
     return tuple(exhibit for exhibit in found if exhibit)
 
 
-def error_at(followed: Followed, probe: str, axis: str) -> TrackError:
+def error_at(followed: MethodRun, probe: str, axis: str) -> TrackError:
     """Estimate less truth at a probe, along an axis, over the whole time."""
     reference = followed.reference(probe)[:, "xyz".index(axis)]
     return track_error(probe, axis, followed.run.traces[f"{probe}.{axis}"].y, reference)
 
 
-def _displacements(experiment: Experiment, shown: Mapping[str, Followed]) -> Exhibit:
+def _displacements(experiment: Experiment, shown: Mapping[str, MethodRun]) -> Exhibit:
     first, axis = next(iter(shown.values())), experiment.axis
     probes = first.scored or first.shown
     charts = [_track_chart(shown, probe, axis) for probe in probes]
@@ -62,7 +62,7 @@ def _displacements(experiment: Experiment, shown: Mapping[str, Followed]) -> Exh
     )
 
 
-def _track_chart(shown: Mapping[str, Followed], probe: str, axis: str) -> Chart:
+def _track_chart(shown: Mapping[str, MethodRun], probe: str, axis: str) -> Chart:
     first = next(iter(shown.values()))
     series = [*_measured(first, probe, axis), *_reference(first, probe, axis)]
     series += [
@@ -76,7 +76,7 @@ def _track_chart(shown: Mapping[str, Followed], probe: str, axis: str) -> Chart:
     )  # fmt: skip
 
 
-def _reference(followed: Followed, probe: str, axis: str) -> list[Series]:
+def _reference(followed: MethodRun, probe: str, axis: str) -> list[Series]:
     """The twin's truth; none where nobody knows it."""
     if probe not in followed.truth.probes:
         return []
@@ -85,7 +85,7 @@ def _reference(followed: Followed, probe: str, axis: str) -> list[Series]:
     return [Series("reference (twin)", t, truth)]
 
 
-def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
+def _measured(followed: MethodRun, probe: str, axis: str) -> list[Series]:
     markers = followed.seen.of(MarkerObservation)
     seen = next((m for m in markers if probe in m.names), None)
     if seen is None:
@@ -97,7 +97,7 @@ def _measured(followed: Followed, probe: str, axis: str) -> list[Series]:
     return [Series("measured", t, _MM * moved[there], "points")]
 
 
-def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart:
+def _error_chart(scored: Mapping[str, MethodRun], probe: str, axis: str) -> Chart:
     """Absolute errors, differences of displacements as large as the reference's range."""
     mine = [f for f in scored.values() if probe in f.scored]
     series = tuple(
@@ -111,7 +111,7 @@ def _error_chart(scored: Mapping[str, Followed], probe: str, axis: str) -> Chart
     )  # fmt: skip
 
 
-def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: Cases) -> Exhibit:
+def _other_cases(experiment: Experiment, main: Mapping[str, MethodRun], others: Cases) -> Exhibit:
     axis, probes = experiment.axis, tuple(next(iter(main.values())).truth.probes)
     rows: list[tuple[Entry, ...]] = []
     for name, case in others.items():
@@ -138,7 +138,7 @@ def _other_cases(experiment: Experiment, main: Mapping[str, Followed], others: C
     )
 
 
-def speed_rows(experiment: Experiment, main: Mapping[str, Followed]) -> tuple[RowBlock, ...]:
+def speed_rows(experiment: Experiment, main: Mapping[str, MethodRun]) -> tuple[RowBlock, ...]:
     """Of every method with step times: its dt, that over the critical one, the real-time factor,
     the cost and the steps, as rows of the long table.
 
@@ -167,7 +167,7 @@ def speed_rows(experiment: Experiment, main: Mapping[str, Followed]) -> tuple[Ro
     return tuple(found)
 
 
-def _real_time(f: Followed) -> float | None:
+def _real_time(f: MethodRun) -> float | None:
     times = f.run.step_s
     return _step(f.own_time) * times.rate_hz if times else None
 
@@ -177,13 +177,13 @@ def _step(t: Floats) -> float:
     return float(t[0]) if t[0] > 0 or len(t) < 2 else float(t[1] - t[0])
 
 
-def _limit(f: Followed) -> float | None:
+def _limit(f: MethodRun) -> float | None:
     """The critical step s that an explicit run watched, the least of the run."""
     trace = f.run.traces.get("critical_step")
     return float(trace.y.min()) if trace is not None and len(trace.y) else None
 
 
-def _maps(shown: Mapping[str, Followed]) -> Exhibit | None:
+def _maps(shown: Mapping[str, MethodRun]) -> Exhibit | None:
     """Rms error over the output frames at every node, where truth and model share a mesh."""
     maps = []
     for f in shown.values():

@@ -307,7 +307,7 @@ class Twin:
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportAdditions:
     """What an experiment adds of its own: exhibits, numbers by name for printed figures, and rows
     of the long table, which its `views` show."""
 
@@ -388,7 +388,7 @@ class Experiment:
     effects: tuple[EffectSpec, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     band: str = ""
-    exhibits: Callable[[Any, Cases, Progress], Told] | None = None
+    exhibits: Callable[[Any, Cases, Progress], ReportAdditions] | None = None
     views: tuple[View, ...] = ()
     published: tuple[Figure, ...] = ()
     captions: Mapping[str, str] = field(default_factory=dict)

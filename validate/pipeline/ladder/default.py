@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError, UsageError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.large_strain.explicit import knows_single
-from validate.pipeline.bodies.own_body import OwnBody, own_body, with_law
+from validate.pipeline.bodies.own_body import ExperimentBody, own_body, with_law
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.ladder.ladder import (
@@ -95,7 +95,7 @@ class _Loading:
         return np.stack(columns, axis=1)
 
 
-def _untaken(own: OwnBody) -> UsageError:
+def _untaken(own: ExperimentBody) -> UsageError:
     """Of a scene that is touched by a probe, where nothing on the ladder takes it."""
     return UsageError(
         f"'{own.experiment.name}' is touched by the probe '{own.scene.tools[0].name}', which a "
@@ -103,7 +103,7 @@ def _untaken(own: OwnBody) -> UsageError:
     )
 
 
-def _trial(own: OwnBody, quick: bool) -> Trial:
+def _trial(own: ExperimentBody, quick: bool) -> Trial:
     if own.scene.tools:
         return _touched(own, quick)
     meshes, reference = _meshes(own, _QUICK_UNKNOWNS if quick else _UNKNOWNS, quick)
@@ -134,7 +134,7 @@ def _trial(own: OwnBody, quick: bool) -> Trial:
     )
 
 
-def _touched(own: OwnBody, quick: bool) -> Trial:
+def _touched(own: ExperimentBody, quick: bool) -> Trial:
     """Under a probe: the experiment's own methods, linear cells, smaller bodies."""
     known = touched_ladder(own, 100)
     if known is None:
@@ -163,7 +163,7 @@ def _touched(own: OwnBody, quick: bool) -> Trial:
     )
 
 
-def _touched_levels(own: OwnBody, most: int) -> tuple[int, ...]:
+def _touched_levels(own: ExperimentBody, most: int) -> tuple[int, ...]:
     """Rising meshes as `_meshes` takes them, the finest of at most so many unknowns. Raises
     `UsageError` where there are not two."""
     for top in own.levels(_LEVELS)[::-1]:
@@ -184,7 +184,7 @@ def _elements(mesh: Mesh, scene: Scene) -> tuple[str, ...]:
 
 
 def _meshes(
-    own: OwnBody, most: int, quick: bool
+    own: ExperimentBody, most: int, quick: bool
 ) -> tuple[Mapping[str, tuple[int, ...]], tuple[str, int]]:
     """Levels by element, and the reference: the most exact element on the finest mesh that has at
     most so many unknowns. Raises `UsageError` where there are not two meshes."""
@@ -203,7 +203,7 @@ def _meshes(
     )
 
 
-def _loading(own: OwnBody) -> _Loading:
+def _loading(own: ExperimentBody) -> _Loading:
     """With inertia the recorded inputs, else a ramp to the largest of them."""
     seen, dynamic = own.seen, own.scene.material.rho is not None
     if dynamic:
@@ -220,7 +220,7 @@ def _loading(own: OwnBody) -> _Loading:
     return _Loading(np.array([0.0, rise]), np.array([0 * peak, peak]), rise, dynamic=False)
 
 
-def _require_instants(own: OwnBody) -> None:
+def _require_instants(own: ExperimentBody) -> None:
     """A step in time is the recording's: raises `UsageError` where it has none."""
     if len(own.seen.t) < 2:
         raise UsageError(
@@ -242,7 +242,10 @@ def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...]
 
 
 def _solvers(
-    own: OwnBody, meshes: Mapping[str, tuple[int, ...]], steps: tuple[float, ...], loading: _Loading
+    own: ExperimentBody,
+    meshes: Mapping[str, tuple[int, ...]],
+    steps: tuple[float, ...],
+    loading: _Loading,
 ) -> tuple[tuple[Rival, ...], LawPair]:
     """All that handle the scene, and what its law costs on the coarsest mesh."""
     levels = next(iter(meshes.values()))
@@ -267,7 +270,7 @@ def _handles(solver: Rival, dt: float, scene: Scene) -> bool:
 
 
 def _points(
-    own: OwnBody, meshes: Mapping[str, tuple[int, ...]], reference: tuple[str, int]
+    own: ExperimentBody, meshes: Mapping[str, tuple[int, ...]], reference: tuple[str, int]
 ) -> Floats:
     """The probes, and points inside the body on every mesh, far from one another."""
     levels = sorted({reference[1], *(n for ns in meshes.values() for n in ns)})
@@ -294,7 +297,7 @@ def _spread(points: Floats) -> Floats:
 # --- stability ------------------------------------------------------------------------------------
 
 
-def _body(own: OwnBody) -> StabilityBody:
+def _body(own: ExperimentBody) -> StabilityBody:
     """The body without its fluid, in linear cells, on meshes whose modes can all be taken."""
     if own.scene.tools:
         raise _untaken(own)
@@ -321,7 +324,7 @@ def _body(own: OwnBody) -> StabilityBody:
     )
 
 
-def _solid(own: OwnBody, level: int, material: Material) -> Scene:
+def _solid(own: ExperimentBody, level: int, material: Material) -> Scene:
     """Of another material; regions keep their modulus over the rest."""
     scene = own.at(level)
     share = material.E / own.scene.material.E

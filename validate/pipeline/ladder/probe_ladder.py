@@ -12,7 +12,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import System
-from validate.pipeline.bodies.own_body import OwnBody
+from validate.pipeline.bodies.own_body import ExperimentBody
 from validate.pipeline.ladder.ladder import Rival, Rung
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
@@ -91,7 +91,7 @@ class TouchedLadder:
         )
 
 
-def touched_ladder(own: OwnBody, coarsest: int) -> TouchedLadder | None:
+def touched_ladder(own: ExperimentBody, coarsest: int) -> TouchedLadder | None:
     """Of the experiment's methods that step a touched body, or None where it has none."""
     given = own.experiment.sets(own.parameters, own.seen)
     found = {m.label: m.given(given) for m in own.experiment.methods.values()

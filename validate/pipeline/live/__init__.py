@@ -1,6 +1,6 @@
 """Real-time loop of a model: from a recorded path, or from UDP packets on loopback."""
 
-from validate.pipeline.live.clock import Lived, live, realtime
+from validate.pipeline.live.clock import LiveRun, live, realtime
 from validate.pipeline.live.listener import Listener
 from validate.pipeline.live.live_recording import LIVE, as_given, written
 from validate.pipeline.live.path import RecordedPath, recorded_tip
@@ -9,7 +9,7 @@ from validate.pipeline.live.preparation import Prepared, prepared
 __all__ = [
     "LIVE",
     "Listener",
-    "Lived",
+    "LiveRun",
     "Prepared",
     "RecordedPath",
     "as_given",

@@ -47,7 +47,7 @@ class Places(Protocol):
 
 
 @dataclass(frozen=True)
-class Lived:
+class LiveRun:
     """What a live loop did. Every tick: `due` (n,) s, `late` (n,) s from then until the force was
     there, `work` (n,) s of it the loop's own, `changed` (n,) whether the contact changed. Ticks
     with a place that the model answered: `t` (m,) s, tip `x` (m, d) m, force given `F` (m, d) N.
@@ -142,7 +142,7 @@ def live(
     seconds: float | None = None,
     clock: Callable[[], float] = perf_counter,
     wait: Callable[[float], None] = sleep,
-) -> Lived:
+) -> LiveRun:
     """Run until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
     _first_too(stepper.threads)
@@ -155,7 +155,7 @@ def live(
     d = len(stepper.tool.tip)
     ticks = np.array(kept.ticks).reshape(-1, 4).T
     due, late, work, changed = ticks
-    return Lived(
+    return LiveRun(
         source.kind, source.rate, due, late, work, changed,
         np.array([t for t, _, _ in kept.places]),
         np.array([x for _, x, _ in kept.places]).reshape(-1, d),

@@ -10,7 +10,7 @@ from validate.compare.verdict import Accept
 from validate.errors import ComparisonError
 from validate.parameters import describe
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.live.clock import Lived
+from validate.pipeline.live.clock import LiveRun
 from validate.pipeline.live.preparation import Prepared
 from validate.recording.types import Recording, Signal, Source
 
@@ -20,7 +20,7 @@ _FRAME = "block"
 _TINY = 1e-12  # N: what was given is known to rounding
 
 
-def written(done: Lived, made: Prepared, start_ns: int) -> Recording:
+def written(done: LiveRun, made: Prepared, start_ns: int) -> Recording:
     """Signals `tip.*` m and `given.*` N of the answered ticks, `tick.late`, `tick.work` s of all.
 
     The path begins where the needle rests, so that a replay begins as the loop did.
@@ -46,7 +46,7 @@ def written(done: Lived, made: Prepared, start_ns: int) -> Recording:
     )  # fmt: skip
 
 
-def _from_rest(done: Lived, rest: Floats) -> tuple[Floats, Floats, Floats]:
+def _from_rest(done: LiveRun, rest: Floats) -> tuple[Floats, Floats, Floats]:
     if len(done.x) and np.array_equal(done.x[0], rest):
         return np.round(done.t, 9), done.x, done.F
     before = (done.t[0] if len(done.t) else 0.0) - 1 / done.rate
@@ -55,7 +55,7 @@ def _from_rest(done: Lived, rest: Floats) -> tuple[Floats, Floats, Floats]:
     return np.round(t, 9), np.vstack([rest[None], done.x]), np.vstack([none, done.F])
 
 
-def _said(done: Lived, made: Prepared) -> Mapping[str, str]:
+def _said(done: LiveRun, made: Prepared) -> Mapping[str, str]:
     counts = {k: str(v) for k, v in sorted(done.findings.items())}
     return {
         "experiment": made.experiment.name, "method": made.method, "source": done.kind,

@@ -46,20 +46,20 @@ def prepared(experiment: Experiment, options: Options, method: str = "") -> Prep
     if name not in experiment.methods:
         raise UsageError(f"unknown method '{name}'; {nearest_names(name, set(experiment.methods))}")
     out = set_out(experiment, Options(options.values, (name,)))
-    road, chosen = out.road, out.road.methods[name]
-    road.start(out.found.recordings)
-    recording = road.recordings[0]
-    scene = out.experiment.build(recording, road.parameters, chosen.scene)
+    runs, chosen = out.runs, out.runs.methods[name]
+    runs.start(out.found.recordings)
+    recording = runs.recordings[0]
+    scene = out.experiment.build(recording, runs.parameters, chosen.scene)
     if isinstance(scene, Meshless) or len(scene.tools) != 1:
         raise UsageError(
             f"experiment '{experiment.name}' has no needle or probe, which `validate live` needs"
         )
-    seen = out.experiment.place(recording, road.parameters, scene)
-    given = out.experiment.sets(road.parameters, seen)
+    seen = out.experiment.place(recording, runs.parameters, scene)
+    given = out.experiment.sets(runs.parameters, seen)
     stepper = chosen.prepare(build_system(scene), seen, given)
     if not isinstance(stepper, HandStepper):
         raise UsageError(
             f"method '{name}' of '{experiment.name}' cannot run in real time under a tool"
         )
     path = RecordedPath(seen.t, seen.inputs + np.array(stepper.tool.tip))
-    return Prepared(out.experiment, name, road.parameters, stepper, path, seen.findings)
+    return Prepared(out.experiment, name, runs.parameters, stepper, path, seen.findings)

@@ -15,7 +15,7 @@ from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.method_run import MAIN, Followed
+from validate.pipeline.run.method_run import MAIN, MethodRun
 from validate.recording.types import Recording
 from validate.register.observation import nearest_samples
 from validate.register.registration import Registered
@@ -35,7 +35,7 @@ def solve(
     tell: Tell = lambda _: None,
     refused: str = "",
     off: tuple[float, ...] = (),
-) -> Followed:
+) -> MethodRun:
     """Builds, registers, prepares, runs and compares; children of `ValidateError` for bad input.
 
     `tell` is given what is being done, in words. A method that is `refused`, for that reason, has
@@ -52,7 +52,7 @@ def solve(
     )
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     done = tuple(replace(run, memory=run.memory or _own_peak()) for run in done)
-    return Followed(name, _label(method, scene), case, scene, seen, done, stacked(found))
+    return MethodRun(name, _label(method, scene), case, scene, seen, done, stacked(found))
 
 
 def placed(

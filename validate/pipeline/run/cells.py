@@ -20,7 +20,7 @@ from validate.engine.store import key_of, oldest_removed
 from validate.engine.worker_cache import fingerprint
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
-from validate.pipeline.experiment.experiment import Experiment, Told
+from validate.pipeline.experiment.experiment import Experiment, ReportAdditions
 from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, configure, folder_of, mesh_files
@@ -28,7 +28,7 @@ from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Meshes
 from validate.pipeline.run.job import Job, job_on
 from validate.pipeline.run.method_run import NO_TRUTH, Cases, Truth
-from validate.pipeline.run.runs import Road, RunFound, RunWanted
+from validate.pipeline.run.runs import ExperimentRuns, RunFound, RunWanted
 from validate.solve.external.program import version_of
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.types import Run
@@ -59,7 +59,7 @@ class RunCell:
 
 
 @dataclass(frozen=True)
-class ToldCell:
+class AdditionsCell:
     """Cell of the report items and rows that an experiment adds to its runs."""
 
     key: str
@@ -88,32 +88,32 @@ class RunJob:
         return self.of.identity()
 
 
-def open_road(job: RunJob) -> Road:
-    """Return the road on a worker, with its recordings."""
+def open_runs(job: RunJob) -> ExperimentRuns:
+    """Return the runs of an experiment on a worker, with its recordings."""
     experiment = with_simulators(job.of.experiment(), job.of.simulators)
     options = Options(dict(job.of.values), (), job.of.quick, simulators=job.of.simulators)
     declared, methods = configure(experiment, options)
     recordings = opened(experiment, declared).recordings
     parameters = decoded(job.parameters, _AT, experiment)
     experiment = experiment.follows(experiment, recordings, parameters)
-    road = Road(experiment, methods, parameters, None, quick=False)
-    road.start(recordings, remake=job.remakes)
-    return road
+    runs = ExperimentRuns(experiment, methods, parameters, None, quick=False)
+    runs.start(recordings, remake=job.remakes)
+    return runs
 
 
-def run_cell(road: Road, cell: RunCell) -> CellFound:
-    parameters = decoded(cell.parameters, _AT, road.experiment)
+def run_cell(runs: ExperimentRuns, cell: RunCell) -> CellFound:
+    parameters = decoded(cell.parameters, _AT, runs.experiment)
     whole = cell.whole or cell.other_mesh
     wanted = RunWanted(cell.case, cell.method, parameters, cell.split, cell.off, whole)
     if cell.truth:
-        return CellFound(truth=road.true(wanted))
-    solved = road.solve(wanted)
+        return CellFound(truth=runs.true(wanted))
+    solved = runs.solve(wanted)
     if not cell.whole and sum(run.u.nbytes for run in solved.runs) > _SMALL:
         solved = replace(solved, runs=())
     return CellFound(solved)
 
 
-def make_told(make: Callable[[], Told], cell: ToldCell) -> Told:
+def make_additions(make: Callable[[], ReportAdditions], cell: AdditionsCell) -> ReportAdditions:
     return make()
 
 
@@ -139,58 +139,62 @@ class InStore:
         count = len(self._records)
         return f", {self.reused} of {count} computations were stored" if self.reused else ""
 
-    def ahead(self, road: Road, wanted: Sequence[RunWanted]) -> None:
+    def ahead(self, runs: ExperimentRuns, wanted: Sequence[RunWanted]) -> None:
         """All of it, timed runs first: they have nothing beside them but each other; then long ones
         before short ones, so that none of them is left for the end."""
-        twin = road.experiment.twin
+        twin = runs.experiment.twin
         cases = dict.fromkeys(w.case for w in wanted if w.whole)
-        first = next((name for name in road.methods if name not in road.refused), "")
-        truths = [RunWanted(case, first, road.parameters, whole=True) for case in cases if first]
+        first = next((name for name in runs.methods if name not in runs.refused), "")
+        truths = [RunWanted(case, first, runs.parameters, whole=True) for case in cases if first]
         told = twin is not None and twin.truth is not None
-        order = sorted(wanted, key=lambda w: (not w.whole, -road.pace.cost(w)))
-        cells = [self._cell(road, w) for w in order]
-        cells += [self._cell(road, w, truth=True) for w in truths if told]
-        self._finish(road, cells)
+        order = sorted(wanted, key=lambda w: (not w.whole, -runs.pace.cost(w)))
+        cells = [self._cell(runs, w) for w in order]
+        cells += [self._cell(runs, w, truth=True) for w in truths if told]
+        self._finish(runs, cells)
         oldest_removed(self._folder, MOST_BYTES)
 
-    def solved(self, road: Road, wanted: RunWanted) -> RunFound:
-        found = self._found(road, self._cell(road, wanted)).solved
+    def solved(self, runs: ExperimentRuns, wanted: RunWanted) -> RunFound:
+        found = self._found(runs, self._cell(runs, wanted)).solved
         assert found is not None
         return found
 
-    def truth(self, road: Road, wanted: RunWanted) -> Truth:
-        twin = road.experiment.twin
+    def truth(self, runs: ExperimentRuns, wanted: RunWanted) -> Truth:
+        twin = runs.experiment.twin
         if twin is None or twin.truth is None:
             return NO_TRUTH
-        found = self._found(road, self._cell(road, wanted, truth=True)).truth
+        found = self._found(runs, self._cell(runs, wanted, truth=True)).truth
         assert found is not None
         return found
 
-    def told(self, road: Road, cases: Cases, make: Callable[[], Told]) -> Told:
+    def told(
+        self, runs: ExperimentRuns, cases: Cases, make: Callable[[], ReportAdditions]
+    ) -> ReportAdditions:
         """Kept under all that it is made of: the code, the experiment, its parameters, recordings
         and what the runs gave, but for what they cost. Raises what making it raises."""
-        job = self._job(road)
-        runs = [
+        job = self._job(runs)
+        computed = [
             (case, name, followed.residuals, followed.truth, *map(_but_costs, followed.runs))
             for case, by_name in cases.items() for name, followed in by_name.items()
         ]  # fmt: skip
-        hashes = [r.source.sha256 or fingerprint(r) for r in road.recordings]
-        key = key_of("told", dict(job.identity()), job.parameters, hashes, fingerprint(runs))
-        plan = Plan(job, (ToldCell(key),), open_road, make_told, Told, bench=make)
-        found = finish(plan, self._folder, self._pool, lambda _, __, what: road.tell(what))
+        hashes = [r.source.sha256 or fingerprint(r) for r in runs.recordings]
+        key = key_of("told", dict(job.identity()), job.parameters, hashes, fingerprint(computed))
+        plan = Plan(
+            job, (AdditionsCell(key),), open_runs, make_additions, ReportAdditions, bench=make
+        )
+        found = finish(plan, self._folder, self._pool, lambda _, __, what: runs.tell(what))
         self._records |= found.records
         self.reused += found.reused
         value = found.records[key].value
         return make() if value is None else value
 
-    def _found(self, road: Road, cell: RunCell) -> CellFound:
+    def _found(self, runs: ExperimentRuns, cell: RunCell) -> CellFound:
         """Raises what the cell raised: it is then computed again, here."""
-        self._finish(road, [cell])
+        self._finish(runs, [cell])
         record = self._records[cell.key]
         if record.value is None:
             if record.error == SceneError.__name__:
                 raise SceneError(record.refused)
-            return run_cell(road, cell)
+            return run_cell(runs, cell)
         found: CellFound = record.value
         return found
 
@@ -198,28 +202,28 @@ class InStore:
         record = self._records.get(cell.key)
         return record is not None and (record.value is None or _enough(cell, record.value))
 
-    def _finish(self, road: Road, asked: Sequence[RunCell]) -> None:
+    def _finish(self, runs: ExperimentRuns, asked: Sequence[RunCell]) -> None:
         """Of these, what this run has not asked for before."""
         cells = [cell for cell in asked if not self._there(cell)]
         if not cells:
             return
         wanted = {cell.key: w for (w, truth, _), cell in self._cells.items() if not truth}
         plan = Plan(
-            self._job(road), _each_once(cells), open_road, run_cell, CellFound,
-            bench=road, enough=_enough, shares=True, beside=_TIMED_BESIDE,
-            after=max(0, road.pace.expected - len(cells)),
+            self._job(runs), _each_once(cells), open_runs, run_cell, CellFound,
+            bench=runs, enough=_enough, shares=True, beside=_TIMED_BESIDE,
+            after=max(0, runs.pace.expected - len(cells)),
         )  # fmt: skip
 
         def done(cell: RunCell, record: Record[CellFound]) -> None:
             if cell.key in wanted:
-                road.pace.took(wanted[cell.key], record.seconds / max(1, self._pool.busy))
+                runs.pace.took(wanted[cell.key], record.seconds / max(1, self._pool.busy))
 
-        found = finish(plan, self._folder, self._pool, lambda _, __, what: road.tell(what), done)
+        found = finish(plan, self._folder, self._pool, lambda _, __, what: runs.tell(what), done)
         self._records |= found.records
         self.reused += found.reused
 
-    def _cell(self, road: Road, wanted: RunWanted, *, truth: bool = False) -> RunCell:
-        at = wanted, truth, road.remakes
+    def _cell(self, runs: ExperimentRuns, wanted: RunWanted, *, truth: bool = False) -> RunCell:
+        at = wanted, truth, runs.remakes
         if at not in self._cells:
             what = f"{wanted.method} on {wanted.case}" if wanted.case else wanted.method
             cell = RunCell(
@@ -227,24 +231,24 @@ class InStore:
                 encoded(_compared_left_out(wanted.parameters), _AT), truth,
             )  # fmt: skip
             self._cells[at] = replace(
-                cell, key=key_of(cell, *self._rests_on(road, wanted, truth)),
+                cell, key=key_of(cell, *self._rests_on(runs, wanted, truth)),
                 label="truth of the twin" if truth else what, whole=wanted.whole,
-                other_mesh=_body(wanted.parameters) != _body(road.parameters),
+                other_mesh=_body(wanted.parameters) != _body(runs.parameters),
                 timed=wanted.whole and not truth,
             )  # fmt: skip
         return self._cells[at]
 
-    def _rests_on(self, road: Road, wanted: RunWanted, truth: bool) -> tuple[Any, ...]:
+    def _rests_on(self, runs: ExperimentRuns, wanted: RunWanted, truth: bool) -> tuple[Any, ...]:
         """What the numbers of a run rest on besides what its cell says. A recording that is no
         file is known by its content."""
-        recordings, true = road.of_case(wanted.case)
+        recordings, true = runs.of_case(wanted.case)
         hashes = [r.source.sha256 or fingerprint(r) for r in recordings]
-        method = replace(road.method(wanted), label="")
+        method = replace(runs.method(wanted), label="")
         if truth:  # seen in the scene of a method, whatever solves it
             method = Method(scene=method.scene)
         read = mesh_files(wanted.parameters, folder_of(self._experiment))
         return (
-            dict(self._job(road).identity()), encoded(method, f"methods.{wanted.method}"),
+            dict(self._job(runs).identity()), encoded(method, f"methods.{wanted.method}"),
             hashes, encoded(_compared_left_out(true), _AT) if truth else "",
             [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
             self._external(method.settings.command)
@@ -257,10 +261,10 @@ class InStore:
             self._externals[command] = version_of(command) or uuid4().hex
         return self._externals[command]
 
-    def _job(self, road: Road) -> RunJob:
-        at = encoded(road.parameters, _AT), road.remakes
+    def _job(self, runs: ExperimentRuns) -> RunJob:
+        at = encoded(runs.parameters, _AT), runs.remakes
         if at not in self._jobs:
-            hashes = tuple(r.source.sha256 for r in road.recordings)
+            hashes = tuple(r.source.sha256 for r in runs.recordings)
             base = job_on(self._experiment, hashes, self._options.values, self._options.quick)
             self._jobs[at] = RunJob(replace(base, simulators=self._options.simulators), *at)
         return self._jobs[at]

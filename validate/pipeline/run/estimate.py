@@ -11,7 +11,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.run.cost import NODAL_MEAN, linear_seconds, newton_seconds
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.scene.scene import Scene
 
 _PROGRAM, _PROGRAM_SECONDS = 0.5e9, 8.0  # bytes and s of the program itself and its report
@@ -43,8 +43,8 @@ def _estimated(experiment: Experiment) -> RunEstimate | None:
     unset = [p.path for p in described if p.path == "material.E" and p.default is None]
     parameters = with_values(found.parameters, dict.fromkeys(unset, _ASSUMED_E.replace(" ", "")))
     experiment = experiment.follows(experiment, found.recordings, parameters)
-    road = Road(experiment, experiment.methods, parameters, None, quick=False)
-    variants, scenes = variants_of(road), {}
+    runs = ExperimentRuns(experiment, experiment.methods, parameters, None, quick=False)
+    variants, scenes = variants_of(runs), {}
     for name in {v.method for v in variants}:
         model = experiment.methods[name].scene
         scene = experiment.build(found.recordings[0], parameters, model)
@@ -55,7 +55,7 @@ def _estimated(experiment: Experiment) -> RunEstimate | None:
     seconds, largest, memory = _PROGRAM_SECONDS, 0.0, 0.0
     for variant in variants:
         scene, steps = scenes[variant.method], len(seen.t) * variant.split
-        N = scene.mesh.nodes.size * road.finer(variant) ** scene.mesh.dimension
+        N = scene.mesh.nodes.size * runs.finer(variant) ** scene.mesh.dimension
         costs = N * NODAL_MEAN if scene.dilatation == "nodal_mean" else N
         linear = scene.material.law == "linear" and not scene.contacts
         alone = linear_seconds(costs) + steps * _SOLVE * costs ** (4 / 3)

@@ -9,7 +9,7 @@ from validate.parameters import Parameter, describe
 from validate.pipeline.checks.checks import variants_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Recording
 
 _POWER = 0.25  # memory of a factor in space goes with the cells along an edge to the fourth
@@ -27,7 +27,7 @@ def require_room(
     quick: bool,
 ) -> None:
     """Raise `MemoryShortError` for what will not fit, before anything is identified or solved."""
-    asking = Road(experiment, methods, parameters, None, quick=quick)
+    asking = ExperimentRuns(experiment, methods, parameters, None, quick=quick)
     asking.expect(variants_of(asking))
     try:
         asking.require_room(recording)

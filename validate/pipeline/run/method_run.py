@@ -49,7 +49,7 @@ def truth_of(run: Run, scene: Scene) -> Truth:
 
 
 @dataclass(frozen=True)
-class Followed:
+class MethodRun:
     """A method on a case: one registration and run for every recording, residuals over all."""
 
     method: str
@@ -135,4 +135,4 @@ class Followed:
         return tuple(name for name in self.truth.probes if name in mine)
 
 
-Cases = Mapping[str, Mapping[str, Followed]]
+Cases = Mapping[str, Mapping[str, MethodRun]]

@@ -38,13 +38,18 @@ from validate.pipeline.checks.uncertain_drives import with_uncertain_drives
 from validate.pipeline.exhibits.external import external_exhibits
 from validate.pipeline.exhibits.gating import gate_warnings
 from validate.pipeline.exhibits.standard import error_at, speed_rows, standard_exhibits
-from validate.pipeline.experiment.experiment import Experiment, Identified, SolvesVariants, Told
+from validate.pipeline.experiment.experiment import (
+    Experiment,
+    Identified,
+    ReportAdditions,
+    SolvesVariants,
+)
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, all_methods, chosen_cases, configure
 from validate.pipeline.experiment.origins import Opened, marked, opened
 from validate.pipeline.run.memory import coarser, require_room
-from validate.pipeline.run.method_run import MAIN, Cases, Followed
-from validate.pipeline.run.runs import Road, Solves
+from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
+from validate.pipeline.run.runs import ExperimentRuns, Solves
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.solve.external.scheme import ExternalSimulator
@@ -79,15 +84,15 @@ def compare(
 
 
 @dataclass(frozen=True)
-class SetOut:
-    """An experiment as its recordings have it, and its road with nothing run on it yet.
+class PreparedRuns:
+    """An experiment as its recordings have it, and its runs, of which none is solved yet.
 
     `differing` parameters are not as the experiment declares them; `fitted` are the calibrations
     that were carried out.
     """
 
     experiment: Experiment
-    road: Road
+    runs: ExperimentRuns
     found: Opened
     identified: Identified | None
     differing: tuple[Changed, ...]
@@ -102,7 +107,7 @@ def set_out(
     *,
     since: float = 0.0,
     by: Solves | None = None,
-) -> SetOut:
+) -> PreparedRuns:
     """Loads, requests memory and identifies. Raises children of `ValidateError` for bad input."""
     parameters, methods = configure(experiment, options)
     cases = chosen_cases(experiment, options)
@@ -127,22 +132,24 @@ def set_out(
     began = since or perf_counter()
 
     def solves(asked: Any) -> SolvesVariants:
-        road = Road(experiment, every, asked, report, quick=options.quick, since=began, by=by)
-        road.start(shipped, remake=False)
-        road.expect(variants_of(road))
-        return road.residuals
+        runs = ExperimentRuns(
+            experiment, every, asked, report, quick=options.quick, since=began, by=by
+        )
+        runs.start(shipped, remake=False)
+        runs.expect(variants_of(runs))
+        return runs.residuals
 
     identified = identified_by(experiment, shipped, parameters, every, fitted, solves)
     used = identified.parameters if identified else parameters
     experiment = identified.of(experiment) if identified else experiment
     if identified is None or identified.inputs is None:  # else the identification counts them
         experiment = with_uncertain_drives(experiment, methods, shipped, used)
-    road = Road(
+    runs = ExperimentRuns(
         experiment, methods, used, report,
         quick=options.quick, cases=cases, calibrated=identified.calibrated if identified else (),
         since=began, refused=refused, by=by,
     )  # fmt: skip
-    return SetOut(experiment, road, found, identified, differing, fitted)
+    return PreparedRuns(experiment, runs, found, identified, differing, fitted)
 
 
 def _compared(
@@ -153,28 +160,28 @@ def _compared(
     by: Solves | None,
 ) -> Result:
     out = set_out(experiment, options, report, identify, since=perf_counter(), by=by)
-    experiment, road, found, identified = out.experiment, out.road, out.found, out.identified
-    methods = road.methods
-    variants = variants_of(road)
-    road.expect(variants)
-    remade = road.start(found.recordings)
-    road.ahead(variants)
-    main = {name: road.main(name) for name in methods}
-    others = {case.name: road.other(case) for case in road.cases}
-    told = _told(road, {MAIN: main, **others})
-    results = tuple(_method(road, main[name], others) for name in methods)
-    effects = effects_of(road, results)
+    experiment, runs, found, identified = out.experiment, out.runs, out.found, out.identified
+    methods = runs.methods
+    variants = variants_of(runs)
+    runs.expect(variants)
+    remade = runs.start(found.recordings)
+    runs.ahead(variants)
+    main = {name: runs.main(name) for name in methods}
+    others = {case.name: runs.other(case) for case in runs.cases}
+    told = _told(runs, {MAIN: main, **others})
+    results = tuple(_method(runs, main[name], others) for name in methods)
+    effects = effects_of(runs, results)
     because, causes = explained_by(
         results, lambda name, failed: _differences(main[name], methods[name], failed)
     )
-    published = _published(road, results, identified, told)
+    published = _published(runs, results, identified, told)
     first = main[next(iter(methods))]
     locking = locking_notes(
         (f.label, f.scene)
         for name, f in main.items()
         if not isinstance(methods[name].settings, ExternalSimulator)  # its elements are its own
     )
-    parameters_used = marked(experiment, options, found, _settings(road.parameters, methods))
+    parameters_used = marked(experiment, options, found, _settings(runs.parameters, methods))
     warnings = (
         *(identified.doubts if identified else ()),
         *doubts(parameters_used, found.stated, found.recordings, first),
@@ -187,12 +194,12 @@ def _compared(
         sentence=_doubtful(warnings)
         + _opening(identified)
         + (f"{predicted(results)}. " if out.fitted else "")
-        + verdict_sentence(results, road.kind, quick=options.quick)
+        + verdict_sentence(results, runs.kind, quick=options.quick)
         + because
         + figures_sentence(published),
         parameters=parameters_used,
         methods=results,
-        recordings=road.recordings,
+        recordings=runs.recordings,
         rest=rest_residuals(first.seen, first.run),
         effects=effects,
         published=published,
@@ -201,16 +208,16 @@ def _compared(
         locking=locking,
         warnings=warnings,
         quick=options.quick,
-        kind=road.kind,
+        kind=runs.kind,
         seed=experiment.seed,
-        twin_notice="" if road.kind == "measured" else experiment.twin_notice,
+        twin_notice="" if runs.kind == "measured" else experiment.twin_notice,
         inputs=_inputs(experiment),
-        joint=joint_inputs(road) if any(m.accepted for m in results) else (),
+        joint=joint_inputs(runs) if any(m.accepted for m in results) else (),
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
             for exhibit in (
                 *causes,
-                *external_exhibits(road, main),
+                *external_exhibits(runs, main),
                 *standard_exhibits(experiment, main, others),
                 *told.exhibits,
             )
@@ -218,13 +225,13 @@ def _compared(
         rows=(*speed_rows(experiment, main), *told.rows),
         views=experiment.views,
         changed=out.differing,
-        specimens=_specimens(experiment, road.recordings),
+        specimens=_specimens(experiment, runs.recordings),
         expected=() if options.quick else experiment.expected,
         identified_values=identified.values if identified else (),
     )
 
 
-def _differences(followed: Followed, method: Method, failed: Failed) -> list[Difference]:
+def _differences(followed: MethodRun, method: Method, failed: Failed) -> list[Difference]:
     """Histories of the observations that a failed quantity is of."""
     handles = getattr(method.settings, "handles", None)
     inertia = handles is None or handles.inertia
@@ -259,16 +266,16 @@ def _settings(parameters: Any, methods: Mapping[str, Method]) -> tuple[Parameter
     return describe(parameters) + describe(methods, "methods.")
 
 
-def _told(road: Road, cases: Cases) -> Told:
+def _told(runs: ExperimentRuns, cases: Cases) -> ReportAdditions:
     """What the experiment adds; only when all of it was run."""
-    experiment = road.experiment
-    if experiment.exhibits is None or road.quick or not road.whole:
-        return Told()
-    return road.told(cases)
+    experiment = runs.experiment
+    if experiment.exhibits is None or runs.quick or not runs.whole:
+        return ReportAdditions()
+    return runs.told(cases)
 
 
-def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
-    experiment, accepted = road.experiment, mine.method in road.experiment.accepted
+def _method(runs: ExperimentRuns, mine: MethodRun, others: Cases) -> MethodResult:
+    experiment, accepted = runs.experiment, mine.method in runs.experiment.accepted
     followed = [mine, *(case[mine.method] for case in others.values() if mine.method in case)]
     return MethodResult(
         name=mine.method,
@@ -280,18 +287,18 @@ def _method(road: Road, mine: Followed, others: Cases) -> MethodResult:
         residuals=mine.residuals,
         scores=(
             *(s for f in followed for s in truth_scores(f, experiment.axis)),
-            *(s for r in mine.residuals.values() for s in scores_of(r, _AGAINST[road.kind])),
+            *(s for r in mine.residuals.values() for s in scores_of(r, _AGAINST[runs.kind])),
             *run_scores(mine.run),
             *_outside(mine),
             *(s for f in followed for s in consistency_scores(f)),
         ),
-        checks=checks_of(road, mine) if accepted else (),
-        band=value_at(road.parameters, experiment.band)[0] if experiment.band else 0.0,
-        chosen=road.methods[mine.method].chosen,
+        checks=checks_of(runs, mine) if accepted else (),
+        band=value_at(runs.parameters, experiment.band)[0] if experiment.band else 0.0,
+        chosen=runs.methods[mine.method].chosen,
     )
 
 
-def truth_scores(followed: Followed, axis: str) -> tuple[Score, ...]:
+def truth_scores(followed: MethodRun, axis: str) -> tuple[Score, ...]:
     """Errors at every probe against the truth; none for a run that did not reach the end."""
     return tuple(
         score
@@ -302,7 +309,7 @@ def truth_scores(followed: Followed, axis: str) -> tuple[Score, ...]:
     )
 
 
-def _outside(followed: Followed) -> tuple[Score, ...]:
+def _outside(followed: MethodRun) -> tuple[Score, ...]:
     """How many samples lie beyond the law's validity and were not compared."""
     outside = sum(r.outside for r in followed.registered)
     if outside == 0:
@@ -313,19 +320,22 @@ def _outside(followed: Followed) -> tuple[Score, ...]:
 
 
 def _published(
-    road: Road, results: tuple[MethodResult, ...], identified: Identified | None, told: Told
+    runs: ExperimentRuns,
+    results: tuple[MethodResult, ...],
+    identified: Identified | None,
+    told: ReportAdditions,
 ) -> tuple[Published, ...]:
     """Printed figures beside ours; none in a quick run.
 
     One that is not computed stands among them with its fault; not where a part was left out.
     """
-    if road.quick:
+    if runs.quick:
         return ()
     values = {m.name: {s.name: s.value for s in m.scores} for m in results}
     values["identified"] = {s.name: s.value for s in (identified.scores if identified else ())}
     values["told"] = dict(told.numbers)
-    figures = [figure.beside(values) for figure in road.experiment.published]
-    return tuple(figure for figure in figures if road.whole or not figure.missing)
+    figures = [figure.beside(values) for figure in runs.experiment.published]
+    return tuple(figure for figure in figures if runs.whole or not figure.missing)
 
 
 def _doubtful(warnings: tuple[str, ...]) -> str:
@@ -339,7 +349,7 @@ def _opening(identified: Identified | None) -> str:
 def _notes(
     remade: tuple[str, ...],
     identified: Identified | None,
-    main: Mapping[str, Followed],
+    main: Mapping[str, MethodRun],
     locking: tuple[str, ...],
 ) -> tuple[str, ...]:
     """What was made anew, identified, noticed by registration or schemes, not compared; locks."""

@@ -16,21 +16,21 @@ from validate.pipeline.experiment.experiment import (
     Case,
     Change,
     Experiment,
+    ReportAdditions,
     SolvesVariants,
-    Told,
     Variant,
     unchanged,
 )
 from validate.pipeline.experiment.method import Limited, Method
 from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.run.case_solution import placed, solve
-from validate.pipeline.run.method_run import MAIN, NO_TRUTH, Cases, Followed, Truth
+from validate.pipeline.run.method_run import MAIN, NO_TRUTH, Cases, MethodRun, Truth
 from validate.pipeline.run.twin_record import kind_of_recordings, made_by, require_known
 from validate.recording.types import Recording
 from validate.scene.meshless import Meshless
 from validate.solve.types import Run
 
-# --- How long the runs of a road will still take, from those that were made.
+# --- time that the runs will still take, by those that were made
 #
 # A guess that is shown as one: a run costs what another run of its method did, times its steps,
 # times its cells to a power between that of assembly (1) and that of a factorisation in space
@@ -121,24 +121,26 @@ class RunFound:
 
 
 class Solves(Protocol):
-    """Solver of the runs that a `Road` requests."""
+    """Solver of the runs that an `ExperimentRuns` requests."""
 
-    def ahead(self, road: "Road", wanted: Sequence[RunWanted]) -> None:
-        """Told of all that will be asked for, in order; may solve it side by side."""
+    def ahead(self, runs: "ExperimentRuns", wanted: Sequence[RunWanted]) -> None:
+        """Solve all that will be requested, in order; may solve it side by side."""
         ...
 
-    def solved(self, road: "Road", wanted: RunWanted) -> RunFound: ...
+    def solved(self, runs: "ExperimentRuns", wanted: RunWanted) -> RunFound: ...
 
-    def truth(self, road: "Road", wanted: RunWanted) -> Truth:
+    def truth(self, runs: "ExperimentRuns", wanted: RunWanted) -> Truth:
         """Return the true motion of the twin, on the case and in the scene of that run."""
         ...
 
-    def told(self, road: "Road", cases: Cases, make: Callable[[], Told]) -> Told:
+    def told(
+        self, runs: "ExperimentRuns", cases: Cases, make: Callable[[], ReportAdditions]
+    ) -> ReportAdditions:
         """What the experiment adds to these runs."""
         ...
 
 
-class Road:
+class ExperimentRuns:
     """Asks for each run once and counts them for the progress bar.
 
     `by` solves them (none: in this process, when they are asked for). `calibrated` names residuals
@@ -176,8 +178,8 @@ class Road:
         self._by = by or SolvesInTurn()
         self._of_cases: dict[str, tuple[tuple[Recording, ...], Any]] = {}
         self._finest: dict[str, float] = {}  # how many times as fine, by method
-        self._fresh: dict[RunWanted, Followed] = {}  # solved in this process, as yet without truth
-        self._whole: dict[RunWanted, Followed] = {}
+        self._fresh: dict[RunWanted, MethodRun] = {}  # solved in this process, as yet without truth
+        self._whole: dict[RunWanted, MethodRun] = {}
 
     # --- what will be asked for -------------------------------------------------------------------
 
@@ -298,7 +300,7 @@ class Road:
         if self._report:
             self._report(*self.pace.progress, what)
 
-    def main(self, method: str) -> Followed:
+    def main(self, method: str) -> MethodRun:
         """Return a method on the experiment's own recordings."""
         return self._followed(self.wanted(Variant(method)))
 
@@ -319,14 +321,14 @@ class Road:
         self._by.ahead(self, wanted)
         return [self.varied(v).residuals for v in variants]
 
-    def told(self, cases: Cases) -> Told:
+    def told(self, cases: Cases) -> ReportAdditions:
         """What the experiment adds of its own to its runs."""
         add = self.experiment.exhibits
         if add is None:
-            return Told()
+            return ReportAdditions()
         return self._by.told(self, cases, lambda: add(self.parameters, cases, self.tell))
 
-    def other(self, case: Case) -> dict[str, Followed]:
+    def other(self, case: Case) -> dict[str, MethodRun]:
         """Every method on a case: the truth's parameters changed."""
         return {
             name: self._followed(RunWanted(case.name, name, self.parameters, whole=True))
@@ -358,13 +360,13 @@ class Road:
         _, seen = placed(self.experiment, recordings[:1], self.method(wanted), wanted.parameters)
         return twin.truth(true, seen[0])
 
-    def _followed(self, wanted: RunWanted) -> Followed:
+    def _followed(self, wanted: RunWanted) -> MethodRun:
         if wanted not in self._whole:
             refused = wanted.method in self.refused
             self._whole[wanted] = self._not_run(wanted) if refused else self._run(wanted)
         return self._whole[wanted]
 
-    def _run(self, wanted: RunWanted) -> Followed:
+    def _run(self, wanted: RunWanted) -> MethodRun:
         """What was solved, in the scene where it was; built anew where that was elsewhere."""
         found = self._by.solved(self, wanted)
         runs = next(name for name in self.methods if name not in self.refused)
@@ -375,12 +377,12 @@ class Road:
         scenes, seen = placed(
             self.experiment, recordings, self.method(wanted), wanted.parameters, wanted.off
         )
-        return Followed(
+        return MethodRun(
             wanted.method, found.label, wanted.case, scenes[0], seen, found.runs,
             found.varied.residuals, truth,
         )  # fmt: skip
 
-    def _not_run(self, wanted: RunWanted) -> Followed:
+    def _not_run(self, wanted: RunWanted) -> MethodRun:
         """A method that is refused; what stands open of its parameters is not known."""
         recordings, _ = self.of_case(wanted.case)
         return solve(
@@ -394,12 +396,12 @@ def solves_here(
     experiment: Experiment, recordings: tuple[Recording, ...], parameters: Any
 ) -> SolvesVariants:
     """Return the solver of variants of these parameters, one after the other in this process."""
-    road = Road(experiment, experiment.methods, parameters, None, quick=False)
-    road.start(recordings, remake=False)
-    return road.residuals
+    runs = ExperimentRuns(experiment, experiment.methods, parameters, None, quick=False)
+    runs.start(recordings, remake=False)
+    return runs.residuals
 
 
-def _varied(found: Followed) -> Varied:
+def _varied(found: MethodRun) -> Varied:
     mesh, t = found.scene.mesh, found.run.t
     until = float(t[-1]) if len(t) else 0.0
     return Varied(found.residuals, len(mesh.nodes), mesh.dimension, len(t), until)
@@ -412,22 +414,24 @@ class SolvesInTurn:
         self._solved: dict[Any, RunFound] = {}
         self._truths: dict[str, Truth] = {}
 
-    def ahead(self, road: Road, wanted: Sequence[RunWanted]) -> None:
+    def ahead(self, runs: ExperimentRuns, wanted: Sequence[RunWanted]) -> None:
         pass
 
-    def solved(self, road: Road, wanted: RunWanted) -> RunFound:
+    def solved(self, runs: ExperimentRuns, wanted: RunWanted) -> RunFound:
         if wanted not in self._solved:
             start = perf_counter()
-            self._solved[wanted] = road.solve(wanted)
-            road.pace.took(wanted, perf_counter() - start)
+            self._solved[wanted] = runs.solve(wanted)
+            runs.pace.took(wanted, perf_counter() - start)
         return self._solved[wanted]
 
-    def truth(self, road: Road, wanted: RunWanted) -> Truth:
+    def truth(self, runs: ExperimentRuns, wanted: RunWanted) -> Truth:
         if wanted.case not in self._truths:
-            self._truths[wanted.case] = road.true(wanted)
+            self._truths[wanted.case] = runs.true(wanted)
         return self._truths[wanted.case]
 
-    def told(self, road: Road, cases: Cases, make: Callable[[], Told]) -> Told:
+    def told(
+        self, runs: ExperimentRuns, cases: Cases, make: Callable[[], ReportAdditions]
+    ) -> ReportAdditions:
         return make()
 
 

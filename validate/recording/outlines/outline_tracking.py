@@ -29,7 +29,7 @@ EXPERTS = 3 / 1.8
 SIMILAR = 0.5  # of the outline's own strength, from which a region is a rival
 _JUMP = 1.0  # radii between two images beyond which it is another region
 
-Told = Callable[[int, int, str], None]
+ReportAdditions = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,11 @@ class FollowedOutline:
 
 
 def followed(
-    frames: Frames, hint: Hint, images: str, told: Told = lambda *_: None, least: float = 0.0
+    frames: Frames,
+    hint: Hint,
+    images: str,
+    told: ReportAdditions = lambda *_: None,
+    least: float = 0.0,
 ) -> FollowedOutline:
     """Return the outline in the `frames` of topic `images`; sd m is that of distances to experts'
     lines.

@@ -20,9 +20,9 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.case_solution import solve
 from validate.pipeline.run.job import Job
-from validate.pipeline.run.method_run import Followed
+from validate.pipeline.run.method_run import MethodRun
 from validate.pipeline.run.pipeline import set_out
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.observation import Drawable, Observation
 from validate.study.coverage.plan import ReadingCell, TermsCell, in_world, numbered, true_method
 
@@ -102,11 +102,11 @@ class AllStated:
 class CoverageBench:
     """An experiment set out, and its judged methods as they run on the real recordings."""
 
-    def __init__(self, road: Road) -> None:
-        self.road = road
+    def __init__(self, runs: ExperimentRuns) -> None:
+        self.runs = runs
 
-    def followed(self, method: str) -> Followed:
-        return self.road.main(method)
+    def followed(self, method: str) -> MethodRun:
+        return self.runs.main(method)
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ class Opening:
 
     def __call__(self, job: Job) -> CoverageBench:
         out = set_out(*_judged(job), identify=self._identified)
-        out.road.start(out.found.recordings)
-        return CoverageBench(out.road)
+        out.runs.start(out.found.recordings)
+        return CoverageBench(out.runs)
 
     def _identified(self, number: int, problem: Problem) -> Identification:
         return self.found[number] if number in self.found else here(number, problem)
@@ -134,8 +134,8 @@ def opened_here(job: Job, identify: Identify = here) -> tuple[CoverageBench, Ope
         return found[number]
 
     out = set_out(*_judged(job), identify=once)
-    out.road.start(out.found.recordings)
-    return CoverageBench(out.road), Opening(key_of(job, "opening"), found)
+    out.runs.start(out.found.recordings)
+    return CoverageBench(out.runs), Opening(key_of(job, "opening"), found)
 
 
 def _judged(job: Job) -> tuple[Experiment, Options]:
@@ -157,10 +157,10 @@ def drawable(o: Observation) -> Drawable:
 
 def run_reading(bench: CoverageBench, cell: ReadingCell) -> ExactReading:
     """Raise `ComparisonError` for a run that does not reach the end, and what solving does."""
-    road = bench.road
-    parameters = in_world(road.experiment, road.parameters, cell.world)
+    runs = bench.runs
+    parameters = in_world(runs.experiment, runs.parameters, cell.world)
     found = solve(
-        road.experiment, road.recordings, cell.method, road.settings[cell.method], parameters
+        runs.experiment, runs.recordings, cell.method, runs.settings[cell.method], parameters
     )
     for seen, run in zip(found.registered, found.runs, strict=True):
         if not reached_end(seen, run):
@@ -177,7 +177,7 @@ def run_terms(bench: CoverageBench, cell: TermsCell) -> AllStated:
     mine = bench.followed(cell.method)
     found = [
         _stated(mine.residuals[name], terms)
-        for _, by_name in terms_of(bench.road, mine)
+        for _, by_name in terms_of(bench.runs, mine)
         for name, terms in by_name.items()
     ]
     if not found:

@@ -17,8 +17,8 @@ from validate.compare.residual import Residual, residuals, stacked
 from validate.compare.verdict import Check, PointErrors, errors_of, name_of, nothing_compared
 from validate.pipeline.run.case_solution import run_on
 from validate.pipeline.run.job import Job
-from validate.pipeline.run.method_run import Followed
-from validate.pipeline.run.runs import Road
+from validate.pipeline.run.method_run import MethodRun
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.observation import AnyDraw, Draw, Exact
 from validate.register.registration import Registered
 from validate.study.coverage.bench import ExactReading, Opening, Stated, drawable
@@ -78,7 +78,7 @@ class Given:
 
     def __call__(self, job: Job) -> "DrawBench":
         bench = self.opening(job)
-        return DrawBench(self, bench.road, bench.followed(self.method))
+        return DrawBench(self, bench.runs, bench.followed(self.method))
 
     def truth(self, draw: int) -> ExactReading:
         """Return the readings of exact sensors with that draw's inputs."""
@@ -97,16 +97,16 @@ class DrawBench:
     """The judged method as it ran on the real recordings; a filter is run anew on every draw."""
 
     given: Given
-    road: Road
-    mine: Followed
+    runs: ExperimentRuns
+    mine: MethodRun
 
     def residuals(self, reading: ExactReading, draws: Sequence[AnyDraw]) -> dict[str, Residual]:
         """Those of the judged method against a drawn recording, by the name of their check."""
         seen = self._drawn(reading, draws)
-        runs, method = self.mine.runs, self.road.settings[self.mine.method]
+        runs, method = self.mine.runs, self.runs.settings[self.mine.method]
         if method.markers:
             runs = run_on(
-                self.road.experiment, self.mine.method, method, self.road.parameters,
+                self.runs.experiment, self.mine.method, method, self.runs.parameters,
                 self.mine.scene, seen,
             )  # fmt: skip
         found = stacked(r for pair in zip(seen, runs, strict=True) for r in residuals(*pair))
@@ -146,7 +146,7 @@ def run_draws(bench: DrawBench, cell: DrawCell) -> Draws:
     """Judges every draw of the cell in every world."""
     given, numbers = bench.given, range(cell.first, cell.first + cell.count)
     worlds, overall = {}, {}
-    filtered = bool(bench.road.settings[cell.method].markers)
+    filtered = bool(bench.runs.settings[cell.method].markers)
     most = FILTER_DRAWS if filtered else WRONG_DRAWS
     for label in (PERFECT, *given.wrong):
         kept = [k for k in numbers if not label or k < most]

@@ -97,10 +97,10 @@ def coverage(
     opened = perf_counter() - start
     accepted = [
         m
-        for m in bench.road.experiment.accepted
-        if m in bench.road.methods and m not in bench.road.refused
+        for m in bench.runs.experiment.accepted
+        if m in bench.runs.methods and m not in bench.runs.refused
     ]
-    if not accepted or not bench.road.experiment.accept:
+    if not accepted or not bench.runs.experiment.accept:
         raise ComparisonError(
             f"{found.name} accepts no method or no quantity: there is "
             "nothing to check; declare both"
@@ -136,7 +136,7 @@ class _Part:
 
 def _of_method(study: Study, method: str) -> _Part:
     stated = _terms(study, method)
-    z = draws_of(study.bench.road.experiment, study.draws, study.seed)
+    z = draws_of(study.bench.runs.experiment, study.draws, study.seed)
     found = read_worlds(study, method, z)
     whole = found.whole
     given = Given(
@@ -178,7 +178,7 @@ def _draws(study: Study, given: Given) -> Finished[Draws]:
         DrawCell(given.method, k, min(BLOCK, study.draws - k), key_of(given.key, k)) for k in blocks
     )
     mine = study.bench.followed(given.method)
-    here = partial(kept, DrawBench(given, study.bench.road, mine))
+    here = partial(kept, DrawBench(given, study.bench.runs, mine))
     first = finish(
         Plan(study.job, cells[:1], here, run_draws, Draws), study.folder, Where(0), study.report
     )

@@ -54,7 +54,7 @@ class Study:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        return tuple(inputs_of(self.bench.road.experiment))
+        return tuple(inputs_of(self.bench.runs.experiment))
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Worlds:
 def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     """z (draws, inputs) standard uncertainties. Raises `ComparisonError` for a method whose own
     truth cannot be run."""
-    true = true_method(study.bench.road.experiment, method)
+    true = true_method(study.bench.runs.experiment, method)
     base = _readings(study, true, (World(),))[World()]
     read = _needed(base, method)
     truth = _Truth(study, true, _stand_in(study, true), read)
@@ -91,7 +91,7 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     checks = CHECKS if each * CHECKS <= BUDGET_S else FEW_CHECKS
     count = study.draws if whole else checks if study.inputs else 0
     solved = _drawn(truth, z[:count], each)
-    paths = tuple(p.path for p in wrong_paths(study.bench.road.parameters))
+    paths = tuple(p.path for p in wrong_paths(study.bench.runs.parameters))
     wrong, mistaken, lines = _mistaken(truth, paths, each)
     known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
     moved = {k: r for k, r in known.items() if _moves(r, read)}
@@ -137,7 +137,7 @@ class _Truth:
 
 
 def _stand_in(study: Study, method: str) -> str:
-    declared = study.bench.road.experiment.uncertainty
+    declared = study.bench.runs.experiment.uncertainty
     return declared.stand_in.get(method, method) if declared else method
 
 
@@ -146,7 +146,7 @@ def _sides(
 ) -> tuple[dict[str, tuple[ExactReading, ExactReading]], tuple[str, ...]]:
     """Each input one standard uncertainty to both sides: by the surrogate, as u_input is found,
     where the method itself has no solution; and what to say of that."""
-    declared = truth.study.bench.road.experiment.uncertainty
+    declared = truth.study.bench.runs.experiment.uncertainty
     bad = {w: r.why for w, r in steps.items() if r.value is None}
     if bad and declared and declared.surrogate not in ("", truth.by):
         other = replace(truth, by=declared.surrogate)

@@ -178,7 +178,7 @@ class Bench:
         def load() -> _Loaded:
             values = {**dict(self.job.values), **dict(cell.condition)}
             out = set_out(self.experiment, Options(values, (cell.tracker,), self.job.quick))
-            return _Loaded(out.experiment, out.road.parameters, out.found.recordings)
+            return _Loaded(out.experiment, out.runs.parameters, out.found.recordings)
 
         return self._loaded.get(cell.condition, load)
 
