@@ -5,7 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Picture, Series, TableCell
+from validate.compare.exhibit import (
+    Chart,
+    Entry,
+    Exhibit,
+    ImageSeries,
+    NumberTable,
+    Picture,
+    Series,
+    TableCell,
+)
 from validate.compare.score import Score
 from validate.pipeline.experiment.experiment import Experiment, Identified, Progress, Told
 from validate.pipeline.experiment.method import Method
@@ -64,6 +73,7 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
     p: ImagedDisk = tree.settings
     (seen,) = next(iter(cases[MAIN].values())).seen.of(RoundOutlines)
     tell("outlines over the images")
+    series, picture = _images(seen)
     return Told((
         Exhibit(
             "disk",
@@ -71,12 +81,13 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> Told:
             ("The nominal diameter is not used to fit an outline.",),
             tables=(_table(seen),),
             charts=(_chart(seen, p),),
-            pictures=(_picture(seen),),
+            pictures=(series,),
+            files=(picture,),
         ),
     ))  # fmt: skip
 
 
-def _picture(seen: RoundOutlines) -> Picture:
+def _images(seen: RoundOutlines) -> tuple[ImageSeries, Picture]:
     """Evenly spaced images, and those of the least and the largest diameter."""
     even = np.linspace(0, len(seen.t) - 1, min(_SHOWN - 2, len(seen.t))).round().astype(int)
     ends = (int(seen.diameters.argmin()), int(seen.diameters.argmax()))
