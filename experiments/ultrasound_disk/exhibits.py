@@ -5,7 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Picture, Series, TableCell
+from validate.compare.exhibit import (
+    Chart,
+    Entry,
+    Exhibit,
+    ImageSeries,
+    NumberTable,
+    Picture,
+    Series,
+    TableCell,
+)
 from validate.compare.score import Score
 from validate.pipeline.experiment.experiment import (
     Experiment,
@@ -69,6 +78,7 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     p: ImagedDisk = tree.settings
     (seen,) = next(iter(cases[MAIN].values())).seen.of(RoundOutlines)
     tell("outlines over the images")
+    series, picture = _images(seen)
     return ReportAdditions((
         Exhibit(
             "disk",
@@ -76,12 +86,13 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
             ("The nominal diameter is not used to fit an outline.",),
             tables=(_table(seen),),
             charts=(_chart(seen, p),),
-            pictures=(_picture(seen),),
+            pictures=(series,),
+            files=(picture,),
         ),
     ))  # fmt: skip
 
 
-def _picture(seen: RoundOutlines) -> Picture:
+def _images(seen: RoundOutlines) -> tuple[ImageSeries, Picture]:
     """Evenly spaced images, and those of the least and the largest diameter."""
     even = np.linspace(0, len(seen.t) - 1, min(_SHOWN - 2, len(seen.t))).round().astype(int)
     ends = (int(seen.diameters.argmin()), int(seen.diameters.argmax()))

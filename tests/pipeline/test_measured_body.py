@@ -40,7 +40,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.ladder import default as ladder_default
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
-from validate.report.scenes.body import _frame as drawn_frame
+from validate.report.scenes.body_scene import body_scene
 from validate.report.scenes.loads import held
 from validate.report.scenes.markers import markers as drawn_markers
 from validate.report.sections.observations import shown_loads
@@ -56,7 +56,6 @@ from validate.scene.scene import Drive, Load, Scene, Support, Weight
 # private: _FEWEST: a limit or list of the code, which the test must meet exactly.
 # private: _followed, _instants, _loading, _noted, _squeezable, _touched, _window:
 #   called alone, case by case.
-# private: _frame: the frame that is drawn.
 # private: _points_in, _untaken: replaced, to bring a case about.
 
 SIZE, E, NU, RHO, G = (0.04, 0.03, 0.05), 20e3, 0.3, 1100.0, 9.80665
@@ -169,7 +168,8 @@ def test_markers_of_a_pressed_body(tmp_path: Path) -> None:
     at, frames = shown_loads(shown)
     assert [h.label for h in at] == ["rest", "1.50s", "2.50s", "4.00s"]
     assert frames == (0, 3, 5, 8)
-    assert drawn_frame(shown)[0] >= 7  # all of the load
+    assert (scene := body_scene(result, 4)) is not None
+    assert scene.methods[0].frames[scene.worst] >= 7  # all of the load
     assert (exhibit := drawn_markers(result)) is not None
     assert [p.name for p in exhibit.pictures] == ["markers", "markers_across"]
 

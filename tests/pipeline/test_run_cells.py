@@ -142,7 +142,8 @@ def adds(parameters, cases, progress):
     table = NumberTable("added", "Added", ("a", "b", "c"), rows)
     line = Series("line", np.arange(300.0), np.full(300, 2.0))
     picture = Picture("p", "Shown", "A picture", np.zeros((20, 30, 3), np.uint8))
-    moves = Animation("m", "Moves", "It moves", (picture.pixels, picture.pixels + 9), (50, 50))
+    images = (picture.pixels, picture.pixels + 9)
+    moves = ImageSeries("m", "Moves", "It moves", images, ("0 mm", "1 mm"))
     shown = Exhibit("added", "Added", ("Words.",), (table,), (Chart("c", "C", "x", "y", (line,)),),
                     pictures=(picture, moves))
     row = RowBlock(LongRow(quantity="gain", unit="1", sd=0.5), np.arange(300.0))
@@ -158,7 +159,7 @@ def test_what_an_experiment_adds_is_kept_until_its_runs_or_parameters_change(
     path = pulled(tmp_path)
     text = path.read_text("utf-8").replace("EXPERIMENT = ", ADDS, 1)
     text = text.replace("import Experiment, Twin", "import Experiment, ReportAdditions, Twin\n"
-                        "from validate.compare.exhibit import (Animation, Chart, Exhibit, "
+                        "from validate.compare.exhibit import (Chart, Exhibit, ImageSeries, "
                         "NumberTable, Picture, Series, TableCell)\n"
                         "from validate.compare.row import LongRow, RowBlock")  # fmt: skip
     text = text.replace("Experiment(\n", "Experiment(\n    exhibits=adds,\n", 1)

@@ -1,16 +1,17 @@
 """Bodies of hexahedra are drawn by the tetrahedra they split into."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from experiments.bending_rod.body import bending_rod
 from validate.report.scenes import gl
-from validate.report.scenes.bodies import _polygons
-from validate.report.scenes.body import ShownBody
+from validate.report.scenes.element_surface import surface_of
 from validate.report.scenes.skin import skins
+from validate.scene.geometries.specification import Box
+from validate.scene.mesh import Kind, quadratic
 from validate.scene.shape_functions import LATTICE
-
-# private: _polygons: called alone, case by case.
 
 ROD = bending_rod(3)
 
@@ -23,31 +24,26 @@ def test_the_skin_has_two_triangles_a_side() -> None:
     assert (normals * (x.mean(axis=1) - [0.25, 0.125, 0.125])).sum(axis=1).min() > 0
 
 
-def test_a_cut_shows_the_whole_section() -> None:
-    still, up, along = np.zeros((len(ROD.mesh.nodes), 3)), np.eye(3)[2], np.eye(3)[0]
-    middle = np.array([250.0, 125.0, 125.0])
-    body = ShownBody(
-        "rod",
-        "",
-        "",
-        ROD.mesh,
-        still,
-        (),
-        (),
-        None,
-        None,
-        (0.0, 0.0),
-        middle,
-        np.eye(3)[1],
-        "",
-        up,
-        along,
-    )
-    polygons, _ = _polygons(body, np.eye(3)[1])
-    area = 0.0
-    for x, y in (p.T for p in polygons):
-        area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-    assert area == pytest.approx(500.0 * 250.0)
+@pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8", "hex27"])
+def test_a_surface_is_whole_and_bends_as_its_elements_do(kind: Kind) -> None:
+    """Its area is that of the box, and points of a quadratic displacement lie where it moves
+    them."""
+    linear = "hex8" if kind.startswith("hex") else "tet4"
+    mesh = Box((0.2, 0.1, 0.1), cells=(2, 1, 1), element=linear).resolved(Path())
+    mesh = mesh if kind == linear else quadratic(mesh)
+    surface = surface_of(mesh)
+    x = surface.at(mesh.nodes)
+    corners = x[surface.every(surface.triangles).reshape(-1, 3)]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert 0.5 * np.linalg.norm(cross, axis=1).sum() == pytest.approx(2 * 0.01 + 4 * 0.02)
+    assert (cross * (corners.mean(axis=1) - [0.1, 0.05, 0.05])).sum(axis=1).min() > 0  # outward
+    if mesh.order == 2:
+        assert surface.at(mesh.nodes**2) == pytest.approx(x**2, abs=1e-15)
+        assert len(surface.triangles) > 8
+    rim = x[surface.every(surface.rim)]
+    on_sides = (np.abs(np.diff(rim, axis=1)) > 1e-12).sum(axis=2)
+    assert on_sides.min() == 1 or kind.startswith("tet")  # along edges of bricks
+    assert rim[:, 0] == pytest.approx(rim[:, -1])
 
 
 @pytest.mark.slow
@@ -57,7 +53,7 @@ def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
         pytest.skip(gl.HOW_TO_GET)
     from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
 
-    from validate.report.scenes.renders import vtk_order
+    from validate.report.scenes.stills import vtk_order
 
     theirs = vtkTriQuadraticHexahedron().GetParametricCoords()
     assert LATTICE[3][vtk_order()] == pytest.approx(np.array(theirs[: 3 * 27]).reshape(27, 3))

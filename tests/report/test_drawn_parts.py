@@ -1,91 +1,20 @@
 """What pictures and tables of a report are drawn from, by hand: no renderer, no page."""
 
-from dataclasses import replace
 from types import SimpleNamespace as Made
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from report_samples import small_result
 
 from validate.recording.types import Recording, Source
-from validate.report.scenes import bodies, markers, outlines
-from validate.report.scenes.body import ShownIndenter, shown_body
-from validate.report.scenes.renders import _fill, _View, drawn_indenter, renders
+from validate.report.scenes import markers, outlines
+from validate.report.scenes.body import indenter_surface
 from validate.report.sections.provenance import _assumed, _metadata, _points
 from validate.report.sections.registration import _residuals
 from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere, Shape
 
-# private: _View, _assumed, _axes, _circles, _fill, _metadata, _points, _residuals:
-#   called alone, case by case.
-# private: _polygons: replaced, to bring a case about.
-
-
-class Plotter:
-    """What is added to a plotter, without a window."""
-
-    def __init__(self) -> None:
-        self.meshes: list[Any] = []
-        self.camera = Made()
-
-    def add_mesh(self, mesh: Any, **looks: Any) -> None:
-        self.meshes.append(mesh)
-
-    def add_text(self, *_: Any, **__: Any) -> None: ...
-
-
-def filled(body: Any, view: _View) -> Plotter:
-    plotter = Plotter()
-    _fill(plotter, body, view)
-    return plotter
-
-
-def test_a_cut_takes_the_plates_with_it_and_rest_is_rest() -> None:
-    found = shown_body(small_result())
-    assert found is not None
-    nodes = 1e3 * found.mesh.nodes
-    rest = filled(found, _View(scale=0.0))
-    body, *plates = rest.meshes
-    assert len(plates) == len(found.plates) == 2
-    assert np.asarray(body.points).min(axis=0) == pytest.approx(nodes.min(axis=0))
-    for plate, told in zip(plates, found.plates, strict=True):
-        assert np.subtract(plate.bounds[1::2], plate.bounds[::2]) == pytest.approx(told.sizes)
-        assert plate.center == pytest.approx(told.centre)
-    opened = filled(replace(found, normal=np.array([0.0, 1.0, 0.0])), _View(scale=0.0)).meshes
-    for plate, told in zip(opened, (None, *found.plates), strict=True):
-        assert plate.bounds[3] == pytest.approx(10.0)  # what lies beyond the cut is gone
-        assert plate.bounds[2] == pytest.approx(0.0 if told is None else -1.2)
-    moved = filled(found, _View()).meshes
-    drives = max(found.plates, key=lambda p: float(np.linalg.norm(p.shift)))
-    k = found.plates.index(drives)
-    assert np.subtract(moved[1 + k].center, plates[k].center) == pytest.approx(
-        drives.shift, abs=1e-6
-    )
-
-
-def test_the_body_is_shown_deformed_and_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
-    views: dict[str, _View] = {}
-    module = "validate.report.scenes.renders._picture"
-    monkeypatch.setattr(module, lambda name, words, body, view: views.update({name: view}))
-    renders(shown_body(small_result()))
-    assert {name: (v.scale, v.oblique, v.edges) for name, v in views.items()} == {
-        "render_deformed": (1.0, True, False),
-        "render_rest": (0.0, False, False),
-        "render_flat": (1.0, False, False),
-        "render_mesh": (1.0, True, True),
-    }
-
-
-def test_a_section_fills_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
-    square = np.array([[1.0, 10.0], [3.0, 10.0], [3.0, 14.0], [1.0, 14.0]])
-    monkeypatch.setattr(bodies, "_polygons", lambda body, normal: ([square], np.array([0.5])))
-    body = shown_body(small_result())
-    assert body is not None
-    figure = Figure()
-    bodies._axes(figure, body, np.array([0.0, 0.0, 1.0]))
-    assert figure.axes[0].get_xlim() == pytest.approx((1 - 0.24, 3 + 0.24))
-    assert figure.axes[0].get_ylim() == pytest.approx((10 - 0.24, 14 + 0.24))
+# private: _assumed, _circles, _metadata, _points, _residuals: called alone, case by case.
 
 
 def test_outlines_of_one_length_have_one_number() -> None:
@@ -130,7 +59,6 @@ def test_every_load_shows_the_section_of_the_judged_method(
             Made(method=rival, sections="rival's"),
             Made(method=judged, sections="judged's"),
         ],
-        "moving_outline": lambda method: (),
         "_at_last": lambda measured, drawn: None,
         "_by_load": lambda measured, first, drawn: shown.append(first.method),
         "outline_images": lambda recording, topic, holds, sections, label: (
@@ -139,7 +67,7 @@ def test_every_load_shows_the_section_of_the_judged_method(
     }.items():
         monkeypatch.setattr(outlines, name, value)
     assert outlines.outlines(Made(recordings=(None,))) is not None
-    assert shown == [judged, ("judged's", "judged")]
+    assert shown == [("judged's", "judged"), judged]
 
 
 def test_a_result_without_methods_has_no_registration_to_show() -> None:
@@ -164,7 +92,7 @@ def test_an_indenter_is_drawn_where_it_stands(
     shape: Shape, low: tuple[float, ...], high: tuple[float, ...]
 ) -> None:
     """In mm; its lowest point touches at 15 mm, endless ones are a fifth longer than the body."""
-    drawn = drawn_indenter(ShownIndenter(shape, np.zeros(3), np.array([15.0, 20.0, 0.0])))
-    points = np.asarray(drawn.points)
+    points, triangles = indenter_surface(shape, np.array([15.0, 20.0, 0.0]))
+    assert set(triangles.ravel()) == set(range(len(points)))
     np.testing.assert_allclose(points.min(axis=0), low, atol=0.02)
     np.testing.assert_allclose(points.max(axis=0), high, atol=0.02)

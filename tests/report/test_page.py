@@ -69,7 +69,7 @@ def test_the_body_and_all_checks_stand_first_and_once() -> None:
     """Before the contents, whose sections link to them."""
     _, text = made(small_result())
     head = text[: text.index("<nav")]
-    for name in ("render_deformed", "cut", "intervals_limits"):
+    for name in ("body", "intervals_limits"):
         if f'id="figure-{name}"' in text:
             assert f'id="figure-{name}"' in head
             assert text.count(f'id="figure-{name}"') == 1

@@ -21,6 +21,7 @@ from validate.compare.exhibit import Chart, Intervals, Series
 from validate.report.page.body_view import body_view
 from validate.report.page.html import forest
 from validate.report.page.plots import plot
+from validate.report.scenes.body_scene import body_scene
 from validate.report.sections.observations import markers_seen
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
@@ -136,8 +137,10 @@ def test_markers_stand_where_they_were_measured() -> None:
     assert seen is not None
     shown = view["methods"][0]["markers"]
     count = len(view["labels"])
-    frames = np.unique(np.linspace(0, len(result.methods[0].run.u) - 1, count).round()).astype(int)
     run = result.methods[0].run
+    scene = body_scene(result, count)
+    assert scene is not None
+    frames = scene.methods[0].frames
     measured = array(shown["measured"], "<f4").reshape(count, -1, 3)
     for i, t in enumerate(run.t[run.at][frames]):
         expected = [np.interp(t, seen.t, x) for x in seen.x.reshape(len(seen.t), -1).T]
@@ -175,5 +178,5 @@ def test_a_planar_body_lies_flat_and_is_not_cut() -> None:
     view = body_view(replace(small_result(), methods=(one,)))
     assert view is not None
     assert view["flat"] is True
-    assert "cut" not in view
+    assert view["cut"] is None
     assert array(view["methods"][0]["nodes"], "<f4").reshape(-1, 3)[:, 2] == pytest.approx(0.0)

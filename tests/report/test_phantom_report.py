@@ -34,10 +34,10 @@ def test_all_sections_that_apply(result: Result, sections: dict[str, DrawnExhibi
 def test_pictures_of_the_paper(sections: dict[str, DrawnExhibit]) -> None:
     names = {p.name for s in sections.values() for p in s.pictures}
     assert names == {
-        "outline", "outlines", "chart_outline_errors", "markers", "markers_across",
+        "outlines", "chart_outline_errors", "markers", "markers_across",
         "errors_over_noise",
         "chart_curve_force_plate", "chart_difference_force_plate", "chart_curve_pressure",
-        "chart_difference_pressure", "chart_curve_inclusion_volume_ratio", "cut", "registration",
+        "chart_difference_pressure", "chart_curve_inclusion_volume_ratio", "body", "registration",
     }  # fmt: skip
 
 

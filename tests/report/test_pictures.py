@@ -117,7 +117,13 @@ SECTIONS = (0.01 + 0.004 * RING, 0.01 + 0.003 * RING, 0.01 + 0.002 * RING)
 
 
 def test_images_are_shown_with_the_outline_found_and_the_circle(recording: Recording) -> None:
-    (picture,) = outline_images(recording, "outline", HOLDS, SECTIONS[:2], "a model")
+    ((series, picture),) = outline_images(recording, "outline", HOLDS, SECTIONS[:2], "a model")
+    assert [label.partition(",")[0] for label in series.labels] == ["0 mm", "3 mm"]
+    assert {image.shape for image in series.images} == {series.images[0].shape}
+    assert series.images[0].shape[1] <= 640
+    assert (series.images[0] != series.images[1]).any()
+    yellow = [((i[..., 0].astype(int) - i[..., 2]) > 60).sum() for i in series.images]
+    assert min(yellow) > 200  # outlines stand in each
     assert "The images 'b_mode'" in picture.caption
     radii = [part.split(" mm")[0] for part in picture.caption.split("mm: ")[1:]]
     assert [float(r) for r in radii] == pytest.approx([4.8, 4.0], abs=0.15)
@@ -148,7 +154,7 @@ def test_images_leave_room_for_their_labels(
     monkeypatch.setattr("validate.report.scenes.outline_images.draw", kept)
     holds = tuple(Held(f"{i}mm", 1e-3 * i, "m", float(i)) for i in range(count))
     assert len(outline_images(made, "outline", holds, SECTIONS[:count], "a model")) == 1
-    assert faults(seen[0]) == []
+    assert all(faults(figure) == [] for figure in seen)
 
 
 def test_outlines_recorded_as_such_show_no_images(recording: Recording) -> None:

@@ -188,7 +188,9 @@ def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[Place
     at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
     holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
     try:
-        picture = outlines_over(frames, contours, holds, "evenly spaced in time", "", marks=marks)
+        _, picture = outlines_over(
+            frames, contours, holds, "evenly spaced in time", "", marks=marks
+        )
         file.write_bytes(png(picture))
     except OSError as error:
         raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error

@@ -55,7 +55,7 @@ _HOMES = {
         "Result",
     ),
     "exhibit": (
-        "Animation",
+        "ImageSeries",
         "Chart",
         "Exhibit",
         "NodeMap",

@@ -248,6 +248,7 @@ class Picture:
     """Image: pixels (h, w, 3) sRGB with a caption and a text alternative (alt).
 
     `photo` pictures are shaded renders, which a lossy code may touch; the others are line art.
+    `dpi` are the dots an inch at which its letters have their size.
     """
 
     name: str
@@ -255,32 +256,36 @@ class Picture:
     alt: str
     pixels: Pixels
     photo: bool = False
+    dpi: int = 130
 
 
 @dataclass(frozen=True)
-class Animation:
-    """frames (h, w, 3) sRGB shown in turn for `milliseconds` each, again and again.
+class ImageSeries:
+    """Images (h, w, 3) sRGB of one size that a slider goes through, each with its label.
 
-    The first frame stands for all of them where nothing moves: on paper.
+    Raises `ComparisonError` unless there is a label for each of one image or more.
     """
 
     name: str
     caption: str
     alt: str
-    frames: tuple[Pixels, ...]
-    milliseconds: tuple[int, ...]
+    images: tuple[Pixels, ...]
+    labels: tuple[str, ...]
 
-    @property
-    def still(self) -> Picture:
-        """The first frame as an image."""
-        return Picture(self.name, self.caption, self.alt, self.frames[0])
+    def __post_init__(self) -> None:
+        if not self.images or len(self.images) != len(self.labels):
+            raise ComparisonError(
+                f"series '{self.name}': {len(self.images)} images and {len(self.labels)} labels; "
+                "give each image one label"
+            )
 
 
 @dataclass(frozen=True)
 class Exhibit:
     """A part of a report: its sentences, then pictures, tables, charts, heats, intervals, maps.
 
-    `data` are tables for files only: the numbers behind what is shown, SI with a column of units.
+    `data` and `files` are tables and pictures for files only: the numbers behind what is shown, SI
+    with a column of units, and what a page shows in another size.
     """
 
     anchor: str
@@ -292,8 +297,9 @@ class Exhibit:
     heats: tuple[Heat, ...] = ()
     intervals: tuple[Intervals, ...] = ()
     regimes: tuple[RegimeMap, ...] = ()
-    pictures: tuple[Picture | Animation, ...] = ()
+    pictures: tuple[Picture | ImageSeries, ...] = ()
     data: tuple[NumberTable, ...] = ()
+    files: tuple[Picture, ...] = ()
 
 
 def captioned(exhibit: Exhibit, captions: Mapping[str, str]) -> Exhibit:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from validate.compare.exhibit import Animation, Exhibit, NodeMap, Picture
+from validate.compare.exhibit import Exhibit, ImageSeries, NodeMap, Picture
 from validate.errors import ComparisonError
 from validate.files import safe_name
 from validate.report.charts import chart as charts
@@ -48,7 +48,7 @@ class DrawnExhibit:
     drawings: tuple[Picture, ...]
 
     @property
-    def pictures(self) -> tuple[Picture | Animation, ...]:
+    def pictures(self) -> tuple[Picture | ImageSeries, ...]:
         """All pictures, those that the exhibit brought first."""
         return *self.exhibit.pictures, *self.drawings
 
@@ -113,7 +113,7 @@ def _map(known: tuple[str, ...], shown: tuple[NodeMap, Range]) -> Picture:
     gl.learn(known)
     if shown[0].mesh.dimension != 3 or not gl.available():
         return encoded(drawn(*shown))
-    from validate.report.scenes.renders import rendered  # vtk reads its window class when imported
+    from validate.report.scenes.stills import rendered  # vtk reads its window class when imported
 
     return encoded(rendered(*shown))
 
@@ -130,12 +130,12 @@ def _require_distinct(found: Sequence[Exhibit]) -> None:
 
 
 def write_files(shown: DrawnExhibit, folder: Path) -> None:
-    """Tables and charts into tables/ as CSV, pictures into figures/ as PNG, what moves as GIF."""
+    """Tables and charts into tables/ as CSV, pictures into figures/ as PNG."""
     exhibit, tables, figures = shown.exhibit, folder / "tables", folder / "figures"
     for table in (*exhibit.tables, *exhibit.data):
         write_table(table, tables)
     for chart in exhibit.charts:
         write_chart(chart, tables)
-    for picture in map(encoded, shown.pictures):
-        kind = "gif" if isinstance(picture, Animation) else "png"
-        (figures / f"{safe_name(picture.name)}.{kind}").write_bytes(picture.file)
+    for picture in (*shown.pictures, *exhibit.files):
+        if isinstance(picture, Picture):
+            (figures / f"{safe_name(picture.name)}.png").write_bytes(encoded(picture).file)

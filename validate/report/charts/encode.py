@@ -1,4 +1,4 @@
-"""Encoding of figures: PNG and GIF files, and smaller WebP data URIs for the page."""
+"""Encoding of figures: PNG files, and smaller WebP data URIs for the page."""
 
 import base64
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from typing import overload
 
 from PIL import Image
 
-from validate.compare.exhibit import Animation, Picture
+from validate.compare.exhibit import ImageSeries, Picture, Pixels
 
-_GIF_COLOURS = 32  # line art: few colours and the steps between them
+_WIDEST = 1400  # pixels of a photo on the page; its file has all
 
 
 @dataclass(frozen=True)
@@ -21,27 +21,28 @@ class EncodedPicture(Picture):
 
 
 @dataclass(frozen=True)
-class EncodedAnimation(Animation):
-    """An animation with its `file` and its data `uri`."""
+class EncodedSeries(ImageSeries):
+    """A series with the data `uris` of its images."""
 
-    file: bytes = b""
-    uri: str = ""
+    uris: tuple[str, ...] = ()
 
 
 @overload
 def encoded(picture: Picture) -> EncodedPicture: ...
 @overload
-def encoded(picture: Picture | Animation) -> EncodedPicture | EncodedAnimation: ...
-def encoded(picture: Picture | Animation) -> EncodedPicture | EncodedAnimation:
-    """Return the picture as a PNG for the folder and a lossless WebP for the page (lossy for a
-    photo), an animation as a GIF for both."""
-    if isinstance(picture, EncodedPicture | EncodedAnimation):
+def encoded(picture: Picture | ImageSeries) -> EncodedPicture | EncodedSeries: ...
+def encoded(picture: Picture | ImageSeries) -> EncodedPicture | EncodedSeries:
+    """Return the picture as a PNG for the folder and a lossless WebP for the page, lossy and at
+    most `_WIDEST` wide for a photo; a series as lossy WebPs for the page."""
+    if isinstance(picture, EncodedPicture | EncodedSeries):
         return picture
     own = vars(picture)
-    if isinstance(picture, Animation):
-        file = gif(picture)
-        return EncodedAnimation(**own, file=file, uri=_data("gif", file))
-    return EncodedPicture(**own, file=png(picture), uri=_data("webp", _webp(picture)))
+    if isinstance(picture, ImageSeries):
+        return EncodedSeries(
+            **own, uris=tuple(_webp(image, photo=True) for image in picture.images)
+        )
+    uri = _webp(picture.pixels, picture.photo)
+    return EncodedPicture(**own, file=png(picture), uri=uri)
 
 
 def png(picture: Picture) -> bytes:
@@ -50,34 +51,21 @@ def png(picture: Picture) -> bytes:
     if not picture.photo:
         image = image.quantize(256, dither=Image.Dither.NONE)
     out = BytesIO()
-    image.save(out, "PNG", compress_level=6)  # 9 takes five times as long for 5 % less
+    image.save(
+        out, "PNG", compress_level=6, dpi=(picture.dpi, picture.dpi)
+    )  # 9 takes five times as long for 5 % less
     return out.getvalue()
 
 
-def gif(animation: Animation) -> bytes:
-    """Return an endless GIF in one palette, so that only what moves is stored again."""
-    frames = [Image.fromarray(f) for f in animation.frames]
-    palette = frames[0].quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
-    first, *others = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames]
-    out = BytesIO()
-    first.save(
-        out, "GIF", save_all=True, append_images=others, duration=list(animation.milliseconds),
-        loop=0, optimize=True,
-    )  # fmt: skip
-    return out.getvalue()
-
-
-def uri(picture: Picture | Animation) -> str:
-    """Return a data URI: GIF of what moves, else WebP, lossless for line art."""
+def uri(picture: Picture) -> str:
+    """Return a data URI: WebP, lossless for line art."""
     return encoded(picture).uri
 
 
-def _webp(picture: Picture) -> bytes:
-    out = BytesIO()
-    how = {"quality": 86} if picture.photo else {"lossless": True, "quality": 60}
-    Image.fromarray(picture.pixels).save(out, "WEBP", method=4, **how)
-    return out.getvalue()
-
-
-def _data(kind: str, content: bytes) -> str:
-    return f"data:image/{kind};base64," + base64.b64encode(content).decode("ascii")
+def _webp(pixels: Pixels, photo: bool) -> str:
+    image, out = Image.fromarray(pixels), BytesIO()
+    if photo and image.width > _WIDEST:
+        image.thumbnail((_WIDEST, image.height), Image.Resampling.LANCZOS)
+    how = {"quality": 82} if photo else {"lossless": True, "quality": 60}
+    image.save(out, "WEBP", method=4, **how)
+    return "data:image/webp;base64," + base64.b64encode(out.getvalue()).decode("ascii")

@@ -10,7 +10,6 @@ from typing import Any, Protocol
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -42,7 +41,7 @@ _SETTINGS: Mapping[str, Any] = {
     "lines.linewidth": 1.4,
     "savefig.facecolor": "white",
 }
-_DPI = 130
+DPI = 130  # dots an inch on the page
 WIDTH = 5.6  # inches
 _LETTER = 0.07  # inches of a legend's letter, about
 _HANDLE = 0.6  # inches of a legend's line and the room beside it
@@ -101,47 +100,18 @@ def free_look(i: int, colour: str) -> Style:
     return Style(colour, _DASHES[(i - 1) % len(_DASHES)], _POINTS[(i - 1) % len(_POINTS)], 1.4)
 
 
-def film(
-    paint: Callable[[Figure], Callable[[int], Sequence[Artist]]],
-    count: int,
-    width: float,
-    height: float,
-) -> tuple[Pixels, ...]:
-    """`count` pictures of one figure: `paint` fills it and returns what turns it to number i.
-
-    That names the artists that it changes, which alone are drawn anew, over all others. The layout
-    is that of number 0 throughout.
-    """
-    settings: Any = dict(_SETTINGS)
-    with mpl.rc_context(settings):
-        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
-        canvas: Any = FigureCanvasAgg(figure)
-        turn, taken = paint(figure), list[Pixels]()
-        moving = turn(0)
-        canvas.draw()
-        figure.set_layout_engine("none")
-        for artist in moving:
-            artist.set_animated(True)
-        canvas.draw()
-        still = canvas.copy_from_bbox(figure.bbox)
-        for i in range(count):
-            canvas.restore_region(still)
-            for artist in turn(i):
-                figure.draw_artist(artist)
-            taken.append(_pixels(canvas))
-    return tuple(taken)
-
-
-def draw(paint: Callable[[Figure], None], width: float, height: float) -> Pixels:
+def draw(paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI) -> Pixels:
     """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
-    return _pixels(painted(paint, width, height).canvas)
+    return _pixels(painted(paint, width, height, dpi).canvas)
 
 
-def painted(paint: Callable[[Figure], None], width: float, height: float) -> Figure:
+def painted(
+    paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI
+) -> Figure:
     """Return the figure itself, laid out and drawn."""
     settings: Any = dict(_SETTINGS)
     with mpl.rc_context(settings):
-        figure = Figure(figsize=(width, height), dpi=_DPI, layout="constrained")
+        figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
         paint(figure)
         canvas.draw()

@@ -12,8 +12,8 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from validate.compare.exhibit import (
-    Animation,
     Entry,
+    ImageSeries,
     Intervals,
     Picture,
     TableCell,
@@ -23,6 +23,7 @@ from validate.compare.result import Result
 from validate.files import safe_name
 from validate.report.charts.encode import uri
 from validate.report.charts.intervals import shares
+from validate.report.charts.style import DPI
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import across, caption, shown, word_columns
 from validate.report.page.body_view import body_view
@@ -38,8 +39,7 @@ _LONG = 420  # letters of a sentence that are shown at once: four lines
 CLOSED = ("discrimination", "body", "scores", "registration", "recording", "parameters", "made",
           "published")  # fmt: skip
 _OPEN = 3  # of an experiment's own sections; its others are opened by their reader
-#: Pictures of the first screen, by name: the body with what was measured, else the body.
-_BODY = ("render_markers", "render_deformed", "cut", "markers", "outlines")
+_BODY = ("body", "markers", "outlines")  # pictures of the first screen, by name: the first there
 _CHECKS = "intervals_limits"
 
 
@@ -98,7 +98,7 @@ def page(
         {f"chart_{c.name}": plot(result, c) for e in shown for c in e.exhibit.charts},
         {f"intervals_{i.name}": forest(i, links) for e in shown for i in e.exhibit.intervals},
     )
-    body = next((p for p in first if p.name.startswith(("render_", "cut"))), None)
+    body = next((p for p in first if p.name == "body"), None)
     view = body_view(result)
     if view is not None:  # it shows what another picture of the body would
         first = [p for p in first if p is body or p.name == _CHECKS]
@@ -111,7 +111,7 @@ def page(
     )  # fmt: skip
 
 
-def first_pictures(exhibits: Iterable[DrawnExhibit]) -> list[Picture | Animation]:
+def first_pictures(exhibits: Iterable[DrawnExhibit]) -> list[Picture | ImageSeries]:
     """The body as simulated and measured, and every check against its limit; what is there."""
     by_name = {picture.name: picture for e in exhibits for picture in e.pictures}
     body = next((by_name[name] for name in _BODY if name in by_name), None)
@@ -217,7 +217,7 @@ def _template(name: str) -> Template:
 def least_width(picture: Picture) -> int:
     """CSS pixels below which the smallest letters of a picture cannot be read: it is scrolled then,
     not shrunk."""
-    return int(_SHRUNK * picture.pixels.shape[1])
+    return int(_SHRUNK * picture.pixels.shape[1] * DPI / picture.dpi)
 
 
 def _breakable(name: str) -> str:

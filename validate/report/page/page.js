@@ -139,6 +139,23 @@
     }).observe(figure);
   }
 
+  // --- images: one at a time ---------------------------------------------------------------------
+
+  function series(box) {
+    const images = [...box.children], last = images.length - 1;
+    const slider = make("input", { type: "range", min: "0", max: String(last), step: "1", "aria-label": "load or time" });
+    const output = make("output", {});
+    const show = () => {
+      images.forEach((one, i) => { one.hidden = i !== Number(slider.value); });
+      output.textContent = images[slider.value].textContent;
+    };
+    slider.value = String(last);
+    slider.addEventListener("input", show);
+    if (last) box.before(make("div", { class: "controls slider" }, slider, output));
+    box.classList.add("live");
+    show();
+  }
+
   // --- the body: three.js -----------------------------------------------------------------------
 
   const VIRIDIS = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
@@ -244,7 +261,7 @@
       return ranges.get(by);
     }
 
-    let held = [1, 1]; // half of what the camera holds in its first place, mm
+    const held = view.camera.half; // to the right and upward, of what the camera holds in its first place, mm
 
     // One pane a method, all with one camera.
     const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -20 * view.size, 20 * view.size);
@@ -375,52 +392,17 @@
     }
 
     // From where it is seen: as the still pictures see it.
-    const box = extent();
-    const middle = new THREE.Vector3(...box.map(([a, b]) => (a + b) / 2));
-    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(i => new THREE.Vector3(...box.map((ends, axis) => ends[(i >> axis) & 1])));
-
-    function extent() { // of the first method at rest and moved, of markers and tools
-      const found = [0, 1, 2].map(() => [Infinity, -Infinity]), m = methods[0], size = m.nodes.length;
-      const add = (value, axis) => {
-        if (value < found[axis][0]) found[axis][0] = value;
-        if (value > found[axis][1]) found[axis][1] = value;
-      };
-      for (let i = 0; i < m.u.length; i++) {
-        add(m.nodes[i % size], i % 3);
-        add(m.nodes[i % size] + m.u[i], i % 3);
-      }
-      if (m.markers) m.markers.measured.forEach((v, i) => add(v, i % 3));
-      for (const t of view.tools.filter(t => t.plate)) numbers(t.nodes, Float32Array).forEach((v, i) => add(v, i % 3));
-      return found;
-    }
-    const up = view.flat ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(...view.down).negate().normalize();
+    const [middle, away, up] = [view.camera.middle, view.camera.away, view.camera.up].map(v => new THREE.Vector3(...v));
     camera.up.copy(up); // before the controls, which read it once
     const controls = new THREE.OrbitControls(camera, canvas);
     controls.enableRotate = !view.flat;
     controls.listenToKeyEvents(canvas);
 
-    const oblique = normal => new THREE.Vector3().crossVectors(normal, up).multiplyScalar(0.6)
-      .addScaledVector(normal, 1.1).addScaledVector(up, 0.5);
-
     function aim() {
-      const axis = Math.abs(up.x) < 0.9 ? new THREE.Vector3(1, 0, 0) : new THREE.Vector3(0, 1, 0);
-      const side = axis.sub(up.clone().multiplyScalar(axis.dot(up))).normalize();
-      const along = new THREE.Vector3().crossVectors(up, side);
-      const away = view.flat ? new THREE.Vector3(0, 0, 1)
-        : view.cut ? oblique(new THREE.Vector3(...view.cut.normal))
-        : up.clone().multiplyScalar(0.5).addScaledVector(side, 1.0).addScaledVector(along, -0.7);
-      camera.position.copy(middle).addScaledVector(away.normalize(), 3 * view.size);
+      camera.position.copy(middle).addScaledVector(away, 3 * view.size);
       camera.zoom = 1;
       controls.target.copy(middle);
       controls.update();
-      camera.updateMatrix();
-      held = half();
-    }
-
-    function half() { // of what the camera must hold, to the right and upward
-      const right = new THREE.Vector3().setFromMatrixColumn(camera.matrix, 0), above = new THREE.Vector3().setFromMatrixColumn(camera.matrix, 1);
-      const reach = along => Math.max(...corners.map(c => Math.abs(c.clone().sub(middle).dot(along))));
-      return [reach(right), reach(above)];
     }
 
     function draw() {
@@ -515,7 +497,11 @@
     const viewer = make("div", { class: "viewer" }, titles, canvas, legend, row, choice,
       make("details", {}, make("summary", {}, "More of the view"), more, text));
     figure.prepend(viewer);
-    figure.classList.add("live");
+    const stills = figure.querySelector(".stills");
+    if (stills) {
+      stills.open = false;
+      addEventListener("beforeprint", () => { stills.open = true; });
+    }
     controls.addEventListener("change", draw);
     new ResizeObserver(draw).observe(canvas);
     aim();
@@ -525,6 +511,7 @@
   // --- all of it, each figure once it has a width ------------------------------------------------
 
   for (const one of document.querySelectorAll("table.sortable")) table(one);
+  for (const one of document.querySelectorAll(".series")) series(one);
   const builders = { plot: curves, view: body };
   const waiting = new Set(document.querySelectorAll("script.plot, script.view"));
   const build = () => {

@@ -1,27 +1,21 @@
-"""Geometry of a drawn body: deformed state, plates, cutting plane, camera, markers, outline."""
+"""Geometry around a drawn body: tools, cutting plane, camera, and the plane of a set of points."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
-from validate.register.clocks import interpolated
-from validate.register.outlines.plane import from_image
-from validate.report.sections.observations import (
-    Held,
-    holds,
-    markers_seen,
-    outline,
-    outline_seen,
-    shown_method,
-)
-from validate.report.views.numbers import significant, spaced, with_unit
-from validate.scene.contact import Shape
+from validate.report.sections.observations import outline
+from validate.scene.contact import RigidCylinder, RigidPlane, RigidPunch, RigidSphere, Shape
 from validate.scene.mesh import Mesh
 from validate.scene.meshless import AnyScene
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene, Weight
+
+_MM = 1e3
+_AROUND = 48  # sides of a round tool
 
 # --- From where a set of points is seen best: along the axis that it spreads over least.
 
@@ -33,143 +27,7 @@ def flattest(points: Floats) -> tuple[list[int], int | None]:
     return [i for i in range(len(spread)) if i != across], across
 
 
-# -------------------------------------------------------------------------------------------------
-
-_MM = 1e3
-
-
-@dataclass(frozen=True)
-class Plate:
-    """A flat face pressed on, in rest position: centre (3,) mm, sizes (3,) mm, `shift` (3,) mm."""
-
-    centre: Floats
-    sizes: Floats
-    shift: Floats
-
-
-@dataclass(frozen=True)
-class ShownIndenter:
-    """A rigid body where it stands at rest, m, moved by `shift` (3,) mm; `extent` (3,) mm is that
-    of what it may touch, by which endless shapes are cut."""
-
-    shape: Shape
-    shift: Floats
-    extent: Floats
-
-
-@dataclass(frozen=True)
-class ShownMarkers:
-    """Markers at the shown load, where they were measured and where the simulation has them: (k, 3)
-    mm each, of those that were seen."""
-
-    measured: Floats
-    simulated: Floats
-
-    @property
-    def largest(self) -> float:
-        """The largest distance between both, mm."""
-        return float(np.linalg.norm(self.measured - self.simulated, axis=1).max())
-
-
-@dataclass(frozen=True)
-class ShownBody:
-    """A mesh at rest with displacements u (n, 3) mm at `load`, opened by a plane or whole.
-
-    The part on the side of `normal` (3,) beyond `origin` (3,) mm is taken away; None: whole; `cut`
-    says where. `part` says when symmetry leaves out the rest of it. `up` (3,) is the camera's,
-    `toward` (3,) where it is driven to; pressure Pa is None without a cavity, `pressures` its range
-    Pa. `markers` and the closed line `outline` (k, 3) mm were measured at that load.
-    """
-
-    label: str
-    part: str
-    load: str
-    mesh: Mesh
-    u: Floats
-    plates: tuple[Plate, ...]
-    indenters: tuple[ShownIndenter, ...]
-    cavity: str | None
-    pressure: float | None
-    pressures: tuple[float, float]
-    origin: Floats
-    normal: Floats | None
-    cut: str
-    up: Floats
-    toward: Floats
-    markers: ShownMarkers | None = None
-    outline: Floats | None = None
-
-
-def shown_body(result: Result) -> ShownBody | None:
-    """Return the accepted method's body at its last load, or where a run over time moves it most.
-
-    None in 2-D or when nothing finished.
-    """
-    method = shown_method(result)
-    if method is None or len(method.run.u) == 0 or method.scene.mesh.dimension != 3:
-        return None
-    scene, run = method.scene, method.run
-    cavity = scene.cavities[0] if scene.cavities else None
-    trace = run.traces.get(f"{cavity.name}.pressure") if cavity else None
-    frame, load, t = _frame(method)
-    nodes = _MM * scene.mesh.nodes
-    wall = nodes[scene.mesh.facet_nodes(cavity.facets)] if cavity else nodes
-    toward = drive_direction(scene)
-    normal, cut = opening_plane(result, toward) if cavity else (None, "")
-    return ShownBody(
-        label=method.label,
-        part=f" One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
-        load=load,
-        mesh=scene.mesh,
-        u=_MM * run.u[frame],
-        plates=plates_at(method, frame),
-        indenters=indenters_at(method, frame),
-        cavity=cavity.facets if cavity else None,
-        pressure=float(trace.y[run.at[frame]]) if trace else None,
-        pressures=(0.0, max(float(trace.y.max()), 1.0)) if trace else (0.0, 1.0),
-        origin=0.5 * (wall.min(axis=0) + wall.max(axis=0)),
-        normal=normal,
-        cut=f"{cavity.name} in {cut}" if cavity else "",
-        up=normal if normal is not None else -toward,
-        toward=toward,
-        markers=_markers(method, frame, t),
-        outline=_outline(method, t),
-    )
-
-
-def _markers(method: MethodResult, frame: int, t: float) -> ShownMarkers | None:
-    """The markers at t s, between two samples on the line between these; None without one there."""
-    seen = markers_seen(method)
-    if seen is None or seen.x.shape[2] != 3:
-        return None
-    flat, _ = interpolated(seen.t, seen.x.reshape(len(seen.t), -1), np.array([t]))
-    measured = _MM * flat.reshape(-1, 3)
-    simulated = _MM * seen.simulated(method.run.u[frame])
-    there = np.isfinite(measured).all(axis=1) & np.isfinite(simulated).all(axis=1)
-    return ShownMarkers(measured[there], simulated[there]) if there.any() else None
-
-
-def _outline(method: MethodResult, t: float) -> Floats | None:
-    """The measured outline nearest to t s in the scene's frame."""
-    seen = outline_seen(method)
-    return None if seen is None else _MM * from_image(seen.pose, seen.measured(t))
-
-
-def _frame(method: MethodResult) -> tuple[int, str, float]:
-    """The last load; of a run over time the frame with the largest displacement. With its time."""
-    run = method.run
-    loads = holds(method.registered[0]) if method.registered else ()
-    if loads:
-        frame = min(len(loads), len(run.u)) - 1
-        return frame, _load(loads[frame]), loads[frame].t
-    largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
-    t = float(run.t[run.at[largest]])
-    return largest, f"t = {significant(t)} s", t
-
-
-def _load(hold: Held) -> str:
-    """The load in words; a label without a number is replaced by the drive's."""
-    return spaced(hold.label) if hold.label[0].isdigit() else with_unit(hold.drive, hold.unit)
+# --- Directions and the plane that opens a body.
 
 
 def drive_direction(scene: AnyScene) -> Floats:
@@ -192,46 +50,147 @@ def opening_plane(result: Result, toward: Floats) -> tuple[Floats, str]:
     return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))])), "the image plane"
 
 
-def indenters_at(method: MethodResult, frame: int) -> tuple[ShownIndenter, ...]:
-    scene, run = method.scene, method.run
-    if not isinstance(scene, Scene):
+# --- The camera.
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera without perspective: it looks at `middle` (3,) mm from the direction `away` (3,),
+    `up` (3,) upward, and holds `half` (2,) mm to each side and upward and downward."""
+
+    middle: Floats
+    away: Floats
+    up: Floats
+    half: Floats
+
+
+def camera(points: Floats, toward: Floats, normal: Floats | None, flat: bool) -> Camera:
+    """Return the oblique camera that holds points (k, 3) mm, the drive pointing down; onto the cut
+    across `normal` (3,) where there is one, from the front of a planar body."""
+    up = np.array([0.0, 1.0, 0.0]) if flat else -toward / np.linalg.norm(toward)
+    side = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]
+    side = side - up * (up @ side)
+    side /= np.linalg.norm(side)
+    if flat:
+        away = np.array([0.0, 0.0, 1.0])
+    elif normal is not None:
+        away = 0.6 * np.cross(normal, up) + 1.1 * normal + 0.5 * up
+    else:
+        away = 0.5 * up + side - 0.7 * np.cross(up, side)
+    away /= np.linalg.norm(away)
+    right = np.cross(up, away)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(away, right), away], axis=1)
+    low, high = np.nanmin(points @ axes, axis=0), np.nanmax(points @ axes, axis=0)
+    return Camera(axes @ (0.5 * (low + high)), away, up, 0.5 * (high - low)[:2])
+
+
+# --- Plates and rigid indenters.
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A plate or a rigid indenter: triangles (t, 3) between nodes (v, 3) mm at rest, and its shifts
+    (f, 3) mm at the instants shown."""
+
+    nodes: Floats
+    triangles: Ints
+    shifts: Floats
+    plate: bool = False
+
+
+def tools_of(method: MethodResult, frames: Ints) -> tuple[Tool, ...]:
+    """Return plates and rigid indenters at output frames (f,) of a run; none in 2-D."""
+    if method.scene.mesh.dimension != 3 or not isinstance(method.scene, Scene):
         return ()
-    found = []
-    for tool in scene.contacts:
-        touched = _MM * scene.mesh.nodes[nodes_of(scene.mesh, tool.facets)]
-        shift, travel = np.zeros(3), run.traces.get(f"{tool.name}.displacement")
-        if tool.direction is not None and travel is not None:
-            shift = _MM * float(travel.y[run.at[frame]]) * np.array(tool.direction)
-        found.append(ShownIndenter(tool.shape, shift, np.ptp(touched, axis=0)))
-    return tuple(found)
+    return *_plates(method, method.scene, frames), *_indenters(method, method.scene, frames)
 
 
-def plates_at(method: MethodResult, frame: int) -> tuple[Plate, ...]:
+def _plates(method: MethodResult, scene: Scene, frames: Ints) -> Iterator[Tool]:
     """Flat facet sets across the first drive: the driven one and the held ones."""
-    scene = method.scene
     drive = scene.drives[0] if scene.drives else None
     travelled = method.run.traces.get(f"{drive.name}.displacement") if drive else None
     if drive is None or travelled is None or drive.follows or drive.shape:
-        return ()
+        return
     axis = int(np.argmax(np.abs(drive.direction)))
-    travel = travelled.y[method.run.at[frame]]
-    moved = {drive.facets: _MM * float(travel) * np.array(drive.direction)}
-    held = dict.fromkeys(s.facets for s in scene.supports if axis in s.components)
-    found = []
-    for name in {**moved, **held}:
+    moved = _MM * np.outer(travelled.y[method.run.at[frames]], drive.direction)
+    held = [s.facets for s in scene.supports if axis in s.components]
+    for name in dict.fromkeys([drive.facets, *held]):
         nodes = _MM * scene.mesh.nodes[nodes_of(scene.mesh, name)]
         low, high = nodes.min(axis=0), nodes.max(axis=0)
         if high[axis] - low[axis] < 1e-6:
-            shift = moved.get(name, np.zeros(3))
-            found.append(_plate(low, high, axis, scene.mesh, shift))
-    return tuple(found)
+            yield _plate(low, high, axis, scene.mesh, moved if name == drive.facets else 0 * moved)
 
 
-def _plate(low: Floats, high: Floats, axis: int, mesh: Mesh, shift: Floats) -> Plate:
+def _plate(low: Floats, high: Floats, axis: int, mesh: Mesh, shifts: Floats) -> Tool:
+    """A box outside the body on the flat face from `low` to `high` (3,) mm across `axis`."""
     middle = 0.5 * _MM * (mesh.nodes[:, axis].min() + mesh.nodes[:, axis].max())
     sizes = (high - low) * 1.12
     thick = 0.04 * float((high - low).max())
     sizes[axis] = thick
     centre = 0.5 * (low + high)
     centre[axis] += 0.55 * thick * np.sign(low[axis] - middle)
-    return Plate(centre, sizes, shift)
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    return Tool(centre + 0.5 * sizes * corners, np.array(_BOX), shifts, plate=True)
+
+
+_BOX = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+
+
+def _indenters(method: MethodResult, scene: Scene, frames: Ints) -> Iterator[Tool]:
+    for tool in scene.contacts:
+        touched = _MM * scene.mesh.nodes[nodes_of(scene.mesh, tool.facets)]
+        shifts, travel = (
+            np.zeros((len(frames), 3)),
+            method.run.traces.get(f"{tool.name}.displacement"),
+        )
+        if tool.direction is not None and travel is not None:
+            shifts = _MM * np.outer(travel.y[method.run.at[frames]], tool.direction)
+        yield Tool(*indenter_surface(tool.shape, np.ptp(touched, axis=0)), shifts)
+
+
+def indenter_surface(shape: Shape, extent: Floats) -> tuple[Floats, Ints]:
+    """Return nodes (v, 3) mm and triangles (t, 3) of a rigid shape at rest; a plane and a bar are
+    as long as what they may touch, of `extent` (3,) mm, a punch as its radius.
+
+    Raises `TypeError` for a shape that is none of a scene.
+    """
+    long = 1.2 * float(np.linalg.norm(extent))
+    if isinstance(shape, RigidSphere):
+        angle = np.linspace(0, np.pi, _AROUND // 2 + 1)
+        profile = _MM * shape.radius * np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        return _revolved(profile, _MM * np.array(shape.centre), np.array([0.0, 0.0, 1.0]))
+    if isinstance(shape, RigidCylinder):
+        axis = np.array(shape.axis) / np.linalg.norm(shape.axis)
+        half = 0.6 * float(np.abs(axis) @ extent)
+        return _revolved(_bar(_MM * shape.radius, -half, half), _MM * np.array(shape.point), axis)
+    if isinstance(shape, RigidPunch):
+        at, radius, thick = shape.centre, _MM * shape.radius, _MM * shape.radius
+    elif isinstance(shape, RigidPlane):
+        at, radius, thick = shape.point, long / 2, 0.05 * long
+    else:
+        raise TypeError(
+            f"a {type(shape).__name__} cannot be drawn; expected a rigid shape of scenes"
+        )
+    return _revolved(_bar(radius, -thick, 0.0), _MM * np.array(at), np.array(shape.normal))
+
+
+def _bar(radius: float, low: float, high: float) -> Floats:
+    """The profile (4, 2) of a closed cylinder: radius and height, mm."""
+    return np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])
+
+
+def _revolved(profile: Floats, origin: Floats, axis: Floats) -> tuple[Floats, Ints]:
+    """A profile (k, 2) of radius and height mm turned about the `axis` through `origin` (3,) mm."""
+    along = axis / np.linalg.norm(axis)
+    side = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    side /= np.linalg.norm(side)
+    angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
+    around = np.outer(np.cos(angle), side) + np.outer(np.sin(angle), np.cross(along, side))
+    radius, height = profile.T[:, :, None, None]
+    nodes = (origin + radius * around + height * along).reshape(-1, 3)
+    here = np.arange((len(profile) - 1) * _AROUND).reshape(-1, _AROUND)
+    right = np.roll(here, -1, axis=1)
+    a, b, c, d = (i.ravel() for i in (here, right, right + _AROUND, here + _AROUND))
+    return nodes, np.vstack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])

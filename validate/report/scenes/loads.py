@@ -61,17 +61,6 @@ def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, 
     return tuple(sorted(found, key=lambda i: i.t))
 
 
-def in_steps(registered: Registered, run: Run, steps: int) -> tuple[Instant, ...]:
-    """Instants at the loads and at `steps` - 1 equal steps of the drive between neighbours."""
-    known = held(registered, run)
-    found = list(known[:1])
-    for a, b in pairwise(known):
-        shares = np.arange(1, steps) / steps
-        found += [_mixed(a, b, float(w), a.t + float(w) * (b.t - a.t)) for w in shares]
-        found.append(b)
-    return tuple(found)
-
-
 def _between(a: Instant, b: Instant, t: float, q: float) -> Instant:
     way = b.drive - a.drive
     share = (q - a.drive) / way if way else 0.0

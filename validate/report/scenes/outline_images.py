@@ -9,18 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Picture
+from validate.compare.exhibit import ImageSeries, Picture, Pixels
 from validate.errors import RegistrationError
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
 from validate.register.outlines.round_outlines import Circle, fit_circle
 from validate.report.charts.style import WIDTH, draw, legend_below
-from validate.report.scenes.animation import closed
 from validate.report.sections.observations import Held
 from validate.report.views.numbers import spaced, with_unit
 
 _MM = 1e3
 _COLUMNS = 2
+_SERIES, _SIDE = 12, 4.8  # images that a slider goes through at most, and inches across one
 _ROOM = 1.1  # inches of labels and legend
 _FOUND, _FITTED = "#F0E442", "#56B4E9"  # light, on dark images
 _SIMULATED = "#FF9F1C"
@@ -52,15 +52,20 @@ class _ImageLine:
     points: Floats
 
 
+def closed(points: Floats) -> Floats:
+    """Return an outline (k, 2) m as a closed line (k + 1, 2) mm."""
+    return np.asarray(_MM * np.vstack([points, points[:1]]))
+
+
 def outline_images(
     recording: Recording,
     topic: str,
     holds: tuple[Held, ...],
     sections: tuple[Floats, ...],
     label: str,
-) -> tuple[Picture, ...]:
-    """One picture of the images at the loads with the `sections` (k, 2) m of the method `label`;
-    none where outlines `topic` were not found in any."""
+) -> tuple[tuple[ImageSeries, Picture], ...]:
+    """Return the images at the loads with the `sections` (k, 2) m of the method `label`, for a
+    slider and as one picture; none where outlines `topic` were not found in any."""
     contours = recording.contours.get(topic)
     frames = recording.frames.get(contours.images) if contours is not None else None
     if contours is None or frames is None:
@@ -78,10 +83,11 @@ def outlines_over(
     words: str,
     simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
     marks: tuple[PlaceSaid, ...] = (),
-) -> Picture:
+) -> tuple[ImageSeries, Picture]:
     """Return the images nearest to the holds in time, with outlines, with circles where the first
-    outline is round, with what was `simulated` at the holds, and with `marks` in the first; `which`
-    they are, and `words` on what they are for, stand in the caption."""
+    outline is round, with what was `simulated` at the holds, and with `marks` in the first: up to
+    twelve for a slider, and all as one picture. `which` they are, and `words` on what they are for,
+    stand in the caption."""
     circles = _circles(contours, holds)
     lines = [
         [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]
@@ -99,19 +105,28 @@ def outlines_over(
     tall = frames.images[0].shape[0] * frames.m_per_px[1]
     wide = frames.images[0].shape[1] * frames.m_per_px[0]
     panel = float(np.clip(0.42 * WIDTH * tall / wide, 1.2, 4.0)) + 0.35
-    return Picture(
-        "outline_images",
+    caption = (
         f"The images '{contours.images}' {which}, image coordinates in mm, with the outline that "
-        f"was found in each (solid, yellow){_of_circles(holds, circles)}. {words}",
-        f"{len(holds)} images with the outline found in each"
-        + (" and the circle fitted to it." if any(circles) else "."),
-        draw(
-            lambda f: _panels(f, frames, holds, lines),
-            WIDTH,
-            panel * rows + _ROOM,
-        ),
-        photo=True,
+        f"was found in each (solid, yellow){_of_circles(holds, circles)}. {words}"
     )
+    alt = f"{len(holds)} images with the outline found in each" + (
+        " and the circle fitted to it." if any(circles) else "."
+    )
+    height = float(np.clip((_SIDE - 0.8) * tall / wide, 1.5, 5.5)) + 0.7
+    shown = np.unique(np.linspace(0, len(holds) - 1, min(len(holds), _SERIES)).round().astype(int))
+
+    def one(i: int) -> Pixels:
+        return draw(lambda f: _image_axes(f.subplots(), frames, holds[i], lines[i]), _SIDE, height)
+
+    series = ImageSeries(
+        "outline_series",
+        caption,
+        alt,
+        tuple(one(i) for i in shown.tolist()),
+        tuple(_named(frames, holds[i]) for i in shown.tolist()),
+    )
+    pixels = draw(lambda f: _panels(f, frames, holds, lines), WIDTH, panel * rows + _ROOM)
+    return series, Picture("outline_images", caption, alt, pixels, photo=True)
 
 
 def _outline(contours: Contours, hold: Held) -> Floats:
@@ -158,13 +173,8 @@ def _panels(
     rows = -(-len(holds) // _COLUMNS)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
     for ax, hold, drawn in zip(grid.flat, holds, lines, strict=False):
-        at = nearest_sample(frames.t, hold.t, "images")
-        _image(ax, frames, at)
-        for line in drawn:
-            _line(ax, line)
-        ax.set_title(fill(f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s", 36),
-                     loc="left", fontsize=8.5)  # fmt: skip
-        ax.set(xlabel="image x / mm", ylabel="image y / mm")
+        _image_axes(ax, frames, hold, drawn)
+        ax.set_title(fill(_named(frames, hold), 36), loc="left", fontsize=8.5)
         ax.label_outer()
     for ax in grid.flat[len(holds) :]:
         ax.set_axis_off()
@@ -173,6 +183,19 @@ def _panels(
     legend.get_frame().set(facecolor="#303030", edgecolor="#303030")
     for text in legend.get_texts():
         text.set_color("white")
+
+
+def _named(frames: Frames, hold: Held) -> str:
+    """The load, and the image that is nearest to it."""
+    at = nearest_sample(frames.t, hold.t, "images")
+    return f"{spaced(hold.label)}, image {at}, t = {frames.t[at]:.4g} s"
+
+
+def _image_axes(ax: Axes, frames: Frames, hold: Held, lines: list[_ImageLine]) -> None:
+    _image(ax, frames, nearest_sample(frames.t, hold.t, "images"))
+    for line in lines:
+        _line(ax, line)
+    ax.set(xlabel="image x / mm", ylabel="image y / mm")
 
 
 def _line(ax: Axes, line: _ImageLine) -> None:

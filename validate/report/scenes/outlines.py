@@ -1,5 +1,6 @@
 """Figures of a cavity's outlines in the image, measured and simulated."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,8 +29,7 @@ from validate.report.charts.style import (
     looks,
     panels,
 )
-from validate.report.scenes.animation import closed, image_axes, moving_outline
-from validate.report.scenes.outline_images import outline_images
+from validate.report.scenes.outline_images import closed, outline_images
 from validate.report.sections.observations import (
     Held,
     distinct,
@@ -78,16 +78,14 @@ def outlines(result: Result) -> Exhibit | None:
     measured = _Outlines(seen, at, tuple(seen.measured(h.t) for h in at), frames)
     drawn = _drawn(result, measured)
     first = next(d for d in drawn if d.method is judged)
+    images = outline_images(result.recordings[0], seen.name, at, first.sections, judged.label)
     return Exhibit(
         "outlines",
         "Outlines in the image",
         tables=tuple(t for c in seen.corners if (t := _corner_table(result, at[1:], c))),
         charts=(_at_last(measured, drawn),),
-        pictures=(
-            *moving_outline(judged),
-            _by_load(measured, first, drawn),
-            *outline_images(result.recordings[0], seen.name, at, first.sections, judged.label),
-        ),
+        pictures=(_by_load(measured, first, drawn), *(series for series, _ in images)),
+        files=tuple(picture for _, picture in images),
     )
 
 
@@ -143,10 +141,19 @@ def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[
         for corner in measured.seen.corners:
             _ring(ax, corner, measured.measured[i], MEASURED)
             _ring(ax, corner, judged.sections[i], judged.look.colour)
-        image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
+        _image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
         ax.label_outer()
     legend_below(figure, axes[-1])
+
+
+def _image_axes(ax: Axes, outlines: Iterable[Floats]) -> None:
+    """Axes in image coordinates with some room about all outlines (k, 2) mm; rows of an image
+    count downward."""
+    everything = np.vstack(list(outlines))
+    (left, upper), (right, lower) = everything.min(axis=0) - 3, everything.max(axis=0) + 3
+    ax.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
+    ax.set(xlabel="image x / mm", ylabel="image y / mm")
 
 
 def _section(ax: Axes, drawn: _Sections, i: int) -> None:

@@ -1,0 +1,256 @@
+"""The scene of a drawn body: methods at common instants with what was measured on them, and tools.
+
+The page's view that turns (`page.body_view`) and the still pictures (`scenes.stills`) show it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from validate.arrays import Floats, Ints
+from validate.compare.result import MethodResult, Result
+from validate.fem.assembly.cell_fields import cell_fields
+from validate.register.clocks import interpolated
+from validate.register.outlines.plane import from_image
+from validate.report.charts.style import looks
+from validate.report.scenes.body import (
+    Camera,
+    Tool,
+    camera,
+    drive_direction,
+    opening_plane,
+    tools_of,
+)
+from validate.report.scenes.loads import held
+from validate.report.sections.observations import (
+    drive,
+    driven,
+    finished,
+    markers_seen,
+    outline_seen,
+)
+from validate.report.views.numbers import significant, spaced, with_unit
+from validate.scene.scene import Scene
+
+_MM = 1e3
+MOST_METHODS = 4
+_LASTS = 0.99  # of the first method's time: another one that ends before is not shown
+_CELLS = 60_000  # elements beyond which strain and stress take longer than the rest of a report
+
+
+@dataclass(frozen=True)
+class SeenMarkers:
+    """Markers at the instants, where they were measured and where the simulation has them,
+    (f, k, 3) mm, NaN where one was not seen; `rest` (k, 3) mm."""
+
+    names: tuple[str, ...]
+    rest: Floats
+    measured: Floats
+    simulated: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """Distances (f, k) mm between both."""
+        return np.asarray(np.linalg.norm(self.measured - self.simulated, axis=2))
+
+
+@dataclass(frozen=True)
+class ShownMethod:
+    """A method at the instants: its output `frames` (f,) there, markers, and at each instant the
+    measured and simulated outline (p, 3) mm."""
+
+    result: MethodResult
+    colour: str
+    frames: Ints
+    markers: SeenMarkers | None
+    outlines: tuple[tuple[Floats, Floats], ...]
+
+    @property
+    def nodes(self) -> Floats:
+        """All nodes (n, 3) mm at rest."""
+        return _MM * three(self.result.scene.mesh.nodes)
+
+    def u(self, nodes: Ints | slice = slice(None)) -> Floats:
+        """Displacements (f, n, 3) mm of nodes at the instants."""
+        return _MM * three(self.result.run.u[self.frames][:, nodes])
+
+    def on_mesh_of(self, other: "ShownMethod") -> bool:
+        """Whether nodes are those of another method: displacements have a difference then."""
+        one, two = self.result.scene.mesh.nodes, other.result.scene.mesh.nodes
+        return one.shape == two.shape and bool(np.array_equal(one, two))
+
+
+@dataclass(frozen=True)
+class Opening:
+    """The plane that opens a body with a cavity: what lies beyond `at` mm along `normal` (3,) is
+    taken away; `words` name it."""
+
+    normal: Floats
+    at: float
+    words: str
+
+
+@dataclass(frozen=True)
+class BodyScene:
+    """Up to four methods at the instants `labels` and times `t` (f,) s; `part` says where symmetry
+    leaves out the rest of the body, `left_out` which methods are not shown; `size` mm."""
+
+    labels: tuple[str, ...]
+    t: Floats
+    methods: tuple[ShownMethod, ...]
+    tools: tuple[Tool, ...]
+    camera: Camera
+    cut: Opening | None
+    size: float
+    flat: bool
+    part: str
+    left_out: tuple[str, ...]
+
+    @property
+    def worst(self) -> int:
+        """The instant of the first method's largest displacement."""
+        return int(np.argmax(np.abs(self.methods[0].u()).max(axis=(1, 2))))
+
+
+def shown_methods(result: Result) -> tuple[MethodResult, ...]:
+    """Methods of a body that finished, the accepted one first, up to `MOST_METHODS`; without those
+    that only begin what the first one computes, as what is timed alone does."""
+    bodies = _bodies(result)
+    end = _LASTS * bodies[0].run.t[bodies[0].run.at[-1]] if bodies else 0.0
+    return tuple(m for m in bodies if m.run.t[m.run.at[-1]] >= end)[:MOST_METHODS]
+
+
+def _bodies(result: Result) -> list[MethodResult]:
+    return [m for m in finished(result) if len(m.scene.mesh.cells) and len(m.run.u)]
+
+
+def body_scene(result: Result, most: int) -> BodyScene | None:
+    """Return the scene at up to `most` instants of the first method: evenly, with the largest
+    displacement; None where no method with a mesh finished.
+
+    Others are shown at their own nearest output frames. Of several recordings the first is shown.
+    """
+    methods = shown_methods(result)
+    if not methods:
+        return None
+    first, scene = methods[0], methods[0].scene
+    names = {m.name for m in methods}
+    labels, t, numbers = _instants(first, most)
+    colours, toward = looks(result), drive_direction(scene)
+    shown = tuple(_shown(m, colours[m.name].colour, t, numbers) for m in methods)
+    tools, cut = tools_of(first, numbers), None
+    if scene.cavities and scene.mesh.dimension == 3:
+        normal, words = opening_plane(result, toward)
+        wall = _MM * scene.mesh.nodes[scene.mesh.facet_nodes(scene.cavities[0].facets)]
+        middle = 0.5 * (wall.min(axis=0) + wall.max(axis=0))
+        cut = Opening(normal, float(normal @ middle), words)
+    seen = shown[0].markers
+    held_by_camera = [
+        shown[0].nodes, (shown[0].nodes + shown[0].u()).reshape(-1, 3),
+        *([seen.measured.reshape(-1, 3)] if seen else []),
+        *(tool.nodes for tool in tools if tool.plate),
+    ]  # fmt: skip
+    flat, normal_ = scene.mesh.dimension == 2, cut.normal if cut else None
+    return BodyScene(
+        labels, t, shown, tools, camera(np.vstack(held_by_camera), three(toward), normal_, flat),
+        cut, float(np.linalg.norm(np.ptp(shown[0].nodes, axis=0))), flat,
+        f"One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
+        tuple(m.label for m in _bodies(result) if m.name not in names),
+    )  # fmt: skip
+
+
+def _instants(method: MethodResult, most: int) -> tuple[tuple[str, ...], Floats, Ints]:
+    """Labels, times s and numbers of at most so many output frames: first, last and evenly, with
+    the one of the largest displacement; loads by their names."""
+    run = method.run
+    times = run.t[run.at]
+    labels = [f"t = {significant(t)} s" for t in times.tolist()]
+    if method.registered and method.registered[0].drives:
+        unit, moved = drive(method.registered[0]).unit, driven(method.registered[0], times)
+        labels = [f"{with_unit(q, unit)}, {t}" for q, t in zip(moved.tolist(), labels, strict=True)]
+    if method.registered:
+        for i, instant in enumerate(held(method.registered[0], run)):
+            if instant.hold is not None:
+                times[i], labels[i] = instant.t, spaced(instant.hold.label)
+    chosen = np.unique(np.linspace(0, len(run.u) - 1, min(len(run.u), most)).round().astype(int))
+    largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
+    if largest not in chosen:
+        chosen[1 + int(np.abs(chosen[1:-1] - largest).argmin()) if len(chosen) > 2 else -1] = (
+            largest
+        )
+        chosen = np.unique(chosen)
+    return tuple(labels[i] for i in chosen), times[chosen], chosen
+
+
+def _shown(method: MethodResult, colour: str, t: Floats, numbers: Ints) -> ShownMethod:
+    scene, run, own = method.scene, method.run, _own_frames(method, t, numbers)
+    seen, markers = markers_seen(method), None
+    if seen is not None and seen.x.shape[2] == scene.mesh.dimension:
+        flat, _ = interpolated(seen.t, seen.x.reshape(len(seen.t), -1), t)
+        measured = flat.reshape(len(t), -1, seen.x.shape[2])
+        simulated = np.array([seen.simulated(run.u[i]) for i in own])
+        markers = SeenMarkers(
+            tuple(seen.names), *(_MM * three(x) for x in (seen.rest, measured, simulated))
+        )
+    outline, outlines = outline_seen(method), tuple[tuple[Floats, Floats], ...]()
+    if outline is not None and scene.mesh.dimension == 3:
+        outlines = tuple(
+            (_MM * from_image(outline.pose, outline.measured(at)),
+             _MM * from_image(outline.pose, outline.simulated(run.u[i])))
+            for at, i in zip(t.tolist(), own.tolist(), strict=True)
+        )  # fmt: skip
+    return ShownMethod(method, colour, own, markers, outlines)
+
+
+def _own_frames(method: MethodResult, t: Floats, numbers: Ints) -> Ints:
+    """The numbers of the method's output frames nearest to the instants shown."""
+    run = method.run
+    if len(run.u) > numbers.max() and method.registered:
+        instants = held(method.registered[0], run)
+        if instants and instants[0].hold is not None:
+            return numbers
+    times = run.t[run.at]
+    return np.array([int(np.abs(times - at).argmin()) for at in t])
+
+
+def fields(methods: Sequence[ShownMethod], at: Sequence[int]) -> list[Mapping[str, Floats]]:
+    """Return for each method by name and unit the largest principal strain and the von Mises stress
+    of its elements, averaged at all nodes (f, n), at instants of these numbers."""
+    found = [_strain_and_stress(m, m.frames[list(at)]) for m in methods]
+    top = max((np.abs(s).max(initial=0.0) for _, s in found if s is not None), default=0.0)
+    unit, size = ("kPa", 1e-3) if top >= 1e3 else ("Pa", 1.0)
+    named = ("largest principal strain / %", 100.0), (f"von Mises stress / {unit}", size)
+    return [
+        {name: by * v for (name, by), v in zip(named, values, strict=True) if v is not None}
+        for values in found
+    ]
+
+
+def _strain_and_stress(
+    shown: ShownMethod, frames: Ints
+) -> tuple[Floats, Floats | None] | tuple[None, None]:
+    """Both (f, n) at the nodes, the stress in Pa; None where a scene has none, or many cells."""
+    scene, run = shown.result.scene, shown.result.run
+    if not isinstance(scene, Scene) or len(scene.mesh.cells) > _CELLS:
+        return None, None
+    found = [cell_fields(scene, run.u[i]) for i in frames]
+    strain = np.array([np.linalg.eigvalsh(f.strain)[:, -1] for f in found])
+    stress = [f.von_mises for f in found if f.von_mises is not None]
+    known = len(stress) == len(found)
+    return _at_nodes(scene, strain), _at_nodes(scene, np.array(stress)) if known else None
+
+
+def _at_nodes(scene: Scene, values: Floats) -> Floats:
+    """Means (f, n) at nodes of the values (f, e) of the elements around them."""
+    cells, n = scene.mesh.cells, len(scene.mesh.nodes)
+    flat, per_cell = cells.ravel(), cells.shape[1]
+    count = np.maximum(np.bincount(flat, minlength=n), 1)
+    return np.array(
+        [np.bincount(flat, np.repeat(v, per_cell), minlength=n) / count for v in values]
+    )
+
+
+def three(x: Floats) -> Floats:
+    """Return vectors (..., 3) of (..., d): a plane lies in space at z = 0."""
+    return np.pad(x, [*([(0, 0)] * (x.ndim - 1)), (0, 3 - x.shape[-1])])

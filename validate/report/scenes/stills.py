@@ -1,0 +1,513 @@
+"""Still pictures of bodies with what was measured on them, by pyvista off screen.
+
+`sheet` draws the scene of the page's view that turns: instants below each other, methods side by
+side. Import only after `gl.available()`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from textwrap import fill
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pyvista as pv
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from PIL import Image
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+from validate.arrays import Floats, Ints
+from validate.compare.exhibit import NodeMap, Picture, Pixels
+from validate.report.charts.style import MEASURED, PALETTE, draw
+from validate.report.scenes.body import Camera, camera
+from validate.report.scenes.body_scene import BodyScene, SeenMarkers, fields
+from validate.report.scenes.element_surface import Surface, surface_of
+from validate.report.scenes.maps import Range, bar_title, colours, values, words
+from validate.report.scenes.residual_arrows import rounded_down
+from validate.report.views.numbers import significant
+from validate.scene.mesh import Mesh
+from validate.scene.shape_functions import LATTICE
+
+ONE_COLUMN, TWO_COLUMNS = 85.0, 175.0  # mm of a journal's page
+DPI = 300
+_INCH = 25.4  # mm
+_PIXELS = 480  # across a panel
+_EDGES = 1500  # facets above which edges of elements would hide the colours
+_OUTLINE = 60  # points of a measured outline
+_LONGEST, _MARKER = 0.1, 0.011  # of the body's size: the longest arrow, the radius of a marker
+_POINTS, _LETTER = 7.0, 0.056  # size of the letters, and inches that one takes
+_LINE, _BAR = 0.13, 0.44  # inches of a line of text, of the colour bars below a row
+_PAGE = 9.0  # inches that a sheet may be high
+_LEAST = 1e-9  # what is smaller, of mm, %, Pa or of what differs, is rounding
+_DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
+_ERRORS = LinearSegmentedColormap.from_list("errors", ["#FFE0CC", PALETTE[1], "#4A1800"])
+_SIMULATED = "#FF4FD8"  # of an outline: no colour of the body
+_TOOL: Mapping[str, Any] = {"color": "#A9B0B7", "ambient": 0.3, "opacity": 0.4}
+_RIM: Mapping[str, Any] = {"color": "#202020", "line_width": 1, "opacity": 0.3}
+_LINE_ART: Mapping[str, Any] = {"ambient": 0.7, "diffuse": 0.3}
+
+
+# --- one panel ------------------------------------------------------------------------------------
+
+# VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA (local order as ours), _TRIQUADRATIC_HEXAHEDRON.
+_CELL = {4: 10, 8: 12, 10: 24, 27: 29}
+# Twice the places of the nodes that VTK lists behind the corners of a quadratic hexahedron: middles
+# of edges, then of faces, then of the cell.
+_BEHIND = "100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"
+
+
+def vtk_order() -> list[int]:
+    """Our local number of each node of a quadratic hexahedron as VTK lists them."""
+    ours = (2 * LATTICE[3]).astype(int).tolist()
+    behind = [ours.index([int(c) for c in place]) for place in _BEHIND.split()]
+    return [*range(8), *behind]
+
+
+class _Stage:
+    """A window that takes one picture after another, all with one camera."""
+
+    def __init__(self, seen_by: Camera, size: float) -> None:
+        half = 1.04 * seen_by.half
+        half = np.maximum(half, half.max() * np.array([0.5, 0.3]))
+        pixels = [_PIXELS, round(_PIXELS * half[1] / half[0])]
+        plotter: Any = pv.Plotter
+        self.plotter = plotter(off_screen=True, window_size=pixels, lighting="light kit")
+        self.plotter.set_background("white")
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        at = self.plotter.camera
+        at.focal_point = tuple(seen_by.middle)
+        at.position = tuple(seen_by.middle + 5 * size * seen_by.away)
+        at.up = tuple(seen_by.up)
+        at.parallel_projection, at.parallel_scale = True, half[1]
+        at.clipping_range = 0.1 * size, 20 * size
+
+    def add(self, mesh: Any, **look: Any) -> None:
+        if mesh.n_points:
+            self.plotter.add_mesh(
+                mesh, reset_camera=False, show_scalar_bar=False, render=False, **look
+            )
+
+    def shot(self) -> Pixels:
+        """The picture (h, w, 3), after which the window is empty."""
+        self.plotter.render_window.Render()
+        taken = vtkWindowToImageFilter()  # the plotter's own way renders three times
+        taken.SetInput(self.plotter.render_window)
+        taken.ReadFrontBufferOff()
+        taken.ShouldRerenderOff()
+        taken.Update()
+        image: Any = pv.wrap(taken.GetOutput())
+        wide, high, _ = image.dimensions
+        self.plotter.clear_actors()
+        return np.array(image.active_scalars, dtype=np.uint8).reshape(high, wide, 3)[::-1]
+
+
+@dataclass(frozen=True)
+class _Body:
+    """What is drawn of a mesh: its surface, and where a plane (normal, point) opens it its cells
+    (n, 3) mm at rest."""
+
+    surface: Surface
+    rest: Floats
+    cells: Any = None
+    plane: tuple[Floats, Floats] | None = None
+
+    def add(self, stage: _Stage, x: Floats, shown: Floats, span: Range, ramp: str) -> None:
+        """Nodes at x (n, 3) mm in the colours of `shown` (n,)."""
+        look = {"scalars": "value", "cmap": ramp, "clim": span, "ambient": 0.6, "diffuse": 0.45,
+                "nan_color": "#C9CED3"}  # fmt: skip
+        surface = self.surface
+        triangles = surface.every(surface.triangles).reshape(-1, 3)
+        outside = _triangulated(surface.at(self.rest), triangles)
+        rims = surface.every(surface.rim)
+        lines = np.insert(rims, 0, rims.shape[1], axis=1).ravel()
+        edges = pv.PolyData(outside.points, lines=lines)
+        for one, how in ((outside, look), *([(edges, _RIM)] if len(rims) <= _EDGES else [])):
+            one.point_data["value"], one.point_data["x"] = surface.at(shown), surface.at(x)
+            self._moved(
+                stage,
+                one if self.plane is None else one.clip(normal=self.plane[0], origin=self.plane[1]),
+                how,
+            )
+        if self.plane is not None:
+            self.cells.point_data["value"], self.cells.point_data["x"] = shown, x
+            self._moved(stage, self.cells.slice(normal=self.plane[0], origin=self.plane[1]), look)
+
+    def _moved(self, stage: _Stage, mesh: Any, look: Mapping[str, Any]) -> None:
+        if mesh.n_points:
+            mesh.points = np.asarray(mesh.point_data["x"])
+            stage.add(mesh, **look)
+
+
+def _body(mesh: Mesh, rest: Floats, plane: tuple[Floats, Floats] | None = None) -> _Body:
+    if plane is None:
+        return _Body(surface_of(mesh), rest)
+    count = mesh.cells.shape[1]
+    cells = mesh.cells[:, vtk_order()] if count == 27 else mesh.cells
+    kinds = np.full(len(cells), _CELL[count], dtype=np.uint8)
+    grid = pv.UnstructuredGrid(np.insert(cells, 0, count, axis=1).ravel(), kinds, rest)
+    return _Body(surface_of(mesh), rest, grid, plane)
+
+
+def _triangulated(nodes: Floats, triangles: Ints) -> Any:
+    return pv.PolyData(nodes, np.insert(triangles, 0, 3, axis=1).ravel())
+
+
+def _add_markers(
+    stage: _Stage, seen: SeenMarkers, frame: int, size: float, by: float, top: float
+) -> None:
+    """Balls where markers were measured, arrows `by` times as long from where they are simulated,
+    both in the colours of the error up to `top` mm."""
+    error = seen.errors[frame]
+    there = np.isfinite(error)
+    measured, error = seen.measured[frame][there], error[there]
+    if not len(measured):
+        return
+    radius = _MARKER * size * min(1.0, float(np.sqrt(60 / len(error))))
+    look = {"scalars": "error", "cmap": _ERRORS, "clim": (0.0, top), **_LINE_ART}
+    points = pv.PolyData(measured)
+    points.point_data["error"] = error
+    ball = pv.Sphere(radius=radius, theta_resolution=14, phi_resolution=14)
+    stage.add(points.glyph(geom=ball, scale=False, orient=False), **look)
+    arrows = by * (measured - seen.simulated[frame][there])
+    long = np.linalg.norm(arrows, axis=1) > 1.5 * radius
+    if long.any():
+        tails = pv.PolyData(measured[long] - arrows[long])
+        tails.point_data["arrow"], tails.point_data["error"] = arrows[long], error[long]
+        tails.point_data["length"] = np.linalg.norm(arrows[long], axis=1)
+        slim = pv.Arrow(tip_radius=0.1, shaft_radius=0.04)
+        stage.add(tails.glyph(geom=slim, scale="length", orient="arrow", factor=1.0), **look)
+
+
+def _add_outlines(stage: _Stage, measured: Floats, simulated: Floats, size: float) -> None:
+    ball = pv.Sphere(radius=0.0065 * size, theta_resolution=10, phi_resolution=10)
+    points = pv.PolyData(measured[:: -(-len(measured) // _OUTLINE)])
+    stage.add(points.glyph(geom=ball, scale=False, orient=False), color=MEASURED, **_LINE_ART)
+    tube = pv.lines_from_points(simulated, close=True).tube(radius=0.004 * size)
+    stage.add(tube, color=_SIMULATED, **_LINE_ART)
+
+
+# --- a sheet of them ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """One panel: instant, method, what colours it; `less`: the method that is subtracted."""
+
+    frame: int
+    method: int
+    by: str
+    less: int | None = None
+
+    @property
+    def scale(self) -> str:
+        """What cells of one colour range share."""
+        return self.by if self.less is None else f"difference of {self.by}"
+
+
+Rows = tuple[tuple[_Cell, ...], ...]
+
+
+def _rows(scene: BodyScene, coloured: Sequence[str], most: int) -> Rows:
+    """Instants of the displacement, then fields at the largest one: `most` panels in a row."""
+    frames = [(f, _DISPLACEMENT) for f in range(len(scene.labels))]
+    hidden = scene.cut is not None and any(m.markers for m in scene.methods)
+    at_worst = [(scene.worst, name) for name in (*[_ERROR] * hidden, *coloured)]
+    if len(scene.methods) == 1:
+        cells = [_Cell(f, 0, by) for f, by in frames]
+        chunks = [cells[i : i + most] for i in range(0, len(cells), most)]
+        return tuple(map(tuple, [*chunks, [_Cell(f, 0, by) for f, by in at_worst]]))
+    first, *others = scene.methods
+    other = next((j for j, m in enumerate(others, 1) if m.on_mesh_of(first)), None)
+    shown = range(min(len(scene.methods), most - (other is not None)))
+    return tuple(
+        (*(_Cell(f, m, by) for m in shown), *([] if other is None else [_Cell(f, 0, by, other)]))
+        for f, by in (*frames, *at_worst)
+    )
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Panels by their cell, and the colour range of each scale: what both widths show."""
+
+    scene: BodyScene
+    coloured: tuple[str, ...]
+    panels: Mapping[_Cell, Pixels]
+    spans: Mapping[str, Range]
+    magnified: float
+
+
+def sheet(scene: BodyScene) -> Sheet:
+    """Return all panels of a scene, rendered."""
+    by_method = fields(scene.methods, [scene.worst])
+    coloured = tuple(dict.fromkeys(name for f in by_method for name in f))
+    rows = _rows(scene, coloured, 9)
+    moved = [m.u() for m in scene.methods]
+
+    def numbers(cell: _Cell) -> Floats | None:
+        if cell.by == _ERROR:
+            seen = cell.less is None and scene.methods[cell.method].markers
+            return np.full(len(moved[cell.method][0]), np.nan) if seen else None
+        if cell.by == _DISPLACEMENT:
+            less = 0.0 if cell.less is None else moved[cell.less][cell.frame]
+            return np.asarray(np.linalg.norm(moved[cell.method][cell.frame] - less, axis=1))
+        own = by_method[cell.method].get(cell.by)
+        of = None if cell.less is None else by_method[cell.less].get(cell.by)
+        if own is None or (cell.less is not None and of is None):
+            return None
+        return np.asarray(own[0] if of is None else np.abs(own[0] - of[0]))
+
+    shown = {cell: v for row in rows for cell in row if (v := numbers(cell)) is not None}
+    errors = [m.markers.errors for m in scene.methods if m.markers]
+    longest = max((float(np.nanmax(e, initial=0.0)) for e in errors), default=0.0)
+    spans: dict[str, Range] = {_DISPLACEMENT: (0.0, _LEAST), _ERROR: (0.0, max(longest, _LEAST))}
+    for cell, v in shown.items():
+        low, high = spans.get(cell.scale, (0.0, 0.0))
+        if cell.by != _ERROR:
+            spans[cell.scale] = min(low, float(v.min())), max(high, float(v.max()))
+    shown = {c: v for c, v in shown.items() if _told(spans, c)}
+    by = rounded_down(_LONGEST * scene.size / longest) if longest > _LEAST else 1.0
+    by = float(np.clip(by, 1.0, 100.0))
+    return Sheet(scene, coloured, _panels(scene, shown, spans, by), spans, by)
+
+
+def _told(spans: Mapping[str, Range], cell: _Cell) -> bool:
+    """Whether the colours of a cell show more than rounding."""
+    top = spans[cell.scale][1]
+    of = spans[cell.by][1] if cell.less is not None else 1.0
+    return top > _LEAST * of or cell.scale in (_DISPLACEMENT, _ERROR)
+
+
+def _panels(
+    scene: BodyScene, shown: Mapping[_Cell, Floats], spans: Mapping[str, Range], by: float
+) -> dict[_Cell, Pixels]:
+    """Opened where the body has a cavity; markers, of which those on the part that is taken away
+    would hang in the air, stand on the whole body then."""
+    stage, found = _Stage(scene.camera, scene.size), dict[_Cell, Pixels]()
+    plane = (scene.cut.normal, scene.cut.at * scene.cut.normal) if scene.cut else None
+    bodies = [_body(m.result.scene.mesh, m.nodes, plane) for m in scene.methods]
+    for cell, v in shown.items():
+        method, whole = scene.methods[cell.method], plane is None or cell.by == _ERROR
+        body = replace(bodies[cell.method], plane=None) if whole else bodies[cell.method]
+        ramp = "viridis" if cell.less is None else "cividis"
+        body.add(stage, method.nodes + method.u()[cell.frame], v, spans[cell.scale], ramp)
+        for tool in scene.tools:
+            solid = _triangulated(tool.nodes + tool.shifts[cell.frame], tool.triangles)
+            if plane is not None and tool.plate and not whole:
+                solid = solid.clip(normal=plane[0], origin=plane[1])
+            stage.add(solid, **_TOOL)
+        compared = cell.less is None and cell.by in (_DISPLACEMENT, _ERROR)
+        if compared and whole and method.markers:
+            top = spans[_ERROR][1]
+            _add_markers(stage, method.markers, cell.frame, scene.size, by, top)
+        if compared and method.outlines and not (whole and plane):
+            _add_outlines(stage, *method.outlines[cell.frame], scene.size)
+        found[cell] = stage.shot()
+    stage.plotter.close()
+    return found
+
+
+def picture(drawn: Sheet, width: float) -> Picture:
+    """Return the sheet for a page that is `width` mm wide, at 300 dots an inch."""
+    narrow = width < TWO_COLUMNS
+    alone = len(drawn.scene.methods) == 1
+    rows = _rows(drawn.scene, drawn.coloured, (2 if alone else 3) if narrow else 4 if alone else 5)
+    rows = tuple(tuple(c for c in row if c in drawn.panels) for row in rows)
+    layout = _Layout(drawn, tuple(filter(None, rows)), width / _INCH)
+    pixels = layout.pixels()
+    caption = _caption(drawn)
+    name = "body_one_column" if narrow else "body"
+    return Picture(name, caption, f"Renders: {caption}", pixels, photo=True, dpi=DPI)
+
+
+def _caption(drawn: Sheet) -> str:
+    scene = drawn.scene
+    names = ", ".join(m.result.label for m in scene.methods)
+    found = [f"{names} at {', '.join(scene.labels)}, true to scale: displacement in mm"]
+    if drawn.coloured:
+        found[0] += f"; {' and '.join(drawn.coloured)} at the largest displacement"
+    found += [w for w in _notes(drawn) if w not in found]
+    return ". ".join(w.removesuffix(".") for w in found) + "."
+
+
+def _notes(drawn: Sheet) -> list[str]:
+    scene = drawn.scene
+    found = [scene.part] if scene.part else []
+    if scene.cut:
+        found.append(f"Opened along {scene.cut.words}")
+    if any(m.markers for m in scene.methods):
+        scale = f", {drawn.magnified:g} times as long" if drawn.magnified > 1 else ""
+        found.append(f"Balls: measured markers; arrows to them from the simulated place{scale}")
+    if any(m.outlines for m in scene.methods):
+        found.append("Black: points of the measured outline; pink line: simulated outline")
+    if scene.tools:
+        found.append("Grey: plates and tools")
+    return found
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Places of panels, texts and colour bars on a figure of `width` inches."""
+
+    drawn: Sheet
+    rows: Rows
+    width: float
+
+    @property
+    def across(self) -> float:
+        """Inches of a column."""
+        return self.width / max(len(row) for row in self.rows)
+
+    @property
+    def panel(self) -> tuple[float, float]:
+        """Inches of a panel, all of which are on one page."""
+        high, wide = next(iter(self.drawn.panels.values())).shape[:2]
+        tall = min(self.across * high / wide, (_PAGE - self._words()) / len(self.rows))
+        return tall * wide / high, tall
+
+    @property
+    def notes(self) -> str:
+        text = ". ".join(w.removesuffix(".") for w in _notes(self.drawn))
+        return fill(text and f"{text}.", int(self.width / _LETTER))
+
+    @property
+    def height(self) -> float:
+        return self._words() + len(self.rows) * self.panel[1]
+
+    def _words(self) -> float:
+        """Inches of all that is no panel."""
+        bars = sum(self._ends(i) for i in range(len(self.rows)))
+        lines = self._titles() + len(self.notes.splitlines()) + sum(map(self._labelled, self.rows))
+        return lines * _LINE + bars * _BAR + 0.05
+
+    def _label(self, row: tuple[_Cell, ...], k: int) -> str:
+        """The instant above a panel, where it is not that of the one before."""
+        if k > 0 and row[k].frame == row[k - 1].frame:
+            return ""
+        several = any(c.frame != row[0].frame for c in row)
+        room = self.across if several else self.width
+        return fill(self.drawn.scene.labels[row[k].frame], int(room / _LETTER) - 1)
+
+    def _labelled(self, row: tuple[_Cell, ...]) -> int:
+        return max(len(self._label(row, k).splitlines()) for k in range(len(row)))
+
+    def _ends(self, i: int) -> bool:
+        """Whether colours of a row are not those of the next one."""
+        after = self.rows[i + 1] if i + 1 < len(self.rows) else ()
+        return {c.scale for c in self.rows[i]} != {c.scale for c in after}
+
+    def _title(self, cell: _Cell) -> str:
+        label = self.drawn.scene.methods[cell.method].result.label
+        if cell.less is not None:
+            label = f"difference of {label} and {self.drawn.scene.methods[cell.less].result.label}"
+        alone = len(self.drawn.scene.methods) == 1
+        return fill(label, int((self.width if alone else self.across) / _LETTER) - 1)
+
+    def _titles(self) -> int:
+        return max(len(self._title(c).splitlines()) for c in self.rows[0])
+
+    def pixels(self) -> Pixels:
+        """The figure (h, w, 3): texts and bars by matplotlib, panels below what is dark in it."""
+        pixels = draw(self._paint, self.width, self.height, DPI)
+        wide, tall = self.panel
+        size = round(DPI * wide), round(DPI * tall)
+        for i, row in enumerate(self.rows):
+            for k, cell in enumerate(row):
+                panel = Image.fromarray(self.drawn.panels[cell]).resize(
+                    size, Image.Resampling.LANCZOS
+                )
+                left = round(DPI * ((k + 0.5) * self.across - 0.5 * wide))
+                top = round(DPI * (self.height - self._bottoms[i] - tall))
+                place = pixels[top : top + size[1], left : left + size[0]]
+                np.minimum(place, np.asarray(panel)[: len(place), : place.shape[1]], out=place)
+        return pixels
+
+    @cached_property
+    def _bottoms(self) -> list[float]:
+        """Inches from below to the lower end of each row."""
+        tops = [self._titles() * _LINE + 0.02]
+        tops += [self.panel[1] + _BAR * self._ends(i) for i in range(len(self.rows) - 1)]
+        above = [_LINE * self._labelled(row) for row in self.rows]
+        return [self.height - y - self.panel[1] for y in np.cumsum(np.add(tops, above)).tolist()]
+
+    def _paint(self, figure: Figure) -> None:
+        figure.set_layout_engine("none")
+        several = len(self.drawn.scene.methods) > 1
+        for k, cell in enumerate(self.rows[0] if several else self.rows[0][:1]):
+            self._text(figure, k * self.across + 0.03, self.height - 0.02, self._title(cell))
+        for i, (row, bottom) in enumerate(zip(self.rows, self._bottoms, strict=True)):
+            for k in range(len(row)):
+                top = bottom + self.panel[1] + _LINE * self._labelled(row)
+                self._text(figure, k * self.across + 0.03, top, self._label(row, k))
+            if self._ends(i):
+                self._bars(figure, row, bottom - _BAR)
+        self._text(figure, 0.03, self._bottoms[-1] - _BAR - 0.01, self.notes)
+
+    @property
+    def _marked(self) -> bool:
+        """Whether markers stand on the bodies that the displacement colours."""
+        return self.drawn.scene.cut is None and any(m.markers for m in self.drawn.scene.methods)
+
+    def _text(self, figure: Figure, x: float, y: float, text: str) -> None:
+        figure.text(x / self.width, y / self.height, text, fontsize=_POINTS, va="top", zorder=9)
+
+    def _bars(self, figure: Figure, row: tuple[_Cell, ...], y: float) -> None:
+        start = 0
+        for scale, cells in groupby(row, lambda c: c.scale):
+            count = len(list(cells))
+            both = [
+                scale,
+                *([_ERROR] if scale == _DISPLACEMENT and self._marked else []),
+            ]
+            each = count * self.across / len(both)
+            for j, name in enumerate(both):
+                ramp: Colormap = _ERRORS if name == _ERROR else mpl.colormaps[
+                    "cividis" if name.startswith("difference") else "viridis"]  # fmt: skip
+                self._bar(figure, name, ramp, start * self.across + j * each, each, y)
+            start += count
+
+    def _bar(
+        self, figure: Figure, name: str, ramp: Colormap, x: float, room: float, y: float
+    ) -> None:
+        wide = min(0.78 * room, 2.2)
+        left = x + 0.5 * (room - wide)
+        ax = figure.add_axes((left / self.width, (y + 0.3) / self.height, wide / self.width,
+                              0.07 / self.height))  # fmt: skip
+        span = self.drawn.spans[name]
+        bar = figure.colorbar(ScalarMappable(Normalize(*span), ramp), cax=ax,
+                              orientation="horizontal")  # fmt: skip
+        ends = [span[0], 0.5 * (span[0] + span[1]), span[1]]
+        bar.set_ticks(ends, labels=[significant(e) for e in ends], fontsize=_POINTS - 0.5)
+        bar.ax.tick_params(length=2, pad=1)
+        first, _, last = bar.ax.get_xticklabels()
+        first.set_horizontalalignment("left")
+        last.set_horizontalalignment("right")
+        quantity = f"difference / {name.rpartition(' / ')[2]}" if name.startswith("diff") else name
+        bar.set_label(quantity, fontsize=_POINTS, labelpad=1)
+
+
+# --- numbers at the nodes -------------------------------------------------------------------------
+
+
+def rendered(shown: NodeMap, span: Range) -> Picture:
+    """Return the map on the undeformed surface, from a camera that only the mesh moves."""
+    nodes = 1e3 * shown.mesh.nodes
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    stage = _Stage(camera(nodes, np.array([0.0, 0.0, -1.0]), None, flat=False), size)
+    _body(shown.mesh, nodes).add(stage, nodes, values(shown), span, colours(span))
+    stage.plotter.add_axes(color="black", viewport=(0.0, 0.0, 0.17, 0.24))
+    panel, said = stage.shot(), words(shown, span)
+    stage.plotter.close()
+
+    def paint(figure: Figure) -> None:
+        ax = figure.subplots()
+        ax.imshow(panel, interpolation="lanczos")
+        ax.set_axis_off()
+        bar = ScalarMappable(Normalize(*span), colours(span))
+        figure.colorbar(bar, ax=ax, label=bar_title(shown), shrink=0.8)
+
+    pixels = draw(paint, 5.6, 4.3)
+    return Picture(f"map_{shown.name}", said, f"Render: {said}", pixels, photo=True)
