@@ -303,7 +303,7 @@ def test_random_recordings_end_in_numbers_or_in_one_line(folder: Path, case: Cas
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@settings(max_examples=40, **COMMON)
+@settings(max_examples=15, **COMMON)
 @given(case=CASES)
 def test_more_random_recordings(folder: Path, case: Case) -> None:
     holds(case, folder)

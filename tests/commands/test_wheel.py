@@ -99,8 +99,8 @@ def test_a_run_from_an_empty_folder_reports_there(installed: Path, tmp_path: Pat
 
 
 def test_a_check_from_an_empty_folder_holds(installed: Path, tmp_path: Path) -> None:
-    done = called(installed, tmp_path, "check", "needle_block", "--json")
+    done = called(installed, tmp_path, "check", "kf_cube", "--json")
     assert done.returncode == 0, done.stderr
     (found,) = json.loads(done.stdout)
-    assert (found["experiment"], found["holds"]) == ("needle_block", True)
-    assert list(tmp_path.iterdir()) == []
+    assert (found["experiment"], found["holds"]) == ("kf_cube", True)
+    assert [p.relative_to(tmp_path) for p in tmp_path.glob("*/*")] == [Path("reports/published")]

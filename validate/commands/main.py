@@ -239,7 +239,7 @@ def check(names: tuple[str, ...], workers: int | None, **options: Any) -> int:
 
     \b
     Example:
-      validate check hanging_bar
+      validate check kf_cube
     """
     with _pool(workers) as pool:
         from validate.commands import check as checking
