@@ -73,7 +73,7 @@ def _by_value(value: Any, known: str) -> Iterator[None]:
     for _ in _parts(value, seen):
         pass
     names = {getattr(thing, "__module__", "") for thing in seen.values()}
-    modules = [m for name, m in sys.modules.items() if name in names and _is_users(name)
+    modules = [m for name, m in list(sys.modules.items()) if name in names and _is_users(name)
                and name.partition(".")[0] not in ("__main__", known)]  # fmt: skip
     for module in modules:
         cloudpickle.register_pickle_by_value(module)

@@ -114,7 +114,7 @@ def _executed(path: Path) -> ModuleType:
 
 
 def _unload(package: str) -> None:
-    for name in [n for n in sys.modules if n == package or n.startswith(f"{package}.")]:
+    for name in [n for n in list(sys.modules) if n == package or n.startswith(f"{package}.")]:
         del sys.modules[name]
 
 
