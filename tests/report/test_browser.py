@@ -19,7 +19,7 @@ from PIL import Image
 from report_samples import CHECK, bare_result, small_result
 from tracking_samples import tracking_result
 
-from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
+from validate.compare.exhibit import Chart, Exhibit, ImageSeries, NumberTable, Series
 from validate.compare.result import Result
 from validate.report.write import write_report
 from validate.study.loose_page import write_loose
@@ -197,11 +197,14 @@ def test_two_methods_stand_side_by_side(browser: str, report: Path, tmp_path: Pa
     action = """const [method, beside] = document.querySelectorAll(".viewer select");
       const names = () => [...document.querySelectorAll(".viewer .titles b")].map(b => b.innerText);
       const choose = (one, value) => { one.value = value; one.dispatchEvent(new Event("change")); };
-      found.alone = names(); choose(beside, "1"); found.two = names();
-      choose(method, "1"); found.same = names();"""
+      const offered = () => [...beside.options].filter(o => !o.disabled).map(o => o.innerText);
+      found.alone = names(); found.offered = [offered()];
+      choose(beside, "1"); found.two = names();
+      choose(method, "1"); found.same = names(); found.offered.push(offered());"""
     found, _ = look(browser, report, tmp_path, 1280, action)
     assert found["alone"] == found["same"] == []
     assert found["two"] == ["soft <cube>", "stiff <cube>"]
+    assert found["offered"] == [["none", "stiff <cube>"], ["none", "soft <cube>"]]
 
 
 # `picture` is what Save PNG gives; `choose` picks an option of a select by its label.
@@ -265,6 +268,87 @@ def test_tools_move_with_scaled_displacements(browser: str, report: Path, tmp_pa
     found, _ = look(browser, report, tmp_path, 1280, action)
     assert found["moved"] is True
     assert found["rest"] is True
+
+
+# The rows of the last saved picture as means of their pixels, 0 (black) to 255.
+ROWS = """const rows = async () => {
+    const image = new Image(); image.src = picture(); await image.decode();
+    const flat = document.createElement("canvas"), wide = image.width;
+    flat.width = wide; flat.height = image.height;
+    const pen = flat.getContext("2d"); pen.drawImage(image, 0, 0);
+    const data = pen.getImageData(0, 0, wide, flat.height).data;
+    return Array.from({length: flat.height}, (_, y) => { let sum = 0;
+      for (let i = 4 * y * wide; i < 4 * (y + 1) * wide; i++) sum += i % 4 < 3 ? data[i] : 0;
+      return sum / (3 * wide); }); };"""
+
+
+@pytest.mark.slow
+def test_a_body_that_is_seen_through_is_paler(browser: str, report: Path, tmp_path: Path) -> None:
+    action = f"""{PICTURES} {ROWS} const mean = a => a.reduce((x, y) => x + y) / a.length;
+      const box = all(".viewer input[type=checkbox]").find(b =>
+        b.parentElement.textContent.includes("see through"));
+      found.whole = mean(await rows()); box.click(); found.through = mean(await rows());"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["whole"] + 5 < found["through"] < 250
+
+
+@pytest.mark.slow
+def test_a_saved_picture_names_what_it_shows(browser: str, report: Path, tmp_path: Path) -> None:
+    action = f"""{PICTURES} {ROWS} const canvas = document.querySelector(".viewer canvas");
+      const one = await rows(); choose("stiff <cube>", "beside"); const two = await rows();
+      found.more = one.length - canvas.height; const dark = a => a.reduce((x, y) => x + 255 - y, 0);
+      const room = found.more / 2; found.tops = [one, two].map(a => dark(a.slice(0, room)));
+      found.below = dark(one.slice(-room));"""
+    found, _ = look(browser, report, tmp_path, 1280, action)
+    assert found["more"] > 10
+    assert 0 < found["tops"][0] < 0.8 * found["tops"][1]  # one name, two names
+    assert found["below"] > 0
+
+
+@pytest.mark.slow
+def test_images_have_a_slider_and_are_all_there_without_scripts(
+    browser: str, tmp_path: Path
+) -> None:
+    shades = tuple(np.full((40, 300 + i, 3), 80 * i, np.uint8) for i in range(3))
+    series = ImageSeries("b_mode", "Images", "Three images", shades, ("0 mm", "1 mm", "2 mm"))
+    own = Exhibit("images", "Images", pictures=(series,))
+    page = of(replace(small_result(), exhibits=(own,)))(tmp_path / "report")
+    action = """const figure = document.getElementById("figure-b_mode");
+      const seen = () => [...figure.querySelectorAll("img")].filter(i => i.offsetWidth)
+        .map(i => i.naturalWidth);
+      const slider = figure.querySelector("input[type=range]");
+      const output = figure.querySelector("output");
+      found.first = slider && [seen(), output.textContent]; found.all = seen();
+      if (slider) { slider.value = "0"; slider.dispatchEvent(new Event("input"));
+        found.then = [seen(), output.textContent]; }"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    assert found["first"] == [[302], "2 mm"]
+    assert found["then"] == [[300], "0 mm"]
+    bare = tmp_path / "bare.html"
+    bare.write_text(re.sub(r"<script(?! type).*?</script>", "", page.read_text(), flags=re.S))
+    found, _ = look(browser, bare, tmp_path, 1280, action)
+    assert found["all"] == [300, 301, 302]
+
+
+@pytest.mark.slow
+def test_zeros_on_a_logarithmic_axis_are_gaps(browser: str, tmp_path: Path) -> None:
+    x = np.arange(4.0)
+    series = (Series("falls", x, np.array([10.0, 1.0, 0.0, -1.0])), Series("none", x, 0 * x))
+    chart = Chart("logs", "Logarithmic", "t / s", "error / mm", series, log="y")
+    page = of(replace(small_result(), exhibits=(Exhibit("l", "L", charts=(chart,)),)))(
+        tmp_path / "r"
+    )
+    action = """const figure = document.getElementById("figure-chart_logs");
+      found.ticks = figure.querySelectorAll(".uplot canvas").length;
+      const canvas = figure.querySelector("canvas"), pen = canvas.getContext("2d");
+      const pixels = pen.getImageData(0, 0, canvas.width, canvas.height).data;
+      found.drawn = 0;
+      for (let i = 0; i < pixels.length; i += 4) {
+        if (pixels[i + 3] > 99 && pixels[i + 2] - pixels[i] > 60) found.drawn += 1;
+      }"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    assert found["ticks"] == 1
+    assert found["drawn"] > 100  # blue: the part above nought
 
 
 @pytest.mark.slow
@@ -381,6 +465,33 @@ def test_dom_of_a_result_over_time(browser: str, tmp_path: Path) -> None:
     assert found["overflow"] <= 0
     assert found["spilt"] == []  # no text of a cell lies on the next one
     assert set(found["anchors"]) == {1}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["passing", "failing", "empty"])
+def test_the_first_screen_is_the_stored_one(browser: str, tmp_path: Path, name: str) -> None:
+    """In 160 x 112 pixels; VALIDATE_STORE_SCREENS=1 stores what is seen now."""
+    result = {"passing": small_result(), "failing": failing(), "empty": empty()}[name]
+    shot, page = tmp_path / "shot.png", of(result)(tmp_path / "report")
+    size = "--window-size=1280,896"
+    run(browser, page, tmp_path / "profile", size, f"--screenshot={shot}")
+    with Image.open(shot) as image:
+        seen = image.convert("RGB").resize((160, 112), Image.Resampling.BOX)
+    stored = Path(__file__).parent / "screens" / f"{name}.png"
+    if os.environ.get("VALIDATE_STORE_SCREENS") == "1":
+        seen.save(stored, optimize=True)
+    with Image.open(stored) as image:
+        apart = np.asarray(seen, dtype=float) - np.asarray(image.convert("RGB"), dtype=float)
+    # Letters of another font move by a pixel or two; a part that is missing, or a verdict of
+    # another colour, changes a twentieth of the page.
+    assert (np.abs(apart).max(axis=2) > 20).mean() < 0.03
+
+
+def failing() -> Result:
+    """Its requirement is not met."""
+    result = small_result()
+    bad = replace(CHECK, value=0.8, acceptance="not good enough", validation="differs")
+    return replace(result, methods=(replace(result.methods[0], checks=(bad,)), result.methods[1]))
 
 
 def test_screenshot(browser: str, report: Path, tmp_path: Path) -> None:

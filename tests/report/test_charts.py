@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from chart_contract import drawn_lines, faults
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from report_samples import sections_of
+from matplotlib.text import Text
+from report_samples import sections_of, small_result
 from tracking_samples import shown, tracking_result
 
 from validate.compare.exhibit import Chart, Series
@@ -18,7 +20,8 @@ from validate.pipeline.run.pipeline import compare
 from validate.report.charts import chart as charts
 from validate.report.charts.axes import beneath, floor_of
 from validate.report.charts.line_styles import TOGETHER, alone, panel_labels, styled
-from validate.report.charts.style import ACCEPTED, MEASURED, PALETTE, WIDTH, painted
+from validate.report.charts.style import ACCEPTED, COLUMNS, MEASURED, PALETTE, WIDTH, painted
+from validate.report.views.drawers import figure_of
 
 X = np.linspace(0.0, 1.0, 50)
 METHODS = 17
@@ -259,3 +262,39 @@ def test_axes_of_both_signs_have_readable_ticks(result: Result, noise: float) ->
     assert faults(drawn(result, chart(*lines, linear=noise))) == []
     far = Series("far", X, 1e5 * noise * (X - 0.5))
     assert faults(drawn(result, chart(far, *lines, linear=noise))) == []
+
+
+# --- print ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_chart_for_a_column_of_print_is_as_wide_and_legible(column: str) -> None:
+    lines = tuple(Series(f"a method with quite a long name, {i}", X, X + i) for i in range(4))
+    chart = Chart(
+        "c", "A title of several words that needs a line of its own", "t / s", "u / mm", lines
+    )
+    figure = figure_of(chart, small_result(), column)
+    assert figure.get_size_inches()[0] == pytest.approx(COLUMNS[column][0] / 25.4)
+    assert faults(figure) == []
+    sizes = [float(t.get_fontsize()) for t in figure.findobj(Text) if t.get_text()]
+    assert 6.5 <= min(sizes) < 9.5
+
+
+# Machado, Oliveira and Fernandes (2009): linear RGB as seen without one kind of cones.
+BLIND = {
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                   [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                     [-0.011820, 0.042940, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                   [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BLIND)
+def test_first_lines_are_told_apart_by_colour_blind_readers(kind: str) -> None:
+    """The measured one and the first four methods; later ones have dashes of their own, too."""
+    colours = np.array([to_rgb(c) for c in (MEASURED, *PALETTE[:4])])
+    seen = np.clip(colours**2.2 @ np.array(BLIND[kind]).T, 0, 1) ** (1 / 2.2)
+    apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)
+    assert apart[np.triu_indices(len(seen), 1)].min() > 0.1

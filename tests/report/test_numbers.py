@@ -13,6 +13,7 @@ from validate.report.views.numbers import (
     significant,
     spaced,
     text,
+    to_decimal_of,
     with_unit,
 )
 
@@ -75,3 +76,21 @@ def test_duration(seconds: float | None, shown: str) -> None:
 def test_at_load() -> None:
     assert at_load("9mm") == "at 9 mm"
     assert at_load("all") == "over the whole time"
+
+
+@pytest.mark.parametrize(
+    ("u", "value", "shown"),
+    [
+        (0.0107, -0.01364, ("0.011", "−0.014")),
+        (0.0996, 1.2345, ("0.10", "1.23")),
+        (9.96, 123.456, ("10", "123")),
+        (1234.0, 15678.0, ("1\u202f200", "15\u202f700")),
+        (91.4, -0.3, ("91", "0")),
+        (0.0, 1.2345, ("0", "1.23")),
+        (1e-9, 1.2345, ("1e−9", "1.23")),
+    ],
+)
+def test_an_error_has_the_decimal_of_two_digits_of_its_uncertainty(
+    u: float, value: float, shown: tuple[str, str]
+) -> None:
+    assert to_decimal_of(u, value) == shown

@@ -110,9 +110,11 @@ def test_figures_are_vectors_and_tables_are_files(reports: Path, tmp_path: Path)
     folder = tmp_path / "figures"
     assert here("export", str(reports / "cube"), "--figures", str(folder))[0] == 0
     names = {f.name for f in folder.iterdir()}
-    assert {"limits.svg", "limits.pdf", "checks.csv", "checks.tex"} <= names
+    charts = {f"limits_{width}mm.{kind}" for width in (85, 175) for kind in ("svg", "pdf")}
+    assert charts | {"checks.csv", "checks.tex", "body.png"} <= names
     assert any(name.startswith("curve") and name.endswith(".svg") for name in names)
-    root = ElementTree.parse(folder / "limits.svg").getroot()
+    root = ElementTree.parse(folder / "limits_85mm.svg").getroot()
     assert root.tag.endswith("svg")
+    assert float(root.get("width", "").removesuffix("pt")) == pytest.approx(85 / 25.4 * 72)
     assert root.findall(".//{*}image") == []  # lines, not pixels
-    assert (folder / "limits.pdf").read_bytes().startswith(b"%PDF")
+    assert (folder / "limits_175mm.pdf").read_bytes().startswith(b"%PDF")

@@ -43,20 +43,27 @@ def export(
 
 
 def _figures(run: Path, folder: Path) -> None:
-    """Every view, chart and table of a stored run by its name: charts as SVG and PDF, 142 mm wide,
-    tables as CSV and LaTeX."""
+    """Every view, chart and table of a stored run by its name: charts as SVG and PDF for one column
+    (85 mm) and two (175 mm), tables as CSV and LaTeX, still pictures as the run has them."""
+    from validate.report.charts.style import COLUMNS  # matplotlib takes half a second
+
     table = read_table(run, *NOT_SHOWN)
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, _, exhibit in shown_of(run, table):
         for part in drawable(exhibit):
-            for suffix in (".svg", ".pdf"):
-                written.append(folder / f"{safe_name(part.name)}{suffix}")
-                figure_of(part, table).savefig(written[-1])
+            for column in COLUMNS:
+                figure = figure_of(part, table, column)
+                for suffix in (".svg", ".pdf"):
+                    written.append(folder / f"{safe_name(part.name)}_{column}{suffix}")
+                    figure.savefig(written[-1])
         for suffix in (".csv", ".tex") if len(exhibit.tables) == 1 else ():
             written.append(folder / f"{safe_name(name)}{suffix}")
             save(replace(exhibit, charts=(), heats=(), intervals=()), table, written[-1])
+    for picture in sorted(run.glob("figures/body*.png")) if run.is_dir() else ():
+        written.append(folder / picture.name)
+        written[-1].write_bytes(picture.read_bytes())
     say(f"{relative(folder)}: {len(set(written))} files", indent="  ")
 
 

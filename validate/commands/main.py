@@ -364,7 +364,9 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 @click.option("--junit", type=FILE, help="Write checks and published figures as JUnit XML.")
 @click.option("--latex", type=FILE, help="Write checks as a LaTeX tabular.")
 @click.option(
-    "--figures", type=FOLDER, help="Write every chart as SVG and PDF, every table as CSV and LaTeX."
+    "--figures",
+    type=FOLDER,
+    help="Write charts as SVG and PDF for one column and two, tables as CSV and LaTeX.",
 )
 @FORCE
 def export_(

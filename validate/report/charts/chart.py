@@ -75,31 +75,31 @@ def _floor(chart: Chart) -> str:
     return f"{significant(floor_of(chart), 1)} {unit}".strip()
 
 
-def drawing(result: HasMethods, chart: Chart) -> Drawing:
+def drawing(result: HasMethods, chart: Chart, width: float = WIDTH) -> Drawing:
     """Return the function that fills the figure, and its width and height in inches."""
     labels = panel_labels(chart)
     if labels:
-        return _one_each(result, chart, labels)
+        return _one_each(result, chart, labels, width)
     drawn = styled(result, chart.series)
     names = _drawn_names(chart, drawn)
-    below = legend_height(_broken(names)) if len(names) > 1 else 0.0
-    return lambda f: _together(f, chart, drawn), WIDTH, _HEIGHT + below
+    below = legend_height(_broken(names, width), width) if len(names) > 1 else 0.0
+    return lambda f: _together(f, chart, drawn, width), width, _HEIGHT + below
 
 
-def _together(figure: Figure, chart: Chart, drawn: list[Drawn]) -> None:
+def _together(figure: Figure, chart: Chart, drawn: list[Drawn], width: float) -> None:
     ax = figure.subplots()
     fill_axes(ax, chart, drawn)
     ax.set(xlabel=chart.x, ylabel=chart.y)
     cut_dips(ax, chart)
     readable(ax, chart)
     name_levels(ax, chart)
-    _title(figure, chart)
+    _title(figure, chart, width)
     if lost := beneath(chart):
-        words = fill(f"below {_floor(chart)}: {', '.join(lost)}", _TITLE)
+        words = fill(f"below {_floor(chart)}: {', '.join(lost)}", _letters(_TITLE, width))
         ax.text(0.02, 0.03, words, transform=ax.transAxes, fontsize=8.5)
     names = _drawn_names(chart, drawn)
     if len(names) > 1:
-        _legend(figure, [ax], names)
+        _legend(figure, [ax], names, width)
 
 
 def _drawn_names(chart: Chart, drawn: Sequence[Drawn]) -> list[str]:
@@ -107,39 +107,45 @@ def _drawn_names(chart: Chart, drawn: Sequence[Drawn]) -> list[str]:
     return [n for n in dict.fromkeys(d.series.name for d in drawn) if n not in lost]
 
 
-def _title(figure: Figure, chart: Chart) -> None:
-    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontsize="medium")
+def _letters(count: int, width: float) -> int:
+    """Letters of a line of a figure `width` inches wide, of so many in one of a report."""
+    return max(12, int(count * width / WIDTH))
 
 
-def _legend(figure: Figure, axes: Iterable[Axes], names: Sequence[str]) -> None:
+def _title(figure: Figure, chart: Chart, width: float) -> None:
+    title = fill(chart.title, _letters(_TITLE, width))
+    figure.suptitle(title, x=0.01, ha="left", fontsize="medium")
+
+
+def _legend(figure: Figure, axes: Iterable[Axes], names: Sequence[str], width: float) -> None:
     """Of one name the upper one: a line, not a band."""
     found: dict[str, Artist] = {}
     for ax in axes:
         handles, labels = ax.get_legend_handles_labels()
         found |= dict(zip(labels, handles, strict=True))
     shown = [name for name in names if name in found]
-    broken = _broken(shown)
+    broken = _broken(shown, width)
     made = figure.legend([found[name] for name in shown], broken, loc="outside lower center",
-                         ncols=legend_columns(broken))  # fmt: skip
+                         ncols=legend_columns(broken, width))  # fmt: skip
     for handle in made.legend_handles:
         if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
             handle.set_markersize(max(handle.get_markersize(), _SEEN))
 
 
-def _broken(names: Sequence[str]) -> list[str]:
-    return [fill(name, _NAME) for name in names]
+def _broken(names: Sequence[str], width: float) -> list[str]:
+    return [fill(name, _letters(_NAME, width)) for name in names]
 
 
 # --- one axes a line -----------------------------------------------------------------------------
 
 
-def _one_each(result: HasMethods, chart: Chart, labels: tuple[str, ...]) -> Drawing:
+def _one_each(result: HasMethods, chart: Chart, labels: tuple[str, ...], width: float) -> Drawing:
     found = {name: alone(result, panel_series(chart, name, labels), name) for name in labels}
     names = [*_common(found), *(name for name, _ in levels(chart))]
-    below = legend_height(_broken(names)) if names else 0.0
+    below = legend_height(_broken(names, width), width) if names else 0.0
     rows = -(-len(labels) // _columns(labels))
     height = _PANEL * rows + _ROOM + below
-    return lambda f: _panels(f, chart, found, names), WIDTH, height
+    return lambda f: _panels(f, chart, found, names, width), width, height
 
 
 def _columns(labels: Sequence[str]) -> int:
@@ -156,24 +162,26 @@ def _common(found: Mapping[str, Sequence[Drawn]]) -> list[str]:
 
 
 def _panels(
-    figure: Figure, chart: Chart, found: Mapping[str, Sequence[Drawn]], names: Sequence[str]
-) -> None:
+    figure: Figure, chart: Chart, found: Mapping[str, Sequence[Drawn]], names: Sequence[str],
+    width: float,
+) -> None:  # fmt: skip
     columns = _columns(tuple(found))
+    letters = _letters(_WIDE if columns == 2 else _NARROW, width)
     axes, lowest = panels(figure, len(found), columns)
     for ax, (label, drawn) in zip(axes, found.items(), strict=True):
         fill_axes(ax, chart, [replace(d, series=_short(d.series)) for d in drawn])
-        ax.set_title(fill(label, _WIDE if columns == 2 else _NARROW), loc="left", fontsize=8.5)
+        ax.set_title(fill(label, letters), loc="left", fontsize=8.5)
         if label in beneath(chart):
             ax.text(0.5, 0.5, f"below {_floor(chart)}", transform=ax.transAxes, ha="center",
                     fontsize=8.5)  # fmt: skip
     for ax in lowest:
-        ax.set_xlabel(fill(chart.x, _WIDE if columns == 2 else _NARROW), fontsize=9)
+        ax.set_xlabel(fill(chart.x, letters), fontsize=9)
     cut_dips(axes[0], chart)
     readable(axes[0], chart, most=4)
     figure.supylabel(chart.y, fontsize="medium")
-    _title(figure, chart)
+    _title(figure, chart, width)
     if names:
-        _legend(figure, axes, names)
+        _legend(figure, axes, names, width)
 
 
 def _short(series: Series) -> Series:

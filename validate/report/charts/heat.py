@@ -13,6 +13,7 @@ from validate.report.views.numbers import significant
 
 _CELL = (0.6, 0.36)  # inches of a square that holds its number
 _LARGEST = (6.2, 6.5)  # inches of all squares
+_BESIDE = 1.9  # inches of labels and colours beside them
 _LEGIBLE = 0.42  # inches across below which numbers would run into each other
 _TICKS = 24  # texts of an axis
 _EMPTY = "#BDBDBD"
@@ -34,12 +35,13 @@ def picture(heat: Heat) -> Picture:
     )
 
 
-def drawing(heat: Heat) -> Drawing:
-    """Return the function that fills the figure, and its width and height in inches."""
+def drawing(heat: Heat, widest: float = _LARGEST[0] + _BESIDE) -> Drawing:
+    """Return the function that fills the figure, and its width and height in inches, which is at
+    most `widest`."""
     rows, columns = heat.values.shape
-    width = min(max(columns * _CELL[0], 3.0), _LARGEST[0])
+    width = min(max(columns * _CELL[0], 3.0), widest - _BESIDE)
     height = min(max(rows * _CELL[1], 1.6), _LARGEST[1])
-    return lambda f: _fill(f, heat, width / columns), width + 1.9, height + 1.1
+    return lambda f: _fill(f, heat, width / columns), width + _BESIDE, height + 1.1
 
 
 def _fill(figure: Figure, heat: Heat, across: float) -> None:

@@ -34,10 +34,10 @@ def picture(shown: Intervals) -> Picture:
     )
 
 
-def drawing(shown: Intervals) -> Drawing:
+def drawing(shown: Intervals, width: float = WIDTH) -> Drawing:
     """Return the function that fills the figure, and its width and height in inches."""
     high = _ROOM + _LINE * max(1, len(_order(shown)))
-    return lambda f: _fill(f, shown), WIDTH, high
+    return lambda f: _fill(f, shown, width), width, high
 
 
 def _order(shown: Intervals) -> list[int]:
@@ -57,7 +57,7 @@ def shares(shown: Intervals) -> tuple[Floats, Floats, str]:
     return np.nan_to_num(share, nan=0.0, posinf=np.inf, neginf=-np.inf), np.nan_to_num(half), of
 
 
-def _fill(figure: Figure, shown: Intervals) -> None:
+def _fill(figure: Figure, shown: Intervals, width: float) -> None:
     share, half, of = shares(shown)
     order = _order(shown)
     ax = figure.subplots()
@@ -70,8 +70,11 @@ def _fill(figure: Figure, shown: Intervals) -> None:
         inside = abs(share[i]) <= _FAR
         sign = "o" if inside else ">" if share[i] > 0 else "<"
         ax.plot([np.clip(share[i], -_FAR, _FAR)], [y], sign, color=colour, markersize=5)
-    ax.set_yticks(range(len(order)), [fill(shown.labels[i], _LETTERS) for i in order])
+    share_of = width / WIDTH
+    labels = [fill(shown.labels[i], int(_LETTERS * share_of)) for i in order]
+    ax.set_yticks(range(len(order)), labels)
     ax.tick_params(axis="y", labelsize=8.5)
     ax.set(ylim=(len(order) - 0.5, -0.5), xlabel=f"{of} / 1", xlim=(-1.1 * _FAR, 1.1 * _FAR))
     ax.grid(visible=False, axis="y")
-    figure.suptitle(fill(shown.title, 66), x=0.01, ha="left", fontsize="medium")
+    title = fill(shown.title, int(66 * share_of))
+    figure.suptitle(title, x=0.01, ha="left", fontsize="medium")

@@ -14,6 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from validate.compare.exhibit import Pixels
 
@@ -24,11 +26,12 @@ _RIVALS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 PALETTE = (ACCEPTED, *_RIVALS)  # Okabe and Ito, without their yellow
 _DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 3)), (0, (2, 3)))
 _POINTS = ("s", "^", "D", "v", "P", "X")
+_LETTERS = 9.5  # points
 _SETTINGS: Mapping[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 9.5,
+    "font.size": _LETTERS,
     "axes.titlesize": 10.0,
-    "axes.labelsize": 9.5,
+    "axes.labelsize": _LETTERS,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -43,8 +46,17 @@ _SETTINGS: Mapping[str, Any] = {
 }
 DPI = 130  # dots an inch on the page
 WIDTH = 5.6  # inches
+_INCH = 25.4  # mm
+#: Widths of a journal's page in mm by name, and the size of its letters over those of a report.
+COLUMNS: Mapping[str, tuple[float, float]] = {"85mm": (85.0, 0.78), "175mm": (175.0, 0.9)}
 _LETTER = 0.07  # inches of a legend's letter, about
 _HANDLE = 0.6  # inches of a legend's line and the room beside it
+
+
+def inches_of(column: str) -> tuple[tuple[float], float]:
+    """Return the width at which a figure for a column is laid out, and its `size` then."""
+    width, size = COLUMNS[column]
+    return (width / _INCH / size,), size
 
 
 Drawing = tuple[Callable[[Figure], None], float, float]  # fills a figure of these inches
@@ -106,16 +118,31 @@ def draw(paint: Callable[[Figure], None], width: float, height: float, dpi: floa
 
 
 def painted(
-    paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI
-) -> Figure:
-    """Return the figure itself, laid out and drawn."""
+    paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI,
+    size: float = 1.0,
+) -> Figure:  # fmt: skip
+    """Return the figure itself, laid out and drawn, letters and lines with it `size` times as
+    large."""
     settings: Any = dict(_SETTINGS)
     with mpl.rc_context(settings):
-        figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+        figure = Figure(figsize=(width * size, height * size), dpi=dpi, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
         paint(figure)
+        if size != 1.0:
+            _resize(figure, size)
         canvas.draw()
     return figure
+
+
+def _resize(figure: Figure, size: float) -> None:
+    for text in figure.findobj(Text):
+        text.set_fontsize(size * float(text.get_fontsize()))
+    for line in figure.findobj(Line2D):
+        line.set_linewidth(size * line.get_linewidth())
+        line.set_markersize(size * line.get_markersize())
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        now: Any = axis.get_tick_params().get("labelsize", _LETTERS)
+        axis.set_tick_params(labelsize=size * now)  # also of ticks that are still to be made
 
 
 def panels(figure: Figure, count: int, columns: int) -> tuple[list[Axes], list[Axes]]:

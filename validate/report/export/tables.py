@@ -62,12 +62,26 @@ def write_chart(chart: Chart, folder: Path) -> None:
     write_csv(folder / f"chart_{safe_name(chart.name)}.csv", head, _points(chart))
 
 
-def write_csv(path: Path, head: tuple[str, ...], rows: Iterable[Row]) -> None:
-    """One header line; numbers in full precision."""
+def write_csv(
+    path: Path, head: tuple[str, ...], rows: Iterable[Row], as_shown: bool = False
+) -> None:
+    """One header line; numbers in full precision, or `as_shown` with the digits that they are shown
+    with."""
     with path.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(head)
-        writer.writerows([_written(plain(entry)) for entry in row] for row in rows)
+        writer.writerows(
+            [_digits(entry) if as_shown else _written(plain(entry)) for entry in row]
+            for row in rows
+        )
+
+
+def _digits(entry: Entry | TableCell) -> str | int:
+    """A number as a page shows it, as programs read it."""
+    value = plain(entry)
+    if isinstance(entry, TableCell) and entry.text and isinstance(value, float):
+        return entry.text.replace("\u202f", "").replace("−", "-")
+    return _written(value)
 
 
 def _written(value: Entry) -> str | int:

@@ -29,7 +29,7 @@ from validate.report.export.tables import across, caption, shown, word_columns
 from validate.report.page.body_view import body_view
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
-from validate.report.views.numbers import with_unit
+from validate.report.views.numbers import duration, with_unit
 from validate.report.views.view_filling import WORDS
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
@@ -119,9 +119,10 @@ def first_pictures(exhibits: Iterable[DrawnExhibit]) -> list[Picture | ImageSeri
 
 
 def cost(result: Result) -> str:
-    """The rate of each checked method and how it was measured; "" where none finished a step."""
+    """The rate of each checked method and its slow steps, which the rate hides where most steps are
+    read from a table; "" where none finished a step."""
     found = [
-        f"{m.called}: {with_unit(times.rate_hz, 'Hz')}"
+        f"{m.called}: {with_unit(times.rate_hz, 'Hz')}, p99 of a step {duration(times.p99)}"
         for m in result.methods
         if m.checks and (times := timed(m.run)) is not None
     ]

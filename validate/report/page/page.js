@@ -408,7 +408,7 @@
     function draw() {
       const width = canvas.clientWidth, height = canvas.clientHeight;
       if (!width) return;
-      const two = state.other >= 0 && state.other !== state.method ? [state.method, state.other] : [state.method];
+      const two = shownPanes();
       titles.replaceChildren(...(two.length > 1 ? two.map(i => make("b", {}, methods[i].label)) : []));
       const w = width / two.length, aspect = w / height;
       const tall = 1.06 * Math.max(held[1], held[0] / aspect);
@@ -426,12 +426,32 @@
       });
     }
 
+    const shownPanes = () => state.other >= 0 ? [state.method, state.other] : [state.method];
+
+    function named() { // the picture with what it shows: methods above, instant and colours below
+      draw();
+      const size = Math.round(canvas.width / 45), room = Math.round(1.8 * size);
+      const whole = make("canvas", { width: canvas.width, height: canvas.height + 2 * room });
+      const pen = whole.getContext("2d"), two = shownPanes(), [low, high] = range(state.by);
+      pen.fillStyle = "#ffffff";
+      pen.fillRect(0, 0, whole.width, whole.height);
+      pen.drawImage(canvas, 0, room);
+      pen.fillStyle = "#000000";
+      pen.font = `${size}px sans-serif`;
+      const each = whole.width / two.length;
+      two.forEach((number, i) => pen.fillText(methods[number].label, i * each + size / 2, 1.3 * size, each - size));
+      const words = [view.labels[state.frame], `${names.get(state.by)}: ${shown(low)} to ${shown(high)}`, view.part];
+      pen.fillText(words.filter(Boolean).join("; "), size / 2, whole.height - 0.6 * size, whole.width - size);
+      return whole;
+    }
+
     function update() {
       fill(panes[state.method]);
       if (state.other >= 0) fill(panes[state.other]);
       const [low, high] = range(state.by);
       const arrows = methods[state.method].markers && state.markers && state.arrows > 1 ? `arrows ${state.arrows} times as long` : "";
-      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high), " ", arrows);
+      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high), " ",
+        [arrows, view.part].filter(Boolean).join("; "));
       output.textContent = view.labels[state.frame];
       canvas.setAttribute("aria-label", `${methods[state.method].label} at ${view.labels[state.frame]}, `
         + `coloured by ${names.get(state.by)}; drag or Shift and arrow keys turn it, arrow keys move it`);
@@ -465,8 +485,7 @@
     again.addEventListener("click", () => { aim(); draw(); });
     const save = make("button", { type: "button" }, "Save PNG");
     save.addEventListener("click", () => {
-      draw();
-      make("a", { href: canvas.toDataURL("image/png"), download: `${document.title}.png` }).click();
+      make("a", { href: named().toDataURL("image/png"), download: `${document.title}.png` }).click();
     });
     const labels = methods.map((m, i) => [i, m.label]);
     const row = make("div", { class: "controls" });
@@ -474,8 +493,14 @@
     else row.append(output);
     const choice = make("div", { class: "controls" }), more = make("div", { class: "controls" });
     if (methods.length > 1) {
-      choice.append(select("Method", labels, 0, v => { state.method = Number(v); }),
-        select("beside", [[-1, "none"], ...labels], -1, v => { state.other = Number(v); }));
+      const beside = select("beside", [[-1, "none"], ...labels], -1, v => { state.other = Number(v); });
+      const others = beside.querySelector("select");
+      const apart = () => { // a method does not stand beside itself
+        for (const option of others.options) option.hidden = option.disabled = option.value === String(state.method);
+        if (state.other === state.method) others.value = String(state.other = -1);
+      };
+      choice.append(select("Method", labels, 0, v => { state.method = Number(v); apart(); }), beside);
+      apart();
     }
     choice.append(select("Colour", [...names], state.by, v => { state.by = v; }));
     more.append(select("Displacements", [[1, "true"], [2, "2 times"], [5, "5 times"], [10, "10 times"], [0, "none"]], 1,
@@ -491,7 +516,6 @@
     const words = ["Black: measured; orange arrows point to it from the simulated place. Grey: plates and tools."];
     if (!methods.some(m => m.markers || m.outlines)) words[0] = "The body as simulated.";
     if (methods.some(m => m.outlines)) words.push("Black line: measured outline; blue: simulated.");
-    if (view.part) words.push(view.part);
     if (view.left_out.length) words.push(`Not in this view: ${view.left_out.join(", ")}.`);
     const text = make("figcaption", {}, words.join(" "));
     const viewer = make("div", { class: "viewer" }, titles, canvas, legend, row, choice,

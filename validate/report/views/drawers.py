@@ -85,7 +85,7 @@ def save(found: Exhibit, run: "HasMethods", path: Path) -> None:
     if suffix in _FIGURES:
         figures(found, run)[0].savefig(path)
     elif suffix == ".csv":
-        write_csv(path, found.tables[0].headings, found.tables[0].rows)
+        write_csv(path, found.tables[0].headings, found.tables[0].rows, as_shown=True)
     else:
         from validate.report.export.junit_latex import tabular
 
@@ -105,19 +105,22 @@ def drawable(found: Exhibit) -> tuple[Chart | Heat | Intervals, ...]:
     return *found.charts, *found.heats, *found.intervals
 
 
-def figure_of(part: Chart | Heat | Intervals, run: "HasMethods") -> "Figure":
-    """Return a chart, a heat or intervals as a matplotlib figure."""
+def figure_of(part: Chart | Heat | Intervals, run: "HasMethods", column: str = "") -> "Figure":
+    """Return a chart, a heat or intervals as a matplotlib figure, as wide as a report's or as a
+    `column` of a journal's page: one of `charts.style.COLUMNS`."""
     from validate.report.charts import chart as charts
     from validate.report.charts import heat, intervals
-    from validate.report.charts.style import painted
+    from validate.report.charts.style import inches_of, painted
 
+    at, size = inches_of(column) if column else ((), 1.0)
     match part:
         case Chart():
-            return painted(*charts.drawing(run, part))
+            drawing = charts.drawing(run, part, *at)
         case Heat():
-            return painted(*heat.drawing(part))
+            drawing = heat.drawing(part, *at)
         case Intervals():
-            return painted(*intervals.drawing(part))
+            drawing = intervals.drawing(part, *at)
+    return painted(*drawing, size=size)
 
 
 # --- a page ---------------------------------------------------------------------------------------

@@ -46,6 +46,21 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:,.{max(0, digits - 1 - power)}f}".replace(",", "\u202f").replace("-", "−")
 
 
+def to_decimal_of(u: float, *values: float) -> tuple[str, ...]:
+    """Return u and `values` in one unit to the same decimal: that of two significant digits of u.
+
+    Each has three significant digits of its own where u is zero, not finite, or very small or
+    large.
+    """
+    if not 1e-4 < abs(u) < 1e7:
+        return tuple(significant(v) for v in (u, *values))
+    decimals = 1 - math.floor(math.log10(abs(float(f"{u:.1e}"))))
+    rounded = (round(v, decimals) + 0.0 for v in (u, *values))  # no minus zero
+    return tuple(
+        f"{v:,.{max(0, decimals)}f}".replace(",", "\u202f").replace("-", "−") for v in rounded
+    )
+
+
 def fixed(value: float, decimals: int) -> str:
     """Return a number already in its shown unit with fixed decimals and a true minus sign."""
     return f"{value:.{decimals}f}".replace("-", "−")

@@ -26,7 +26,15 @@ from validate.compare.view import View, texts
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names
 from validate.report.long_table import LongTable
-from validate.report.views.numbers import MISSING, scale, shown_unit, spaced, with_unit
+from validate.report.views.numbers import (
+    MISSING,
+    scale,
+    shown_unit,
+    spaced,
+    text,
+    to_decimal_of,
+    with_unit,
+)
 from validate.units import in_si, si_of, split
 
 _TWO = 2.0  # standard uncertainties of an interval
@@ -193,13 +201,21 @@ def _cell(view: View, rows: list[LongRow], column: str) -> TableCell:
     if row is None:
         return TableCell(None)
     if column in _NUMBERS:
-        return TableCell(_number(row, column), row.unit)
+        return TableCell(_number(row, column), row.unit, _to_one_decimal(row).get(column, ""))
     found = getattr(row, column)
     if column in _COUNTS:
         return TableCell(found)
     text = str(found or "")
     decides = column != "validation" or row.acceptance in ("", "no requirement")
     return TableCell(text, emphasis=WORDS.get(text.partition(" (")[0], "") if decides else "")
+
+
+def _to_one_decimal(row: LongRow) -> dict[str, str]:
+    """Error and uncertainties of a check in the shown unit, to the same decimal."""
+    if row.part != "check" or row.value is None or row.sd is None:
+        return {}
+    found = (scale(row.unit) * v for v in (_TWO * row.sd, row.value, row.sd))
+    return dict(zip(("expanded", "value", "sd"), to_decimal_of(*found), strict=True))
 
 
 def _chosen(view: View, rows: list[LongRow], column: str) -> LongRow | None:
@@ -224,8 +240,10 @@ def _written(view: View, cell: TableCell, *, in_cell: bool) -> TableCell:
         return cell
     value = float(cell.value)
     if in_cell and not view.unit:
-        return TableCell(with_unit(value, cell.unit))
-    return TableCell(_shown(cell.unit, view.unit)[1](value))
+        told = f"{cell.text} {shown_unit(cell.unit)}".strip() if cell.text else ""
+        return TableCell(told or with_unit(value, cell.unit))
+    text = "" if view.unit else cell.text
+    return TableCell(_shown(cell.unit, view.unit)[1](value), text=text)
 
 
 def _also(line: Mapping[str, list[LongRow]], name: str, first: LongRow) -> TableCell:
@@ -412,7 +430,9 @@ def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Interva
         names.append(": ".join(filter(None, _key(row, texts(view.x), table))))
         quantities.append(row.quantity)
         numbers.append((row.value, _TWO * row.sd, limit))
-        words.append((with_unit(row.value, row.unit), with_unit(_TWO * row.sd, row.unit),
+        told = _to_one_decimal(row) or {"value": text(row.value, row.unit),
+                                        "expanded": text(_TWO * row.sd, row.unit)}  # fmt: skip
+        words.append((*(f"{told[c]} {shown_unit(row.unit)}".strip() for c in _NUMBERS[::2]),
                       with_unit(limit, row.unit) if limit else MISSING,
                       row.acceptance if limit else row.validation))  # fmt: skip
     value, half, most = np.array(numbers, dtype=float).reshape(-1, 3).T  # None becomes NaN
