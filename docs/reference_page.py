@@ -1,4 +1,4 @@
-"""The page of the public API: exactly what validate/library/public_names.toml lists.
+"""The public API of docs/reference/api.md: exactly what validate/library/public_names.toml lists.
 
 `python docs/reference_page.py --write` stores the signatures after a change of the API.
 """
@@ -19,27 +19,6 @@ from validate.plugins import Registry
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ROOT / "validate" / "library" / "public_names.toml"
 SIGNATURES = ROOT / "tests" / "docs" / "public_signatures.txt"
-INTRO = """# Reference
-
-The public API, version {version}: {count} names, from the code itself. Each is imported from the
-module above it, as `from validate.scene.geometries.specification import Box`.
-`validate/library/public_names.toml` lists them.
-
-A version is a promise. Within one version a listed name stays at its place, a call that worked
-works, and its result has the same meaning, units and shapes. New names, new optional parameters
-and new members may come at any time. What breaks a call raises the version, and `CHANGELOG.md`
-says what to write instead. Numbers may change when a method is corrected: `CHANGELOG.md` lists
-these changes. Nothing else is promised: modules and names that do not stand on this page may
-change without notice.
-"""
-
-
-def on_files(files: Any, config: Any) -> Any:
-    """mkdocs calls this once the files are known."""
-    from mkdocs.structure.files import File
-
-    files.append(File.generated(config, "reference.md", content=page()))
-    return files
 
 
 @cache
@@ -72,9 +51,8 @@ def thing(module: str, name: str) -> Any:
 
 
 def page() -> str:
-    """The whole page as Markdown."""
-    names = list(public())
-    text = INTRO.format(version=version(), count=len(names))
+    """Return all names as Markdown."""
+    text = f"The public API, version {version()}: {len(list(public()))} names.\n"
     for title, part in sections().items():
         text += f"\n## {title}\n"
         for module, names_ in part.items():
@@ -163,6 +141,7 @@ def _plain(text: str) -> str:
     for name, dtype in (("Floats", "float64"), ("Ints", "int64")):
         text = re.sub(rf"numpy\.ndarray\[[^\]]*\], numpy\.dtype\[numpy\.{dtype}\]\]", name, text)
     text = re.sub(r" at 0x[0-9a-f]+", "", text)
+    text = re.sub(r"\*<class '([\w.]+)'>", r"Unpack[\1]", text)
     return re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z_])", "", text)
 
 

@@ -21,7 +21,7 @@ def readme(project_root: Path) -> str:
 
 @pytest.fixture(scope="module")
 def commands(project_root: Path) -> str:
-    return (project_root / "docs" / "commands.md").read_text("utf-8")
+    return (project_root / "docs" / "reference" / "commands.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_its_tables_of_filters_are_todays_runs(
     project_root: Path, script: ModuleType, whole: Callable[[str], Result]
 ) -> None:
     """All but the last column of the filters' table, which is a timing."""
-    page = (project_root / "docs" / "results.md").read_text("utf-8")
+    page = (project_root / "docs" / "explanation" / "results.md").read_text("utf-8")
     results = {name: whole(name) for name in script.PRINTED}
     ours = [row[:-1] for row in script.filter_rows(results["kf_cube"])]
     assert [row[:-1] for row in _cells(page, "filters")] == ours
@@ -96,6 +96,6 @@ def test_its_pictures_are_there_and_small(readme: str, project_root: Path) -> No
 
 def test_every_shipped_experiment_has_a_row_with_its_exit_code(project_root: Path) -> None:
     """`benchmarks/exit_codes.py` runs them and holds each to its row."""
-    table = (project_root / "docs" / "experiments.md").read_text("utf-8")
+    table = (project_root / "docs" / "reference" / "experiments.md").read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \|.*\| ([01]) \|$", table, re.M)
     assert sorted(name for name, _ in rows) == sorted(experiment_files(project_root))
