@@ -63,6 +63,7 @@ def test_files_exist(project_root: Path) -> None:
     named -= {
         "experiments/my_gel.py",
         "experiments/gel.py",
+        "experiments/NAME.py",
         "experiments/NAME/experiment.py",
         "validate/commands/NAME.py",
     }  # the reader writes them
