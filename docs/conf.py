@@ -23,6 +23,7 @@ myst_heading_anchors = 4
 copybutton_prompt_text = r"\$ "
 copybutton_prompt_is_regexp = True
 
+nb_merge_streams = True
 nb_execution_mode = os.environ.get("VALIDATE_DOCS_NOTEBOOKS", "cache")
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True  # their assertions are their claims
@@ -39,6 +40,7 @@ html_css_files = ["validate.css"]
 html_show_sourcelink = False
 html_use_index = False
 html_copy_source = False
+html_sidebars = {"gallery": [], "index": []}
 html_theme_options = {
     "show_prev_next": True,
     "navigation_depth": 3,

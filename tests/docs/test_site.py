@@ -99,6 +99,7 @@ def test_words_of_every_page_are_in_the_search_index(site: Path) -> None:
 
 
 def test_notebooks_were_executed(site: Path) -> None:
-    for notebook in (ROOT / "docs" / "tutorials").glob("*.ipynb"):
-        page = Page((site / "tutorials" / f"{notebook.stem}.html").read_text("utf-8"))
-        assert any("_images/" in address for address in page.loaded), notebook.stem
+    tutorials = ROOT / "docs" / "tutorials"
+    for name in ("own_files", *(notebook.stem for notebook in tutorials.glob("*.ipynb"))):
+        page = Page((site / "tutorials" / f"{name}.html").read_text("utf-8"))
+        assert any("_images/" in address for address in page.loaded), name
