@@ -1,6 +1,7 @@
 """The silicone beam under gravity: error against the converged answer over time, with peers.
 
-OMP_NUM_THREADS=1 python benchmarks/beam.py [--peers PYTHON] [--picture docs/beam.png] [--quick]
+OMP_NUM_THREADS=1 python benchmarks/beam.py [--peers PYTHON] [--quick]
+    [--picture docs/pictures/beam.png]
 
 A block of 100 x 30 x 30 mm, clamped at one end, E 263 824 Pa, nu .499, 1070 kg/m3. Statics: from
 rest to the whole weight in one step; the answer is the mean vertical motion of the end. Swing: the

@@ -1,4 +1,4 @@
-"""Every shipped experiment ends with the exit code that its row in docs/experiments.md states.
+"""Every shipped experiment ends with the exit code of its row in docs/reference/experiments.md.
 
     .venv/bin/python benchmarks/exit_codes.py [NAME ...]
 
@@ -27,7 +27,7 @@ def stated(page: str) -> dict[str, int]:
 
 
 def main(names: list[str]) -> int:
-    wanted = stated((ROOT / "docs" / "experiments.md").read_text("utf-8"))
+    wanted = stated((ROOT / "docs" / "reference" / "experiments.md").read_text("utf-8"))
     wrong = 0
     for name in names or list(wanted):
         start = time.monotonic()

@@ -1,7 +1,7 @@
 """Time of a step at equal error, internal and external: the silicone beam and the hanging bar.
 
 OMP_NUM_THREADS=1 python benchmarks/external_rates.py            prints the tables (ten minutes)
-OMP_NUM_THREADS=1 python benchmarks/external_rates.py --write    puts them into docs/results.md, too
+OMP_NUM_THREADS=1 python benchmarks/external_rates.py --write  writes docs/explanation/results.md
 
 Every simulator solves the same scene on several meshes of each cell type. The time at an error
 level is the smallest one on the lines through neighbouring meshes of one type (time over error,
@@ -290,7 +290,7 @@ def main() -> None:
     table += rows("beam let go", swing_points(true_swing()), SWING_LEVELS)
     print(text := markdown(table))
     if write:
-        page = ROOT / "docs" / "results.md"
+        page = ROOT / "docs" / "explanation" / "results.md"
         before, rest = page.read_text("utf-8").split(BEGIN)
         page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", "utf-8")
 

@@ -1,7 +1,7 @@
 """The table of external simulators on the same recordings as ours.
 
 OMP_NUM_THREADS=1 python benchmarks/external_table.py            prints it (some five minutes)
-OMP_NUM_THREADS=1 python benchmarks/external_table.py --write    puts it into docs/results.md
+OMP_NUM_THREADS=1 python benchmarks/external_table.py --write    writes docs/explanation/results.md
 
 Needs the recordings, FElupe, CalculiX and MuJoCo. All but rate and memory is the same everywhere.
 """
@@ -97,7 +97,7 @@ def main() -> None:
     text = markdown([row for one in judged() for row in rows_of(one, run(one))])
     print(text)
     if "--write" in sys.argv[1:]:
-        page = ROOT / "docs" / "results.md"
+        page = ROOT / "docs" / "explanation" / "results.md"
         before, rest = page.read_text("utf-8").split(BEGIN)
         page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", "utf-8")
 

@@ -1,6 +1,8 @@
 """Do identified moduli hold their truth, and are wrong laws named? Synthetic compression logs.
 
-python benchmarks/identified_logs.py [COUNT] [--curve docs/law_detection.svg]   (200 logs; 40: slow)
+python benchmarks/identified_logs.py [COUNT] [--curve docs/pictures/law_detection.svg]
+
+COUNT is 200 logs; the slow test takes 40.
 
 A log is a function of its seed: law and contact, aspect ratio, Poisson ratio, sizes, share of
 friction, scale of the load cell, noise (white, or remembering .7 of its last sample), contact

@@ -6,7 +6,8 @@ The truth is another code's (pip install felupe): an axisymmetric neo-Hooke disc
 bonded to its floor, under a frictionless rigid sphere by penalty. What is recorded is the motion of
 the stage: the depth, and what the machine yields under the force. DIR gets the log (layer.csv), one
 of the same machine on a rigid block (rigid.csv), and the answers of `validate new` without
-(unknown.toml), with a declared (declared.toml) compliance. docs/indentation.md goes on from there.
+(unknown.toml), with a declared (declared.toml) compliance.
+docs/how-to/indentation.md goes on from there.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """The table of measured experiments: fitted on what, predicted what, within what.
 
 python benchmarks/measured_table.py            prints it (some ten minutes; needs the recordings)
-python benchmarks/measured_table.py --write    puts it into docs/results.md
+python benchmarks/measured_table.py --write    puts it into docs/explanation/results.md
 """
 
 import sys
@@ -88,7 +88,7 @@ def main() -> None:
     table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
     print(table)
     if "--write" in sys.argv[1:]:
-        page = ROOT / "docs" / "results.md"
+        page = ROOT / "docs" / "explanation" / "results.md"
         before, rest = page.read_text("utf-8").split(BEGIN)
         page.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}", "utf-8")
 

@@ -1,4 +1,4 @@
-"""The tables of docs/paper-00x.md, from stored runs: printed results, then settings by reason.
+"""The tables of the paper pages in docs/explanation, from stored runs: results, then settings.
 
 validate run fluid_block fluid_phantom needle_pocket --out DIR
 python benchmarks/paper_table.py DIR paper-000            prints it
@@ -22,7 +22,7 @@ PAGES = {
     "paper-003": ("ekf_cube", "ekf_liver", "ekf_cone", "haptic_liver"),
     "paper-004": ("async_line", "async_block"),
 }
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "explanation"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 _NUMERALS = ("", "I", "II", "III", "IV", "V", "VI", "VII")
 HEAD = ("paper", "what", "theirs", "ours", "verdict", "why", "experiment")

@@ -1,4 +1,4 @@
-"""Tables of README.md and docs/results.md, from today's runs: models of the phantom, filters.
+"""Tables of README.md and docs/explanation/results.md, from today's runs: phantom and filters.
 
 python benchmarks/readme_table.py            prints them (about three minutes)
 python benchmarks/readme_table.py --write    puts them into the pages
@@ -121,7 +121,7 @@ def main() -> None:
     }
     print("\n\n".join(tables.values()))
     if "--write" in sys.argv[1:]:
-        for page in (ROOT / "README.md", ROOT / "docs" / "results.md"):
+        for page in (ROOT / "README.md", ROOT / "docs" / "explanation" / "results.md"):
             page.write_text(replaced(page.read_text("utf-8"), tables), "utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Write the tables of formats and of `--map` keys in docs/formats.md, as the readers specify them.
+"""Write the tables of formats and `--map` keys in docs/reference/formats.md, from the readers.
 
 python docs/format_tables.py
 """

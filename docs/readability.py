@@ -35,12 +35,13 @@ def prose(text: str) -> str:
 
 def row(path: Path) -> tuple[str, int, float, float]:
     """Name, words, words per sentence and ARI of a page."""
+    name = str(path.relative_to(HERE)) if HERE in path.parents else path.name
     text = prose(path.read_text("utf-8"))
     words = len(text.split())
     if not words:
-        return path.name, 0, 0.0, 0.0
+        return name, 0, 0.0, 0.0
     sentences = max(len(re.findall(r"[.!?](?=\s|$)", text)), 1)
-    return path.name, words, words / sentences, float(textstat.automated_readability_index(text))
+    return name, words, words / sentences, float(textstat.automated_readability_index(text))
 
 
 def main() -> None:
@@ -49,15 +50,15 @@ def main() -> None:
         pages = [
             HERE.parent / "README.md",
             HERE.parent / "CHANGELOG.md",
-            *sorted(HERE.glob("*.md")),
+            *sorted(HERE.rglob("*.md")),
         ]
     rows = sorted(map(row, pages), key=lambda r: -r[2])
-    print(f"{'page':<24}{'words':>8}{'words / sentence':>18}{'ARI':>7}")
+    print(f"{'page':<36}{'words':>8}{'words / sentence':>18}{'ARI':>7}")
     for name, words, mean, ari in rows:
-        print(f"{name:<24}{words:>8}{mean:>18.1f}{ari:>7.1f}{'' if mean <= AIM else '  long'}")
+        print(f"{name:<36}{words:>8}{mean:>18.1f}{ari:>7.1f}{'' if mean <= AIM else '  long'}")
     total = sum(r[1] for r in rows)
     mean = sum(r[1] for r in rows) / sum(r[1] / r[2] for r in rows if r[2])
-    print(f"{'all':<24}{total:>8}{mean:>18.1f}")
+    print(f"{'all':<36}{total:>8}{mean:>18.1f}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The page of the public API: exactly what validate/library/public_names.toml lists.
+"""The public API of docs/reference/api.md: exactly what validate/library/public_names.toml lists.
 
 `python docs/reference_page.py --write` stores the signatures after a change of the API.
 """
@@ -18,28 +18,8 @@ from validate.plugins import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ROOT / "validate" / "library" / "public_names.toml"
+BAR = "\\|"  # in a cell of a table
 SIGNATURES = ROOT / "tests" / "docs" / "public_signatures.txt"
-INTRO = """# Reference
-
-The public API, version {version}: {count} names, from the code itself. Each is imported from the
-module above it, as `from validate.scene.geometries.specification import Box`.
-`validate/library/public_names.toml` lists them.
-
-A version is a promise. Within one version a listed name stays at its place, a call that worked
-works, and its result has the same meaning, units and shapes. New names, new optional parameters
-and new members may come at any time. What breaks a call raises the version, and `CHANGELOG.md`
-says what to write instead. Numbers may change when a method is corrected: `CHANGELOG.md` lists
-these changes. Nothing else is promised: modules and names that do not stand on this page may
-change without notice.
-"""
-
-
-def on_files(files: Any, config: Any) -> Any:
-    """mkdocs calls this once the files are known."""
-    from mkdocs.structure.files import File
-
-    files.append(File.generated(config, "reference.md", content=page()))
-    return files
 
 
 @cache
@@ -72,9 +52,8 @@ def thing(module: str, name: str) -> Any:
 
 
 def page() -> str:
-    """The whole page as Markdown."""
-    names = list(public())
-    text = INTRO.format(version=version(), count=len(names))
+    """Return all names as Markdown."""
+    text = f"The public API, version {version()}: {len(list(public()))} names.\n"
     for title, part in sections().items():
         text += f"\n## {title}\n"
         for module, names_ in part.items():
@@ -86,14 +65,14 @@ def page() -> str:
 def _entry(name: str, what: Any) -> str:
     members = "".join(f"\n- `.{member}`: {_first(doc)}" for member, _, doc in _members(what) if doc)
     return (
-        f"\n#### {name}\n{_block(_signature(name, what), 'python')}{_block(_doc(what))}"
+        f"\n#### {name}\n{_block(_signature(name, what), 'python')}\n{prose(_doc(what))}\n"
         f"{members}{chr(10) if members else ''}"
     )
 
 
 def _signature(name: str, what: Any) -> str:
     if is_dataclass(what) and inspect.isclass(what):
-        lines = [f"    {f.name}: {_type(f.type)}" for f in fields(what)]
+        lines = [f"    {f.name}: {type_text(f.type)}" for f in fields(what)]
         return "\n".join([f"class {name}:", *lines])
     if inspect.isclass(what):
         return f"class {name}"
@@ -141,7 +120,7 @@ def _call(what: Any) -> str:
         if p.kind.name == "KEYWORD_ONLY" and not starred:
             parts.append("*")
         starred |= p.kind.name in ("KEYWORD_ONLY", "VAR_POSITIONAL")
-        given = "" if p.annotation is p.empty else f": {_type(p.annotation)}"
+        given = "" if p.annotation is p.empty else f": {type_text(p.annotation)}"
         default = "" if p.default is p.empty else " = ..."
         parts.append(f"{marks.get(p.kind.name, '')}{p.name}{given}{default}")
     ends = "" if inspect.isclass(what) else f" -> {_returned(function)}"
@@ -150,10 +129,11 @@ def _call(what: Any) -> str:
 
 def _returned(function: Any) -> str:
     found = inspect.signature(function).return_annotation
-    return "None" if found is None else _type(found)
+    return "None" if found is None else type_text(found)
 
 
-def _type(annotation: Any) -> str:
+def type_text(annotation: Any) -> str:
+    """Return a type as the code writes it, without modules."""
     plain_class = inspect.isclass(annotation) and not get_args(annotation)
     return annotation.__name__ if plain_class else _plain(str(annotation)).replace("'", "")
 
@@ -163,6 +143,7 @@ def _plain(text: str) -> str:
     for name, dtype in (("Floats", "float64"), ("Ints", "int64")):
         text = re.sub(rf"numpy\.ndarray\[[^\]]*\], numpy\.dtype\[numpy\.{dtype}\]\]", name, text)
     text = re.sub(r" at 0x[0-9a-f]+", "", text)
+    text = re.sub(r"\*<class '([\w.]+)'>", r"Unpack[\1]", text)
     return re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z_])", "", text)
 
 
@@ -176,9 +157,23 @@ def _doc(what: Any) -> str:
     return inspect.getdoc(what) or ""
 
 
+def prose(doc: str) -> str:
+    """Return a docstring as Markdown: paragraphs, and blocks of what it indents or lists."""
+    parts = []
+    for part in doc.split("\n\n"):
+        if re.search(r"^(?:\s|[-*] |\w+  )", part, re.MULTILINE):
+            parts.append(f"```text\n{part}\n```")
+        else:
+            pieces = re.split(r"(`[^`]*`)", " ".join(part.split()))
+            plain = (re.sub(r"([\\*_<>\[\]$#|])", r"\\\1", piece) for piece in pieces[::2])
+            pieces[::2] = plain
+            parts.append("".join(pieces))
+    return "\n\n".join(parts)
+
+
 def _first(doc: str) -> str:
     """The first sentence."""
-    return " ".join(doc.split("\n\n")[0].split()).replace("|", "\\|")
+    return " ".join(doc.split("\n\n")[0].split()).replace("|", BAR)
 
 
 def _block(text: str | None, language: str = "text") -> str:

@@ -36,7 +36,7 @@ from validate.pipeline.run.pipeline import compare
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 # Groups that take minutes begin first: a short one ends each process.
-FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_notebooks.py", "tree")
+FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree")
 # The same examples each time, and no test judges the time that it takes.
 settings.register_profile("validate", deadline=None, derandomize=True)
 settings.load_profile("validate")

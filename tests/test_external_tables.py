@@ -31,7 +31,7 @@ def table(project_root: Path) -> ModuleType:
 
 
 def cells(root: Path, module: ModuleType) -> list[list[str]]:
-    page = (root / "docs" / "results.md").read_text("utf-8")
+    page = (root / "docs" / "explanation" / "results.md").read_text("utf-8")
     text = page.split(module.BEGIN)[1].split(module.END)[0]
     return [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
 

@@ -81,7 +81,7 @@ def test_no_text_sends_a_user_to_a_name_that_nobody_published(project_root: Path
     name = tomllib.loads((project_root / "pyproject.toml").read_text())["project"]["name"]
     files = [
         *(project_root / "validate").rglob("*.py"),
-        *(project_root / "docs").glob("*.md"),
+        *(project_root / "docs").rglob("*.md"),
         project_root / "README.md",
     ]
     sent = [f for f in files if f"install {name}" in f.read_text() or f"'{name}[" in f.read_text()]

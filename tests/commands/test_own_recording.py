@@ -1,4 +1,4 @@
-"""From a user's files to a report, as README.md and docs/log-and-images.md print it."""
+"""From a user's files to a report, as README.md and docs/how-to/log-and-images.md print it."""
 
 import contextlib
 import io
@@ -21,7 +21,7 @@ from validate.recording.types import Recording, Signal, Source
 
 
 def commands(project_root: Path) -> list[list[str]]:
-    section = (project_root / "docs" / "log-and-images.md").read_text("utf-8")
+    section = (project_root / "docs" / "how-to" / "log-and-images.md").read_text("utf-8")
     return [shlex.split(line) for line in printed(section, "console").strip().splitlines()]
 
 
@@ -62,7 +62,7 @@ def pressed_in_images(folder: Path, project_root: Path) -> None:
         envelope = np.hypot(*parts)
         grey = np.clip(200 + 100 * np.log10(envelope / envelope.mean() + 1e-3), 0, 255)
         (folder / "images" / f"frame_{i:03}.png").write_bytes(encode_png(grey.astype(np.uint8)))
-    section = (project_root / "docs" / "log-and-images.md").read_text("utf-8")
+    section = (project_root / "docs" / "how-to" / "log-and-images.md").read_text("utf-8")
     (folder / "answers.toml").write_text(printed(section, "toml"), "utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Every worked example of docs/adding.md runs as it is printed."""
+"""Every worked example of docs/developers/adding.md runs as it is printed."""
 
 import re
 import shutil
@@ -17,7 +17,7 @@ from validate.solve.static.quasi_static import QuasiStatic
 
 
 def blocks(project_root: Path) -> list[str]:
-    text = (project_root / "docs" / "adding.md").read_text("utf-8")
+    text = (project_root / "docs" / "developers" / "adding.md").read_text("utf-8")
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
@@ -28,7 +28,7 @@ PARTS = (
 
 
 def test_the_page_adds_each_part(project_root: Path) -> None:
-    text = (project_root / "docs" / "adding.md").read_text("utf-8")
+    text = (project_root / "docs" / "developers" / "adding.md").read_text("utf-8")
     for thing in PARTS:
         (section,) = re.findall(rf"\n## An? {thing}\n(.*?)(?=\n## |\Z)", text, flags=re.DOTALL)
         assert "assert " in section, thing
@@ -78,6 +78,6 @@ def test_every_example_runs(
 
 
 def test_the_page_of_laws_runs(project_root: Path) -> None:
-    text = (project_root / "docs" / "laws.md").read_text("utf-8")
+    text = (project_root / "docs" / "explanation" / "laws.md").read_text("utf-8")
     (block,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     exec(compile(block, "laws.md", "exec"), {})

@@ -34,7 +34,7 @@ def cited(text: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def keys(project_root: Path) -> set[str]:
-    text = (project_root / "docs" / "bibliography.md").read_text("utf-8")
+    text = (project_root / "docs" / "reference" / "bibliography.md").read_text("utf-8")
     return set(re.findall(r"\*\*(.+?)\*\*", text))
 
 

@@ -1,4 +1,4 @@
-"""docs/capabilities.md: a command reaches every scheme, solver, filter and part of a scene."""
+"""docs/reference/capabilities.md: a command reaches every scheme, filter and part of a scene."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ from validate.solve.schemes import SCHEMES, SOLVERS
 ROOT = Path(__file__).parents[2]
 ROWS = [
     [cell.strip().strip("`") for cell in line.strip("| \n").split("|")]
-    for line in (ROOT / "docs" / "capabilities.md").read_text("utf-8").splitlines()
+    for line in (ROOT / "docs" / "reference" / "capabilities.md").read_text("utf-8").splitlines()
     if line.startswith("| `")
 ]
 DECLARING = (

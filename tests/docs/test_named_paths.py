@@ -14,7 +14,7 @@ FILES = re.compile(r"`((?:validate|tests|experiments|benchmarks|docs)/[\w./]+\.(
 
 
 def pages(root: Path) -> list[Path]:
-    return [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").glob("*.md"))]
+    return [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").rglob("*.md"))]
 
 
 def test_names_of_the_code_exist(project_root: Path) -> None:
@@ -33,7 +33,7 @@ def of_layers(root: Path, text: str) -> list[str]:
 
 
 def test_names_of_the_architecture_page_exist(project_root: Path) -> None:
-    text = (project_root / "docs" / "architecture.md").read_text("utf-8")
+    text = (project_root / "docs" / "developers" / "architecture.md").read_text("utf-8")
     named = set(of_layers(project_root, text))
     assert len(named) >= 120
     for name in sorted(named):
@@ -41,7 +41,7 @@ def test_names_of_the_architecture_page_exist(project_root: Path) -> None:
 
 
 def test_walks_count_their_files(project_root: Path) -> None:
-    text = (project_root / "docs" / "architecture.md").read_text("utf-8")
+    text = (project_root / "docs" / "developers" / "architecture.md").read_text("utf-8")
     walks = re.findall(r"\n### [^\n]*\((\d+) files\)\n\n(.*?)(?=\n##)", text, flags=re.DOTALL)
     assert len(walks) == 5
     for count, steps in walks:
@@ -63,11 +63,39 @@ def test_files_exist(project_root: Path) -> None:
     named -= {
         "experiments/my_gel.py",
         "experiments/gel.py",
+        "experiments/NAME.py",
         "experiments/NAME/experiment.py",
         "validate/commands/NAME.py",
     }  # the reader writes them
     missing = [n for n in named if not (project_root / n).is_file()]
     assert missing == []
+
+
+def test_pages_that_the_code_names_exist(project_root: Path) -> None:
+    """Messages and docstrings send a reader to them."""
+    folders = [project_root / name for name in ("validate", "experiments", "benchmarks", "tests")]
+    named = {
+        name
+        for folder in folders
+        for file in folder.rglob("*.py")
+        for name in re.findall(
+            r"(?<![\w/])docs/[\w/-]+\.(?:md|csv|svg|png|py)\b", file.read_text("utf-8")
+        )
+    }
+    assert len(named) > 10
+    assert [name for name in sorted(named) if not (project_root / name).is_file()] == []
+
+
+def test_links_of_pages_outside_the_documentation_exist(project_root: Path) -> None:
+    """Sphinx tests the links inside it."""
+    outside = [*project_root.glob("*.md"), *(project_root / "experiments").rglob("*.md")]
+    links = [
+        page.parent / link
+        for page in outside
+        for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text("utf-8"))
+    ]
+    assert len(links) > 20
+    assert [link for link in links if not link.exists()] == []
 
 
 def test_a_name_that_is_gone_would_be_seen() -> None:

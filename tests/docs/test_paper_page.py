@@ -111,7 +111,7 @@ def test_every_picture_of_the_paper_is_named(script: ModuleType, page: str) -> N
 
 def test_the_results_page_gives_the_same_verdicts(script: ModuleType, project_root: Path) -> None:
     """Rows of its table of printed figures that a page has, too."""
-    page = (project_root / "docs" / "results.md").read_text("utf-8")
+    page = (project_root / "docs" / "explanation" / "results.md").read_text("utf-8")
     text = page.split("<!-- printed: begin -->")[1].split("<!-- printed: end -->")[0]
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in text.strip().splitlines()]
     paged = {f"{r[6]}: {r[1]}": r[4] for page in PICTURES for r in page_rows(script, page)[2:]}

@@ -1,4 +1,4 @@
-"""docs/plugins.md: its examples run, and the contracts find a part that is broken."""
+"""docs/developers/plugins.md: its examples run, and the contracts find a part that is broken."""
 
 import re
 from collections.abc import Callable
@@ -28,9 +28,8 @@ from validate.testing import (
 # private: _added: plug-ins of the test are taken out again.
 
 ROOT = Path(__file__).parents[2]
-BLOCKS = re.findall(
-    r"```python\n(.*?)```", (ROOT / "docs" / "plugins.md").read_text("utf-8"), re.DOTALL
-)
+PAGE = ROOT / "docs" / "developers" / "plugins.md"
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
 
 
 @pytest.fixture
@@ -155,6 +154,6 @@ def test_the_contracts_of_schemes_and_filters_find_what_is_broken(page: dict[str
 
 
 def test_the_page_of_formats_is_what_the_readers_specify() -> None:
-    page = (ROOT / "docs" / "formats.md").read_text("utf-8")
+    page = (ROOT / "docs" / "reference" / "formats.md").read_text("utf-8")
     assert with_tables(page) == page
     assert with_tables(page.replace("| `c3d` | motion", "| `c3d` | slow motion")) == page

@@ -1,4 +1,4 @@
-"""Every example of docs/python.md runs as it is printed, one after the other."""
+"""Every example of docs/how-to/python.md runs as it is printed, one after the other."""
 
 import re
 from pathlib import Path
@@ -15,13 +15,13 @@ def test_the_examples_run(
     project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    page = (project_root / "docs" / "python.md").read_text("utf-8")
+    page = (project_root / "docs" / "how-to" / "python.md").read_text("utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     assert len(blocks) == 6
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "__main__"}
     for block in blocks:
-        exec(compile(block, "docs/python.md", "exec"), names)
+        exec(compile(block, "docs/how-to/python.md", "exec"), names)
     result, stiffer, recording = names["result"], names["stiffer"], names["recording"]
     assert isinstance(result, RunResult)
     assert (result.parameters["material.E"], stiffer.parameters["material.E"]) == (10e3, 12e3)

@@ -142,7 +142,7 @@ def test_a_stylus_on_eight_landmarks_against_its_published_tip(
     shared_data: Path, tmp_path: Path
 ) -> None:
     """1.5 mm from the published tip: three times the error stated beside it, eight times our own
-    sd. Landmarks are predicted worse with ours (docs/measured.md); why was not tested."""
+    sd. Landmarks are predicted worse with ours (docs/explanation/measured.md); why is untested."""
     path = shared_data / SEQUENCE
     x, out = tmp_path / "x.mcap", tmp_path / "y.mcap"
     write_recording(recognised(path).read(path, {"images": "no"}), x)

@@ -254,7 +254,7 @@ def test_the_page_about_reports_adds_one(
     request: pytest.FixtureRequest, project_root: Path
 ) -> None:
     request.addfinalizer(VIEWS._added.clear)
-    page_text = (project_root / "docs" / "report.md").read_text("utf-8")
+    page_text = (project_root / "docs" / "reference" / "report.md").read_text("utf-8")
     code = next(b for b in re.findall(r"```python\n(.*?)```", page_text, re.DOTALL) if "View(" in b)
     exec(code, {})
     (added,) = VIEWS.further

@@ -57,7 +57,7 @@ def external_simulators(command: Callable[..., Any]) -> Any:
         click.option("--guest", "former", multiple=True, hidden=True),
         click.option(
             "--external", "simulators", multiple=True, metavar="COMMAND",
-            help="An external simulator as one more method (docs/external-simulators.md).",
+            help="An external simulator as one more method (docs/how-to/external-simulators.md).",
         ),
     ):  # fmt: skip
         renamed = option(renamed)

@@ -10,7 +10,7 @@ from validate.commands.arguments import EXPERIMENTS, FOLDER, FORCE
 
 @click.group("external")
 def external() -> None:
-    """Use an external simulator as one more method (docs/external-simulators.md).
+    """Use an external simulator as one more method (docs/how-to/external-simulators.md).
 
     \b
     Example:

@@ -32,7 +32,7 @@ def show(as_json: bool) -> None:
         for line in rows(["kind", "name", "package", "version", ""], cells):
             print(line)
     else:
-        print("no plug-ins are installed; docs/plugins.md shows how to write one")
+        print("no plug-ins are installed; docs/developers/plugins.md shows how to write one")
 
 
 def _kinds() -> list[str]:

@@ -72,7 +72,7 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun
         return live(made.stepper, made.path, seconds)
     with closing(Listener(*made.reach, made.stepper.rate, listen)) as source:
         host, port = source.address
-        complain(f"listens on {host} port {port} (UDP), see docs/live.md; Ctrl-C ends it")
+        complain(f"listens on {host} port {port} (UDP), see docs/how-to/live.md; Ctrl-C ends it")
         return live(made.stepper, source, seconds)
 
 

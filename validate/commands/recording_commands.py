@@ -304,7 +304,7 @@ def new(
 )
 @click.option(
     "--face", "faces", multiple=True, metavar="NAME=WORDS",
-    help="Facet set by place: top=zmax, side=x=20mm, box A to B or near P (docs/new.md).",
+    help="Facet set by place: top=zmax, side=x=20mm, box A to B or near P (docs/how-to/new.md).",
 )  # fmt: skip
 @click.option("--size", metavar="LENGTH", help="Largest side; confirms an unusual size.")
 @click.option(

@@ -24,7 +24,7 @@ over the numbers and D does not: meshes that cut a curved wall anew, 0.1 mm apar
 0.9 mm.) Three sizes are enough; a scalar has no s then. A trusted order above
 the formal one is replaced by the formal one in the fit: near a corner the observed order falls as
 the mesh is refined, and the band of the rule as printed (p up to 2.1 as it is) was short for pads
-between bonded plates (`benchmarks/bodies.py table`, docs/discretisation.md).
+between bonded plates (`benchmarks/bodies.py table`, docs/explanation/discretisation.md).
 
 `richardson` is for tables of studies: the observed order of three answers by a fixed point for
 unequal ratios, and the grid convergence index of the finest (Celik et al. 2008).

@@ -1,7 +1,7 @@
 """Python library for scripts and notebooks, on the same functions as the commands.
 
 `run` and `open_run` give a `RunResult`, `study` a `StudyResult`: both read the folder that the
-command would have written. `docs/python.md` is the manual; `public_names.toml` lists what is
+command would have written. `docs/how-to/python.md` is the manual; `public_names.toml` lists what is
 promised.
 """
 

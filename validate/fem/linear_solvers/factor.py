@@ -187,7 +187,7 @@ def _touching(graph: sparse.csr_array, low: Ints, high: Ints, side: np.ndarray) 
 # (1973), "Nested dissection of a regular finite element mesh". The numbers before them were
 # measured as peaks of blocks of 2 000 to 64 000 unknowns in space (P1 and P2: 252 to 317 and 296
 # to 635 bytes, thin plates 140) and 2 000 to 116 000 in the plane (84 to 107):
-# docs/conventions.md.
+# docs/reference/conventions.md.
 
 _SPACE, _PLANE = 300.0, 100.0  # bytes of a factor per N^(4/3), N log2 N
 _ASSEMBLED = {2: 2e3, 3: 13e3}  # bytes an unknown while K is assembled

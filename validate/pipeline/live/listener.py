@@ -17,7 +17,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import UsageError
 
-# --- Packets of the live loop, little-endian; docs/live.md describes them for who sends them.
+# --- Packets of the live loop, little-endian; docs/how-to/live.md describes them for senders.
 #
 # In: magic "VLP1", sequence number uint32, time int64 ns, position d doubles in m. Out: magic
 # "VLF1", sequence number uint32 of the last one taken, force d doubles in N, flags uint32.

@@ -1,4 +1,4 @@
-"""Job and answer of an external simulator (docs/external-simulators.md).
+"""Job and answer of an external simulator (docs/how-to/external-simulators.md).
 
 Everything is checked: sizes and shapes before memory is allocated, mesh and times against the job,
 law and parameters against the request, and forces against each other.

@@ -25,7 +25,7 @@ from validate.plugins import Registry
 @dataclass(frozen=True)
 class Simulator:
     """An external simulator: its name, what it is, the `command` that is called with a folder
-    (docs/external-simulators.md), and the `programs` that the command starts."""
+    (docs/how-to/external-simulators.md), and the `programs` that the command starts."""
 
     name: str
     doc: str

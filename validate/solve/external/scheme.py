@@ -119,7 +119,9 @@ _FOLDER = "validate-external-"
 
 @dataclass(frozen=True)
 class ExternalSimulator:
-    """Settings of an external simulator, called as `command FOLDER`: docs/external-simulators.md.
+    """Settings of an external simulator, called as `command FOLDER`.
+
+    docs/how-to/external-simulators.md describes its files.
 
     The outcome of the run reports an unsupported scene, a missing program, a crash, a time-out and
     a wrong answer. In statics a Prony series becomes its relaxed limit. A time whose inputs equal
