@@ -1,6 +1,6 @@
 """Figures of docs/explanation from today's code: locking, u_num and its terms, process noise.
 
-python docs/explanation_pictures.py    writes docs/pictures/*.svg (three minutes)
+python docs/explanation_pictures.py    writes docs/pictures/*.svg (some five minutes)
 
 A cantilever of 100 x 30 x 30 mm under its weight, by linear statics, gives locking and u_num.
 `fluid_phantom` gives the terms of u_val, `kf_cube` the error of a filter over its process noise.
