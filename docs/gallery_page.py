@@ -13,8 +13,7 @@ from pathlib import Path
 
 from PIL import Image, ImageChops
 
-from validate.catalogue import experiment_files
-from validate.pipeline import load
+from validate.catalogue import card, experiment_files
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -29,15 +28,15 @@ FIGURES = (
 
 def page() -> str:
     """Return cards and sections as Markdown."""
-    names = sorted(experiment_files(ROOT))
-    asked = _questions()
-    cards = "\n".join(_card(name) for name in names)
+    files = experiment_files(ROOT)
+    names, asked = sorted(files), _questions()
+    cards = "\n".join(_card(name, files[name]) for name in names)
     sections = "\n".join(_section(name, asked[name]) for name in names)
     return f"::::{{grid}} 1 2 3 3\n:gutter: 3\n\n{cards}\n::::\n\n{sections}"
 
 
-def _card(name: str) -> str:
-    declared = load(name)
+def _card(name: str, file: Path) -> str:
+    declared = card(file)
     return (
         f":::{{grid-item-card}} {name}\n:img-top: pictures/gallery/{name}.webp\n"
         f":img-alt: {declared.title}\n:link: gallery-{name}\n:link-type: ref\n\n"

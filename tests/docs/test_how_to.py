@@ -37,9 +37,6 @@ def test_every_command_has_its_own() -> None:
 def test_its_options_exist(page: Path) -> None:
     for line in typed(page):
         name = name_of(line)
-        given = shlex.split(line, comments=True)[len(name.split()) :]
-        command_at(cli, name).make_context(name, given, resilient_parsing=True)
-        known = {o for p in command_at(cli, name).params for o in (*p.opts, *p.secondary_opts)}
-        assert [word for word in given if re.match(r"--?[a-z]", word)] == [
-            word for word in given if word.partition("=")[0] in known
-        ], line
+        options = [w for w in shlex.split(line, comments=True) if re.match(r"--?[a-z]", w)]
+        known = {option for p in command_at(cli, name).params for option in p.opts}
+        assert {option.partition("=")[0] for option in options} <= known, line
