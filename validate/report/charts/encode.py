@@ -9,7 +9,7 @@ from PIL import Image
 
 from validate.compare.exhibit import ImageSeries, Picture, Pixels
 
-_WIDEST = 1400  # pixels of a photo on the page; its file has all
+_WIDEST = 1000  # pixels of a photo on the page; its file has all
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,6 @@ def _webp(pixels: Pixels, photo: bool) -> str:
     image, out = Image.fromarray(pixels), BytesIO()
     if photo and image.width > _WIDEST:
         image.thumbnail((_WIDEST, image.height), Image.Resampling.LANCZOS)
-    how = {"quality": 82} if photo else {"lossless": True, "quality": 60}
+    how = {"quality": 76} if photo else {"lossless": True, "quality": 60}
     image.save(out, "WEBP", method=4, **how)
     return "data:image/webp;base64," + base64.b64encode(out.getvalue()).decode("ascii")

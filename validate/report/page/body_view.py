@@ -73,16 +73,13 @@ def _method(
     nodes = np.unique(np.concatenate([part.nodes for part in parts]))
     seen = shown.markers
     return {
-        "name": shown.result.name,
         "label": shown.result.label,
-        "colour": shown.colour,
         "nodes": _packed(shown.nodes[nodes], "<f4"),
         "parts": [
             {"name": p.name, "triangles": _packed(np.searchsorted(nodes, p.nodes)[p.triangles],
                                                   "<u4")}
             for p in parts
         ],
-        "whole": sum(p.whole for p in parts),
         "u": _shares(shown.u(nodes)),
         "fields": {name: _shares(values[:, nodes]) for name, values in coloured.items()},
         "markers": seen and {

@@ -13,7 +13,6 @@ from validate.compare.result import MethodResult, Result
 from validate.fem.assembly.cell_fields import cell_fields
 from validate.register.clocks import interpolated
 from validate.register.outlines.plane import from_image
-from validate.report.charts.style import looks
 from validate.report.scenes.body import (
     Camera,
     Tool,
@@ -61,7 +60,6 @@ class ShownMethod:
     measured and simulated outline (p, 3) mm."""
 
     result: MethodResult
-    colour: str
     frames: Ints
     markers: SeenMarkers | None
     outlines: tuple[tuple[Floats, Floats], ...]
@@ -137,8 +135,8 @@ def body_scene(result: Result, most: int) -> BodyScene | None:
     first, scene = methods[0], methods[0].scene
     names = {m.name for m in methods}
     labels, t, numbers = _instants(first, most)
-    colours, toward = looks(result), drive_direction(scene)
-    shown = tuple(_shown(m, colours[m.name].colour, t, numbers) for m in methods)
+    toward = drive_direction(scene)
+    shown = tuple(_shown(m, t, numbers) for m in methods)
     tools, cut = tools_of(first, numbers), None
     if scene.cavities and scene.mesh.dimension == 3:
         normal, words = opening_plane(result, toward)
@@ -183,7 +181,7 @@ def _instants(method: MethodResult, most: int) -> tuple[tuple[str, ...], Floats,
     return tuple(labels[i] for i in chosen), times[chosen], chosen
 
 
-def _shown(method: MethodResult, colour: str, t: Floats, numbers: Ints) -> ShownMethod:
+def _shown(method: MethodResult, t: Floats, numbers: Ints) -> ShownMethod:
     scene, run, own = method.scene, method.run, _own_frames(method, t, numbers)
     seen, markers = markers_seen(method), None
     if seen is not None and seen.x.shape[2] == scene.mesh.dimension:
@@ -200,7 +198,7 @@ def _shown(method: MethodResult, colour: str, t: Floats, numbers: Ints) -> Shown
              _MM * from_image(outline.pose, outline.simulated(run.u[i])))
             for at, i in zip(t.tolist(), own.tolist(), strict=True)
         )  # fmt: skip
-    return ShownMethod(method, colour, own, markers, outlines)
+    return ShownMethod(method, own, markers, outlines)
 
 
 def _own_frames(method: MethodResult, t: Floats, numbers: Ints) -> Ints:

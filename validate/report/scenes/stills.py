@@ -26,7 +26,7 @@ from validate.report.charts.style import MEASURED, PALETTE, draw
 from validate.report.scenes.body import Camera, camera
 from validate.report.scenes.body_scene import BodyScene, SeenMarkers, fields
 from validate.report.scenes.element_surface import Surface, surface_of
-from validate.report.scenes.maps import Range, bar_title, colours, values, words
+from validate.report.scenes.maps import Range, bar_title, colours, triad, values, words
 from validate.report.scenes.residual_arrows import rounded_down
 from validate.report.views.numbers import significant
 from validate.scene.mesh import Mesh
@@ -42,6 +42,7 @@ _LONGEST, _MARKER = 0.1, 0.011  # of the body's size: the longest arrow, the rad
 _POINTS, _LETTER = 7.0, 0.056  # size of the letters, and inches that one takes
 _LINE, _BAR = 0.13, 0.44  # inches of a line of text, of the colour bars below a row
 _PAGE = 9.0  # inches that a sheet may be high
+_ROOMY = 1.0  # inches of a colour bar with a number in its middle
 _LEAST = 1e-9  # what is smaller, of mm, %, Pa or of what differs, is rounding
 _DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
 _ERRORS = LinearSegmentedColormap.from_list("errors", ["#FFE0CC", PALETTE[1], "#4A1800"])
@@ -479,10 +480,10 @@ class _Layout:
         span = self.drawn.spans[name]
         bar = figure.colorbar(ScalarMappable(Normalize(*span), ramp), cax=ax,
                               orientation="horizontal")  # fmt: skip
-        ends = [span[0], 0.5 * (span[0] + span[1]), span[1]]
+        ends = np.linspace(*span, 3 if wide > _ROOMY else 2).tolist()
         bar.set_ticks(ends, labels=[significant(e) for e in ends], fontsize=_POINTS - 0.5)
         bar.ax.tick_params(length=2, pad=1)
-        first, _, last = bar.ax.get_xticklabels()
+        first, *_, last = bar.ax.get_xticklabels()
         first.set_horizontalalignment("left")
         last.set_horizontalalignment("right")
         quantity = f"difference / {name.rpartition(' / ')[2]}" if name.startswith("diff") else name
@@ -496,16 +497,18 @@ def rendered(shown: NodeMap, span: Range) -> Picture:
     """Return the map on the undeformed surface, from a camera that only the mesh moves."""
     nodes = 1e3 * shown.mesh.nodes
     size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    stage = _Stage(camera(nodes, np.array([0.0, 0.0, -1.0]), None, flat=False), size)
+    seen_by = camera(nodes, np.array([0.0, 0.0, -1.0]), None, flat=False)
+    stage = _Stage(seen_by, size)
     _body(shown.mesh, nodes).add(stage, nodes, values(shown), span, colours(span))
-    stage.plotter.add_axes(color="black", viewport=(0.0, 0.0, 0.17, 0.24))
     panel, said = stage.shot(), words(shown, span)
     stage.plotter.close()
 
     def paint(figure: Figure) -> None:
         ax = figure.subplots()
-        ax.imshow(panel, interpolation="lanczos")
+        high, wide = panel.shape[:2]
+        ax.imshow(panel, interpolation="lanczos", extent=(0, wide, 0, high))
         ax.set_axis_off()
+        triad(ax, seen_by.away)
         bar = ScalarMappable(Normalize(*span), colours(span))
         figure.colorbar(bar, ax=ax, label=bar_title(shown), shrink=0.8)
 
