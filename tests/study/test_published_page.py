@@ -5,8 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from validate.compare.published import Published
 from validate.report.stored.store import figure_members
+from validate.report.stored.tables import open_store
+from validate.study.stored_runs.predictions import stored_runs
 from validate.study.stored_runs.published_page import write_published
 
 Json = dict[str, Any]
@@ -87,3 +91,10 @@ def test_a_report_is_linked_where_it_is_stored(tmp_path: Path) -> None:
 def test_without_a_printed_figure_there_is_no_page(tmp_path: Path) -> None:
     assert write_published(tmp_path, [entry("bar")]) is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_is_no_run(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    write_published(tmp_path, [entry("bar", figure("drop", 1.0, 1.0))])
+    assert stored_runs(tmp_path) == ()
+    assert list(open_store(tmp_path)) == []
+    assert not caplog.messages

@@ -107,7 +107,7 @@ def write_overview(reports: Path) -> Path:
          "largest_share_of_limit": share(s.runs[-1]), "changed": s.changed}
         for s in found
     ]  # fmt: skip
-    document = {"kind": "overview", "runs": members}
+    document = {"page": FOLDER, "runs": members}
     return write_loose(told, (exhibit,), document, reports / FOLDER, "Stored")
 
 

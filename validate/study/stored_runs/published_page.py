@@ -40,14 +40,14 @@ def write_published(reports: Path, checked: Sequence[Json]) -> Path | None:
     told = ("published", "Printed figures, and ours", "validate check", f"{sentence}{moved}.")
     exhibits = (Exhibit("figures", "All experiments", (), (_summary(entries, reports),),
                         intervals=_differences(entries)), *map(_section, entries))  # fmt: skip
-    document = {"kind": FOLDER, "experiments": entries}
+    document = {"page": FOLDER, "experiments": entries}
     return write_loose(told, exhibits, document, reports / FOLDER, "Checked")
 
 
 def _earlier(reports: Path) -> list[Json]:
     file = reports / FOLDER / MARK
     content = json.loads(file.read_text("utf-8")) if file.is_file() else {}
-    return list(content["experiments"]) if content.get("kind") == FOLDER else []
+    return list(content["experiments"]) if content.get("page") == FOLDER else []
 
 
 def _counted(results: Iterable[Json]) -> str:
