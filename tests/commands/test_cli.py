@@ -504,7 +504,7 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
     whole = SimpleNamespace(unread={})
     assert outlining._same(Path("a.mcap"), whole) == Path("a.mcap")  # type: ignore[arg-type]
     frames = SimpleNamespace()
-    monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: None)
+    monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: (None, None))
     monkeypatch.setattr(outlining, "png", lambda picture: b"")
     contours = SimpleNamespace(t=np.zeros(1))
     with pytest.raises(

@@ -38,7 +38,7 @@ def test_files_without_gl(tmp_path: Path) -> None:
     folder = path.parent
     names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     assert names >= {
-        "report.html", "results.json", "runs/soft.nc", "runs/stiff.nc", "figures/map_body.png",
+        "report.html", "results.json", "runs/soft.nc", "runs/stiff.nc", "figures/body.png",
         "figures/chart_curve_force_plate.png", LONG_TABLE,
     }  # fmt: skip
     now_in_it = ("scores", "residuals", "effects", "checks", "published", "identified")
