@@ -20,6 +20,7 @@ from validate.report.export.tables import write_chart, write_table
 from validate.report.scenes import gl
 from validate.report.scenes.maps import Range, drawn, legible, ranges
 
+_LONG = ("body",)  # sections that take longest to draw: begun first
 Part = Exhibit | Callable[[Any], Exhibit | None]  # a section makes its exhibit of the result
 S = TypeVar("S")
 I = TypeVar("I")
@@ -73,10 +74,12 @@ def drawing(
     """
     every = tuple(parts)
     _require_distinct([p for p in every if isinstance(p, Exhibit)])
-    begun = beside(_part, (result, gl.known()), every)
+    order = sorted(range(len(every)), key=lambda i: getattr(every[i], "anchor", "") not in _LONG)
+    begun = beside(_part, (result, gl.known()), [every[i] for i in order])
 
     def finished() -> tuple[DrawnExhibit, ...]:
-        made = [one for one in begun() if one is not None]
+        found = dict(zip(order, begun(), strict=True))
+        made = [one for i in range(len(every)) if (one := found[i]) is not None]
         exhibits = [one.exhibit for one in made]
         _require_distinct(exhibits)
         clear = legible(m for e in exhibits for m in e.maps)
