@@ -11,6 +11,7 @@ from html import unescape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -21,8 +22,14 @@ from tracking_samples import tracking_result
 
 from validate.compare.exhibit import Chart, Exhibit, ImageSeries, NumberTable, Series
 from validate.compare.result import Result
+from validate.library.comparison import scores_of_runs
+from validate.pipeline.experiment.find import find
 from validate.report.write import write_report
+from validate.solve.types import Ending, Outcome
 from validate.study.loose_page import write_loose
+from validate.study.stored_runs.compare_page import write_comparison
+from validate.study.stored_runs.published_page import write_published
+from validate.study.study_page import Findings, write_study
 
 OPTIONS = (
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--hide-scrollbars",
@@ -56,6 +63,7 @@ FINDINGS = """<script>addEventListener("load", async () => {
   const pre = document.createElement("pre"); pre.id = "found";
   pre.textContent = JSON.stringify(found); document.body.append(pre); });</script></body>"""
 CREATED = "2026-11-21T04:00:00Z"
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +144,43 @@ def of_runs(folder: Path) -> Path:
     return write_loose(told, (exhibit,), {"kind": "summary"}, folder, "Summary")
 
 
+def ended(state: Ending, why: str) -> Result:
+    """The small result whose checked method ended so at step 3."""
+    result = bare_result()
+    (method,) = result.methods
+    run = replace(method.run, outcome=Outcome(state, 3, why))
+    return replace(result, methods=(replace(method, runs=(run,)),))
+
+
+def of_a_study(folder: Path) -> Path:
+    experiment = find("hanging_bar", ROOT)
+    rows = tuple((f"Cell {i}", 1.5 * i, 0.1 / (i + 1)) for i in range(12))
+    cells = NumberTable("cells", "Every cell.", ("cell", "time / s", "error / mm"), rows)
+    x = np.arange(12.0)
+    chart = Chart(
+        "front", "Error over time", "time / s", "error / mm", (Series("all", x, 1 / (x + 1)),)
+    )
+    exhibits = (Exhibit("cells", "Cells", (), (cells,), charts=(chart,)),)
+    told = Findings("Trade: a bar", "12 cells.", exhibits, {"kind": "tradeoff"}, cells, quick=True)
+    return write_study(experiment, told, folder)
+
+
+def of_a_comparison(folder: Path) -> Path:
+    runs = [folder.with_name(name) for name in ("one", "other")]
+    for run, checks in zip(runs, (3, 4), strict=True):
+        of(with_checks(checks))(run)
+    found = scores_of_runs(runs, (), (), "change")
+    return write_comparison(found, {}, folder)
+
+
+def of_printed_figures(folder: Path) -> Path:
+    content = json.loads((of(small_result())(folder / "cube").parent / "results.json").read_text())
+    figures = {"title": "A cube", "holds": True, "checked": CREATED, **content}
+    page = write_published(folder, [figures])
+    assert page is not None
+    return page
+
+
 def of(result: Result) -> Callable[[Path], Path]:
     return lambda folder: write_report(result, folder, created=CREATED)
 
@@ -156,8 +201,12 @@ def test_dom(browser: str, report: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [375, 1280])
 @pytest.mark.parametrize(
-    "write", [of(with_checks(3)), of(bare_result()), of(empty()), of_runs, of(with_checks(500))],
-    ids=["failing", "not converged", "empty", "summary", "500 checks"],
+    "write",
+    [of(with_checks(3)), of(bare_result()), of(ended("diverged", "u beyond 1 km")),
+     of(ended("refused", "nu = 0.5")), of(empty()), of_runs, of_a_study, of_a_comparison,
+     of_printed_figures, of(with_checks(500))],
+    ids=["failing", "not converged", "diverged", "refused", "empty", "summary", "study",
+         "comparison", "printed figures", "500 checks"],
 )  # fmt: skip
 def test_every_kind_of_page_is_whole(
     browser: str, tmp_path: Path, write: Callable[[Path], Path], width: int
@@ -359,6 +408,38 @@ def test_zeros_on_a_logarithmic_axis_are_gaps(browser: str, tmp_path: Path) -> N
     found, _ = look(browser, page, tmp_path, 1280, action)
     assert found["ticks"] == 1
     assert found["drawn"] > 100  # blue: the part above nought
+
+
+@pytest.mark.slow
+def test_a_curve_is_saved_as_vectors_as_it_is_shown(browser: str, tmp_path: Path) -> None:
+    x = np.arange(4.0)
+    line, hidden = Series("a <line>", x, 2 * x), Series("hidden", x, 3 - x)
+    dots = Series("dots", x, x + 1, style="points")
+    band = Series("band", x, x - 0.5, style="band", upper=x + 0.5)
+    chart = Chart("saved", "Saved", "time / s", "force / N", (line, hidden, dots, band))
+    page = of(replace(small_result(), exhibits=(Exhibit("s", "S", charts=(chart,)),)))(
+        tmp_path / "r"
+    )
+    action = """const figure = document.getElementById("figure-chart_saved");
+      URL.createObjectURL = blob => { found.blob = blob; return "#"; };
+      HTMLAnchorElement.prototype.click = function () { found.file = this.download; };
+      const rows = [...figure.querySelectorAll(".u-series")];
+      rows.find(r => r.innerText.includes("hidden")).querySelector("th").click(); await wait(50);
+      figure.querySelector("button").click();
+      found.text = await found.blob.text(); found.kind = found.blob.type; delete found.blob;"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    assert (found["file"], found["kind"]) == ("figure-chart_saved.svg", "image/svg+xml")
+    top = ElementTree.fromstring(found["text"])
+    drawn = {kind: list(top.iter(f"{{http://www.w3.org/2000/svg}}{kind}"))
+             for kind in ("polyline", "circle", "polygon", "text")}  # fmt: skip
+    assert [len(drawn[kind]) for kind in ("polyline", "circle", "polygon")] == [1, 4, 1]
+    words = [one.text or "" for one in drawn["text"]]
+    assert {"time / s", "force / N", "\u2014 a <line>", "\u2014 dots"} <= set(words)
+    assert not any("hidden" in text for text in words)
+    points = np.array([p.split(",") for p in drawn["polyline"][0].get("points", "").split()], float)
+    slopes = np.diff(points[:, 1]) / np.diff(points[:, 0])
+    assert (slopes < 0).all()  # y rises upward on paper
+    assert np.ptp(slopes) == pytest.approx(0, abs=0.01)
 
 
 @pytest.mark.slow

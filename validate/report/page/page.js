@@ -131,12 +131,66 @@
       }] },
     }, uPlot.join(tables), box);
     for (const row of box.querySelectorAll(".u-series.branch")) row.hidden = true;
+    const save = make("button", { type: "button" }, "Save SVG");
+    save.addEventListener("click", () => {
+      const blob = new Blob([vector(drawn)], { type: "image/svg+xml" });
+      const link = make("a", { href: URL.createObjectURL(blob), download: `${figure.id}.svg` });
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
     box.append(make("p", { class: "note" },
-      "Drag to zoom, double-click to see all; a click on a name hides its curve."));
+      "Drag to zoom, double-click to see all; a click on a name hides its curve. ", save));
     figure.classList.add("live");
     new ResizeObserver(() => {
       if (figure.clientWidth) drawn.setSize({ width: figure.clientWidth, height: HEIGHT });
     }).observe(figure);
+  }
+
+  // The curves of a plot as it is shown, black on white: for a document.
+  function vector(plot) {
+    const [left, top] = [plot.over.offsetLeft, plot.over.offsetTop];
+    const [wide, high] = [plot.over.clientWidth, plot.over.clientHeight];
+    const at = (v, scale) => (plot.valToPos(v, scale) + (scale === "x" ? left : top)).toFixed(1);
+    const ends = plot.bands.flatMap(b => b.series);
+    const lines = [], names = new Map();
+    const text = (x, y, words, more = "") => {
+      const one = make("span", {}, String(words)); // escapes
+      return `<text x="${x}" y="${y}" ${more}>${one.innerHTML}</text>`;
+    };
+    const points = i => plot.data[0].flatMap((x, k) =>
+      plot.data[i][k] == null ? [] : [`${at(x, "x")},${at(plot.data[i][k], "y")}`]);
+    const print = one => one === style("--ink") ? "#000000" : one;
+    plot.series.forEach((s, i) => {
+      if (!i || !s.show) return;
+      const colour = print(s._stroke || s.stroke());
+      names.set(s.label, colour);
+      if (ends.includes(i)) return;
+      if (s.points.show && s.points.size === 5) {
+        for (const point of points(i)) {
+          const [x, y] = point.split(",");
+          lines.push(`<circle cx="${x}" cy="${y}" r="2.5" fill="${colour}"/>`);
+        }
+      } else {
+        lines.push(`<polyline points="${points(i).join(" ")}" fill="none" stroke="${colour}" stroke-width="${s.width}" stroke-dasharray="${(s.dash || []).join(" ")}"/>`);
+      }
+    });
+    for (const b of plot.bands) {
+      if (!plot.series[b.series[0]].show) continue;
+      const [upper, lower] = b.series.map(points);
+      lines.unshift(`<polygon points="${[...upper, ...lower.reverse()].join(" ")}" fill="${print(plot.series[b.series[0]].stroke())}" fill-opacity="0.25"/>`);
+    }
+    const [across, upward] = plot.axes.map(a => a._splits.map((v, i) => [v, a._values[i]]).filter(t => t[1] !== ""));
+    const frame = `<rect x="${left}" y="${top}" width="${wide}" height="${high}" fill="none" stroke="#000000"/>`;
+    const ticks = [
+      ...across.map(([v, words]) => text(at(v, "x"), top + high + 16, words, 'text-anchor="middle"')),
+      ...upward.map(([v, words]) => text(left - 6, Number(at(v, "y")) + 4, words, 'text-anchor="end"')),
+      text(left + wide / 2, top + high + 34, plot.axes[0].label, 'text-anchor="middle"'),
+      text(0, 0, plot.axes[1].label, `text-anchor="middle" transform="translate(14 ${top + high / 2}) rotate(-90)"`),
+    ];
+    const legend = [...names].map(([name, colour], i) =>
+      text(left, top + high + 54 + 16 * i, `\u2014 ${name}`, `fill="${colour}"`));
+    const size = [plot.width, top + high + 60 + 16 * names.size];
+    return `<svg xmlns="http://www.w3.org/2000/svg" width="${size[0]}" height="${size[1]}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/><clipPath id="inside"><rect x="${left}" y="${top}" width="${wide}" height="${high}"/></clipPath><g clip-path="url(#inside)">${lines.join("")}</g>${frame}${ticks.join("")}${legend.join("")}</svg>`;
   }
 
   // --- images: one at a time ---------------------------------------------------------------------
