@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -171,3 +172,18 @@ def test_a_recording_without_a_hash_is_never_reused(tmp_path: Path) -> None:
     taken, said = checked(tmp_path)
     assert not taken
     assert "a recording without a hash" in said
+
+
+def test_a_folder_of_the_user_is_no_place_for_the_page_and_no_reason_to_stop(
+    stored: Path, tmp_path: Path
+) -> None:
+    """Without --out the check goes on and says so in a line; with it nothing is checked."""
+    place = stored / "reports" / "published"
+    place.mkdir()
+    (place / "mine.txt").write_text("", "utf-8")
+    assert "no page of printed figures: " in checked(stored)[1]
+    (tmp_path / "published").mkdir()
+    (tmp_path / "published" / "mine.txt").write_text("", "utf-8")
+    code, _, err = here("check", "pulled", "--out", str(tmp_path), cwd=stored)
+    assert (code, "not replaced" in err) == (2, True)
+    shutil.rmtree(place)

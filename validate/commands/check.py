@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from validate.commands.arguments import Detail
+from validate.commands.arguments import Detail, complain
 from validate.commands.display import print_views, relative, say, shown
 from validate.commands.progress import progress
 from validate.commands.run import each
@@ -15,6 +15,7 @@ from validate.commands.screen import Passage, check_passages, rows, sentences, s
 from validate.compare.result import KINDS, Result
 from validate.engine.execution import CELLS
 from validate.engine.pool import Pool
+from validate.errors import UsageError
 from validate.library.run_report import by_cells
 from validate.pipeline.checks.motion_summary import described
 from validate.pipeline.experiment.experiment import Experiment
@@ -47,8 +48,7 @@ def check(
     no figure moved and every verdict is the declared one."""
     found: list[Json] = []
     figures: list[Json] = []
-    reports = reports_of(None, out)
-    try_results(reports / FOLDER, ())
+    reports = _writable(reports_of(None, out), out)
 
     def one(experiment: Experiment) -> bool:
         content = None if fresh else _stored(experiment, out)
@@ -75,12 +75,25 @@ def check(
         found.append({"experiment": name, "holds": False, "error": why})
 
     code = each(names, named, one, failed)
-    page = write_published(reports, figures)
+    page = write_published(reports, figures) if reports else None
     if page and not as_json:
         say(f"printed figures: {relative(page)}")
     if as_json:
         print(json.dumps(found, ensure_ascii=False, indent=1, allow_nan=False))
     return code
+
+
+def _writable(reports: Path, out: Path | None) -> Path | None:
+    """The folder of reports; None, and a line, where nothing can be written and `out` is not asked
+    for."""
+    try:
+        try_results(reports / FOLDER, ())
+    except UsageError as error:
+        if out:
+            raise
+        complain(f"no page of printed figures: {error}")
+        return None
+    return reports
 
 
 def _figures(experiment: Experiment, content: Json, *, holds: bool) -> Json:
