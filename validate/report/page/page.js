@@ -504,8 +504,8 @@
       if (state.other >= 0) fill(panes[state.other]);
       const [low, high] = range(state.by);
       const arrows = methods[state.method].markers && state.markers && state.arrows > 1 ? `arrows ${state.arrows} times as long` : "";
-      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high), " ",
-        [arrows, view.part].filter(Boolean).join("; "));
+      legend.replaceChildren(names.get(state.by), " ", shown(low), make("span", { class: "ramp" }), shown(high),
+        make("span", { class: "also" }, [arrows, view.part].filter(Boolean).join("; ")));
       output.textContent = view.labels[state.frame];
       canvas.setAttribute("aria-label", `${methods[state.method].label} at ${view.labels[state.frame]}, `
         + `coloured by ${names.get(state.by)}; drag or Shift and arrow keys turn it, arrow keys move it`);
