@@ -13,15 +13,16 @@ from report_samples import small_result
 from tracking_samples import tracking_result
 
 from validate.compare.result import Result
-from validate.fem.assembly.locate import nearest_node_rows
+from validate.fem.assembly.locate import barycentric_rows, nearest_node_rows
+from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.markers import MarkerObservation
 from validate.report.scenes import gl
 from validate.report.scenes.bodies import _without_gl
 from validate.report.scenes.body import camera
-from validate.report.scenes.body_scene import BodyScene, body_scene, fields
+from validate.report.scenes.body_scene import BodyScene, _particles, body_scene, fields
 
 # private: _KNOWN: a cache, emptied.
-# private: _without_gl: called alone, case by case.
+# private: _particles, _without_gl: called alone, case by case.
 
 
 def cube() -> BodyScene:
@@ -88,6 +89,24 @@ def test_markers_stand_where_they_were_measured_and_where_the_run_has_them() -> 
     off = np.linalg.norm(shown.markers.measured[1] - shown.markers.simulated[1], axis=1)
     assert shown.markers.errors[1] == pytest.approx(off, nan_ok=True)
     assert np.isnan(shown.markers.errors[:, 2]).all()
+
+
+def test_particles_are_markers_inside_of_the_body() -> None:
+    mesh = small_result().methods[0].scene.mesh
+    inner = mesh.nodes.mean(axis=0) + 1e-4 * np.arange(900.0)[:, None] * [0.01, 0.02, 0.0]
+    rows = barycentric_rows(mesh, inner)
+    measured = np.tile([0.0, 0.0, -1e-3], (900, 1))
+    beads = DisplacementObservation("beads", "validates", np.ones(1), inner, measured, rows,
+                                    np.full(3, 1e-5))  # fmt: skip
+    u = np.tile([0.0, 0.0, -3e-3], (len(mesh.nodes), 1))
+    found = _particles([beads], u)
+    assert found is not None
+    assert found.inside
+    assert found.measured.shape == (1, 300, 3)  # every third of 900
+    assert found.names[1] == "beads 3"
+    np.testing.assert_allclose(found.rest[1], 1e3 * inner[3])
+    np.testing.assert_allclose(found.errors, 2.0)
+    assert _particles([], u) is None
 
 
 def test_stresses_of_all_methods_have_one_unit() -> None:

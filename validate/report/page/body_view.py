@@ -85,7 +85,7 @@ def _method(
         "markers": seen and {
             "names": list(seen.names), "rest": _packed(seen.rest, "<f4"),
             "measured": _packed(seen.measured, "<f4"),
-            "simulated": _packed(seen.simulated, "<f4"),
+            "simulated": _packed(seen.simulated, "<f4"), "inside": seen.inside,
         },
         "outlines": [
             {"measured": _packed(measured, "<f4"), "simulated": _packed(simulated, "<f4")}

@@ -240,14 +240,15 @@
 
     // What is shown.
     const state = { method: 0, other: -1, frame: largest(methods[0]), by: "displacement",
-      markers: true, arrows: magnified(), outline: true, edges: false, through: false, cut: Boolean(view.cut), scale: 1 };
+      markers: true, arrows: magnified(), outline: true, edges: false,
+      through: methods.some(m => m.markers && m.markers.inside), cut: Boolean(view.cut), scale: 1 };
 
     function unpacked(m) {
       const nodes = numbers(m.nodes, Float32Array);
       const triangles = m.parts.map(p => numbers(p.triangles, Uint32Array));
       const shares = ({ top, shares }) => Float32Array.from(numbers(shares, Int16Array), v => v * top / STEPS);
       const fields = Object.fromEntries(Object.entries(m.fields).map(([name, f]) => [name, shares(f)]));
-      const markers = m.markers && { names: m.markers.names,
+      const markers = m.markers && { names: m.markers.names, inside: m.markers.inside,
         rest: numbers(m.markers.rest, Float32Array), measured: numbers(m.markers.measured, Float32Array), simulated: numbers(m.markers.simulated, Float32Array) };
       const outlines = m.outlines && m.outlines.map(o => ({
         measured: numbers(o.measured, Float32Array), simulated: numbers(o.simulated, Float32Array) }));

@@ -12,6 +12,7 @@ from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
 from validate.fem.assembly.cell_fields import cell_fields
 from validate.register.clocks import interpolated
+from validate.register.markers.displacements import DisplacementObservation
 from validate.register.outlines.plane import from_image
 from validate.report.scenes.body import (
     Camera,
@@ -34,6 +35,7 @@ from validate.scene.scene import Scene
 
 _MM = 1e3
 MOST_METHODS = 4
+_PARTICLES = 400  # of a field of measured displacements
 _LASTS = 0.99  # of the first method's time: another one that ends before is not shown
 _CELLS = 60_000  # elements beyond which strain and stress take longer than the rest of a report
 
@@ -41,12 +43,14 @@ _CELLS = 60_000  # elements beyond which strain and stress take longer than the 
 @dataclass(frozen=True)
 class SeenMarkers:
     """Markers at the instants, where they were measured and where the simulation has them,
-    (f, k, 3) mm, NaN where one was not seen; `rest` (k, 3) mm."""
+    (f, k, 3) mm, NaN where one was not seen; `rest` (k, 3) mm. `inside`: particles in the body,
+    which is seen through."""
 
     names: tuple[str, ...]
     rest: Floats
     measured: Floats
     simulated: Floats
+    inside: bool = False
 
     @property
     def errors(self) -> Floats:
@@ -188,9 +192,11 @@ def _shown(method: MethodResult, t: Floats, numbers: Ints) -> ShownMethod:
         flat, _ = interpolated(seen.t, seen.x.reshape(len(seen.t), -1), t)
         measured = flat.reshape(len(t), -1, seen.x.shape[2])
         simulated = np.array([seen.simulated(run.u[i]) for i in own])
-        markers = SeenMarkers(
-            tuple(seen.names), *(_MM * three(x) for x in (seen.rest, measured, simulated))
-        )
+        rest, measured, simulated = (_MM * three(x) for x in (seen.rest, measured, simulated))
+        markers = SeenMarkers(tuple(seen.names), rest, measured, simulated)
+    if markers is None and len(t) == 1 and method.registered:
+        found = method.registered[0].of(DisplacementObservation)
+        markers = _particles(found, run.u[own[0]])
     outline, outlines = outline_seen(method), tuple[tuple[Floats, Floats], ...]()
     if outline is not None and scene.mesh.dimension == 3:
         outlines = tuple(
@@ -199,6 +205,19 @@ def _shown(method: MethodResult, t: Floats, numbers: Ints) -> ShownMethod:
             for at, i in zip(t.tolist(), own.tolist(), strict=True)
         )  # fmt: skip
     return ShownMethod(method, own, markers, outlines)
+
+
+def _particles(found: Sequence[DisplacementObservation], u: Floats) -> SeenMarkers | None:
+    """Points of measured displacements at one instant, every so many; None without any."""
+    if not found:
+        return None
+    rest = np.vstack([o.points for o in found])
+    measured = rest + np.vstack([o.u for o in found])
+    simulated = rest + np.vstack([o.simulated(u) for o in found])
+    names = [f"{o.name} {i}" for o in found for i in range(len(o.points))]
+    every = slice(None, None, -(-len(rest) // _PARTICLES))
+    rest, measured, simulated = (_MM * three(x[every]) for x in (rest, measured, simulated))
+    return SeenMarkers(tuple(names[every]), rest, measured[None], simulated[None], inside=True)
 
 
 def _own_frames(method: MethodResult, t: Floats, numbers: Ints) -> Ints:

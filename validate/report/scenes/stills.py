@@ -48,6 +48,7 @@ _DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
 _ERRORS = LinearSegmentedColormap.from_list("errors", ["#FFE0CC", PALETTE[1], "#4A1800"])
 _SIMULATED = "#FF4FD8"  # of an outline: no colour of the body
 _TOOL: Mapping[str, Any] = {"color": "#A9B0B7", "ambient": 0.3, "opacity": 0.4}
+_THROUGH = 0.25  # opacity of a body with particles in it
 _RIM: Mapping[str, Any] = {"color": "#202020", "line_width": 1, "opacity": 0.3}
 _LINE_ART: Mapping[str, Any] = {"ambient": 0.7, "diffuse": 0.3}
 
@@ -116,10 +117,12 @@ class _Body:
     cells: Any = None
     plane: tuple[Floats, Floats] | None = None
 
-    def add(self, stage: _Stage, x: Floats, shown: Floats, span: Range, ramp: str) -> None:
+    def add(
+        self, stage: _Stage, x: Floats, shown: Floats, span: Range, ramp: str, opacity: float = 1.0
+    ) -> None:
         """Nodes at x (n, 3) mm in the colours of `shown` (n,)."""
         look = {"scalars": "value", "cmap": ramp, "clim": span, "ambient": 0.6, "diffuse": 0.45,
-                "nan_color": "#C9CED3"}  # fmt: skip
+                "nan_color": "#C9CED3", "opacity": opacity}  # fmt: skip
         surface = self.surface
         triangles = surface.every(surface.triangles).reshape(-1, 3)
         outside = _triangulated(surface.at(self.rest), triangles)
@@ -294,13 +297,15 @@ def _panels(
         method, whole = scene.methods[cell.method], plane is None or cell.by == _ERROR
         body = replace(bodies[cell.method], plane=None) if whole else bodies[cell.method]
         ramp = "viridis" if cell.less is None else "cividis"
-        body.add(stage, method.nodes + method.u()[cell.frame], v, spans[cell.scale], ramp)
+        compared = cell.less is None and cell.by in (_DISPLACEMENT, _ERROR)
+        inside = compared and method.markers is not None and method.markers.inside
+        x = method.nodes + method.u()[cell.frame]
+        body.add(stage, x, v, spans[cell.scale], ramp, _THROUGH if inside else 1.0)
         for tool in scene.tools:
             solid = _triangulated(tool.nodes + tool.shifts[cell.frame], tool.triangles)
             if plane is not None and tool.plate and not whole:
                 solid = solid.clip(normal=plane[0], origin=plane[1])
             stage.add(solid, **_TOOL)
-        compared = cell.less is None and cell.by in (_DISPLACEMENT, _ERROR)
         if compared and whole and method.markers:
             top = spans[_ERROR][1]
             _add_markers(stage, method.markers, cell.frame, scene.size, by, top)
