@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from html import escape
+from html import unescape
 from pathlib import Path
 from shutil import copytree
 from types import SimpleNamespace
@@ -305,8 +305,8 @@ def test_check_shows_every_figure_and_fails_when_one_moves(
     printed = here(*asked)[1].splitlines()
     assert printed[0] == "fluid_phantom: holds; the verdict is good enough."
     assert len(printed) <= 27  # the path of the page takes two lines here
-    page = (tmp_path / "published" / "report.html").read_text("utf-8")
-    assert all(escape(p["name"]) in page for p in found["published"])
+    page = unescape((tmp_path / "published" / "report.html").read_text("utf-8"))
+    assert all(p["name"] in page for p in found["published"])
     whole = here(*asked, "--verbose")[1]
     assert all(p["name"] in " ".join(whole.split()) for p in found["published"])
     moved = replace(phantom_result.published[0], expected=1.0)
