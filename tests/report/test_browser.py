@@ -437,6 +437,10 @@ def test_a_curve_is_saved_as_vectors_as_it_is_shown(browser: str, tmp_path: Path
     assert {"time / s", "force / N", "\u2014 a <line>", "\u2014 dots"} <= set(words)
     assert not any("hidden" in text for text in words)
     points = np.array([p.split(",") for p in drawn["polyline"][0].get("points", "").split()], float)
+    frame = next(r for r in top.iter("{http://www.w3.org/2000/svg}rect") if r.get("stroke"))
+    low = np.array([float(frame.get(name, "nan")) for name in ("x", "y")])
+    size = np.array([float(frame.get(name, "nan")) for name in ("width", "height")])
+    assert ((points >= low - 1) & (points <= low + size + 1)).all()
     slopes = np.diff(points[:, 1]) / np.diff(points[:, 0])
     assert (slopes < 0).all()  # y rises upward on paper
     assert np.ptp(slopes) == pytest.approx(0, abs=0.01)
