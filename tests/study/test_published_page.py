@@ -99,3 +99,14 @@ def test_the_page_is_no_run(tmp_path: Path, caplog: pytest.LogCaptureFixture) ->
     assert stored_runs(tmp_path) == ()
     assert list(open_store(tmp_path)) == []
     assert not caplog.messages
+
+
+def test_a_damaged_page_is_told_and_written_anew(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    write_published(tmp_path, [entry("bar", figure("drop", 1.0, 1.01))])
+    file = tmp_path / "published" / "results.json"
+    file.write_text(file.read_text("utf-8")[:40], "utf-8")
+    write_published(tmp_path, [entry("cube", figure("side", 3.0, 3.0))])
+    assert "left out" in caplog.messages[0]
+    assert [r["experiment"] for r in rows(tmp_path, "experiments")] == ["cube"]

@@ -1,6 +1,6 @@
 """Page of all printed figures: what was printed, our number, the verdict and its reason."""
 
-import json
+import logging
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from validate.checksums import read_sealed
 from validate.compare.exhibit import Exhibit, Intervals, NumberTable, TableCell
+from validate.errors import RecordingError
 from validate.report.long_table import long_table
 from validate.report.stored.folder import MARK
 from validate.report.views.numbers import with_unit
@@ -17,6 +19,7 @@ from validate.report.views.view_filling import filled
 from validate.study.loose_page import write_loose
 
 Json = dict[str, Any]
+LOG = logging.getLogger(__name__)
 FOLDER = "published"
 _ACROSS = "our number minus the printed one, over the tolerance"
 _ORDER = ("reproduced", "not reproduced", "not reproducible as printed", "not comparable")
@@ -46,7 +49,11 @@ def write_published(reports: Path, checked: Sequence[Json]) -> Path | None:
 
 def _earlier(reports: Path) -> list[Json]:
     file = reports / FOLDER / MARK
-    content = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+    try:
+        content = read_sealed(file) if file.is_file() else {}
+    except RecordingError as error:
+        LOG.warning("%s; figures of earlier checks are left out", error)
+        return []
     return list(content["experiments"]) if content.get("page") == FOLDER else []
 
 
