@@ -13,11 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import LinAlgError, cholesky, solve_triangular
+from scipy.linalg import LinAlgError, solve_triangular
+from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf
 from scipy.sparse.linalg import SuperLU, splu
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
+from validate.fem.kernels.jit_cache import compiled
 from validate.memory import free_memory, require_memory
 
 
@@ -59,7 +62,8 @@ class Fronts:
 
 @dataclass(frozen=True)
 class _Update:
-    """What eliminated unknowns leave on those at their border (b,): a matrix (b, b) to add."""
+    """What eliminated unknowns leave on those at their border (b,): the lower triangle of a matrix
+    (b, b) to add."""
 
     border: Ints
     matrix: Floats
@@ -72,14 +76,13 @@ def fronts(A: sparse.csr_array, order: Ints, stops: Ints, children: Sequence[int
     `children[i]` predecessors on the stack have left: the tree in postorder.
     """
     lower = sparse.tril(A[order][:, order]).tocsc()
-    lower.sort_indices()
     found: list[Front] = []
     stack: list[_Update] = []
-    start = 0
+    start, place = 0, np.empty(len(order), dtype=np.int64)
     for stop, below in zip(stops.tolist(), children, strict=True):
         parts = [stack.pop() for _ in range(below)]
         try:
-            front, update = _eliminated(lower, start, stop, parts)
+            front, update = _eliminated(lower, start, stop, parts, place)
         except LinAlgError:
             return None
         found.append(front)
@@ -89,24 +92,47 @@ def fronts(A: sparse.csr_array, order: Ints, stops: Ints, children: Sequence[int
 
 
 def _eliminated(
-    lower: sparse.csc_array, start: int, stop: int, parts: list[_Update]
+    lower: sparse.csc_array, start: int, stop: int, parts: list[_Update], place: Ints
 ) -> tuple[Front, _Update]:
-    """One front: assembled from the matrix and its children, its own unknowns eliminated."""
-    columns = lower[:, start:stop].tocoo()
-    borders = np.concatenate([columns.row, *(p.border for p in parts)], dtype=np.int64)
-    rows = np.union1d(np.arange(start, stop), borders)
-    F = np.zeros((len(rows), len(rows)))
-    for i, part in enumerate(parts):
-        at = np.searchsorted(rows, part.border)
-        within = np.ix_(at, at)
-        F[within] = part.matrix if i == 0 else F[within] + part.matrix  # the first meets zeros
-    F[np.searchsorted(rows, columns.row), columns.col] += columns.data
-    k = stop - start
-    L = cholesky(F[:k, :k], lower=True, check_finite=False)
-    below = solve_triangular(L, F[k:, :k].T, lower=True, check_finite=False).T
-    left = below @ below.T
-    np.subtract(F[k:, k:], left, out=left)
-    return Front(start, stop, rows[k:], L, below), _Update(rows[k:], left)
+    """One front: assembled from the matrix and its children, its own unknowns eliminated.
+
+    `place` (m,) is room for the number that each unknown has here.
+    """
+    k, of = stop - start, slice(*lower.indptr[[start, stop]])
+    rows, values = lower.indices[of], lower.data[of]
+    columns = np.repeat(np.arange(k), np.diff(lower.indptr[start : stop + 1]))
+    beyond = [p.border[np.searchsorted(p.border, stop) :] for p in parts]
+    border = np.unique(np.concatenate([rows[rows >= stop], *beyond], dtype=np.int64))
+    b = len(border)
+    place[start:stop], place[border] = np.arange(k), np.arange(k, k + b)
+    own, below, left = (np.zeros(shape, order="F") for shape in ((k, k), (b, k), (b, b)))
+    for part in parts:
+        _add(part.matrix, place[part.border], own, below, left)
+    at = place[rows]
+    inside = at < k
+    own[at[inside], columns[inside]] += values[inside]
+    below[at[~inside] - k, columns[~inside]] += values[~inside]
+    own, stopped = dpotrf(own, lower=1, clean=1, overwrite_a=1)
+    if stopped:
+        raise LinAlgError(f"pivot {start + stopped} is not positive")
+    if b:
+        below = dtrsm(1.0, own, below, side=1, lower=1, trans_a=1, overwrite_b=1)
+        left = dsyrk(-1.0, below, beta=1.0, c=left, lower=1, overwrite_c=1)
+    return Front(start, stop, border, own, below), _Update(border, left)
+
+
+@compiled()
+def _add(matrix: Floats, at: Ints, own: Floats, below: Floats, left: Floats) -> None:
+    """Add the lower triangle of a child's matrix (j, j) to a front, whose rows `at` (j,) ascend."""
+    k = len(own)
+    for j in range(len(at)):
+        for i in range(j, len(at)):
+            if at[j] >= k:
+                left[at[i] - k, at[j] - k] += matrix[i, j]
+            elif at[i] >= k:
+                below[at[i] - k, at[j]] += matrix[i, j]
+            else:
+                own[at[i], at[j]] += matrix[i, j]
 
 
 # --- Nested dissection of a mesh graph by coordinates: the elimination order that keeps fill
@@ -232,7 +258,8 @@ def require_factor(unknowns: float, dimension: int, *, indefinite: bool = False)
 
 # -------------------------------------------------------------------------------------------------
 
-FRONTAL = 3000  # unknowns from which dense fronts are faster: 0.24 s for 0.43 s at 3548
+# Unknowns from which dense fronts pay: at 3548 a factor takes 14 ms for 47, a solve 1.3 ms for 0.7.
+FRONTAL = 3000
 
 
 @dataclass(frozen=True)
