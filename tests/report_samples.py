@@ -18,7 +18,7 @@ from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.report.long_table import LongTable
-from validate.report.sections.sections import Begun, exhibits, parts
+from validate.report.sections.sections import Begun, parts
 from validate.report.stored.store import document
 from validate.report.write import table_of
 from validate.scene.material import Material
@@ -172,14 +172,16 @@ def table(result: Result) -> LongTable:
     return table_of(result, document(result, "2026-11-21T04:00:00Z"), result.name)
 
 
-def parts_of(result: Result) -> tuple[Begun | Exhibit, ...]:
-    """The parts of its report."""
-    return parts(result, table(result))
+def parts_of(result: Result) -> list[tuple[int, Begun | Exhibit]]:
+    """The parts of its report, with their places."""
+    return list(parts(result, lambda: table(result)))
 
 
 def sections_of(result: Result) -> list[Exhibit]:
     """What the report of a result shows, not drawn."""
-    return list(exhibits(result, table(result)))
+    found = [part for _, part in sorted(parts_of(result), key=lambda at: at[0])]
+    made = [part if isinstance(part, Exhibit) else part(result) for part in found]
+    return [exhibit for exhibit in made if exhibit is not None]
 
 
 def section(result: Result, anchor: str) -> Exhibit:

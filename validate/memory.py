@@ -39,8 +39,10 @@ def require_memory(needed: float, what: str) -> None:
 @cache
 def imports_stay() -> None:
     """Spares the garbage collector what is imported now, some 700 000 objects: it would walk
-    through them several times a run, and once more at the end. Once a process."""
+    through them several times a run, and once more at the end. It looks less often at the rest,
+    which is rows of tables more than circles. Once a process."""
     gc.freeze()
+    gc.set_threshold(20_000)
 
 
 def free_memory() -> int | None:

@@ -5,7 +5,7 @@ import os
 import tempfile
 from asyncio import CancelledError
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from time import sleep
@@ -67,6 +67,7 @@ def _local_cluster(count: int) -> Iterator[Any]:
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.admin.tick.interval": "1s",  # each of five event loops looks at the clock
         "distributed.worker.memory.monitor-interval": "1s",
+        "distributed.scheduler.worker-saturation": 1.0,  # none waits behind a long one
         "distributed.worker.profile.enabled": False,  # a thread that looks a hundred times a second
     }
     before = set(os.environ)
@@ -90,15 +91,15 @@ def _local_cluster(count: int) -> Iterator[Any]:
 
 
 def side_by_side(
-    client: Any, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
+    client: Any, function: Callable[[Any, Any], Any], shared: Any, items: Iterable[Any]
 ) -> Callable[[], list[Any]]:
     """Begin `function(shared, item)` of every item on all workers, each as soon as one is free."""
     (there,) = client.scatter([shared], broadcast=True, hash=False)  # a tuple would be divided
-    sent = [client.submit(function, there, item, pure=False, retries=0) for item in items]
+    sent = [(client.submit(function, there, item, pure=False, retries=0), item) for item in items]
 
     def finished() -> list[Any]:
         values = []
-        for future, item in zip(sent, items, strict=True):
+        for future, item in sent:
             try:
                 values.append(future.result())
             except (KilledWorker, *_LOST):

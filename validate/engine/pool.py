@@ -1,7 +1,7 @@
 """Pool of workers of one command: this process, local workers or a scheduler."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -85,10 +85,10 @@ class Pool:
         return self._client
 
     def beside(
-        self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
+        self, function: Callable[[Any, Any], Any], shared: Any, items: Iterable[Any]
     ) -> Callable[[], list[Any]]:
         """Begin to apply a function of a module to `shared` and each item, on local workers where
-        some have started; what it returns waits for the values, in order.
+        some have started, as `items` comes to it; what it returns waits for the values, in order.
 
         Without workers, and where one dies, an item is done in this process when it is asked for.
         Raises what the function raises.

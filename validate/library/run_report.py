@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 
 from validate.compare.result import Result
@@ -67,6 +68,7 @@ def reported_run(
         store = reports_of(experiment.path, out) / experiment.name
         if not options.quick and not any((store / CELLS).glob("*")):
             pool.begin()  # much is left to do: workers start while this process loads
+            import_module("validate.report.page.html")
         by = InStore(plain, options, store, pool)
         identify = by_cells(experiment, options, out, report, pool)
         result = compare(experiment, options, report, identify, by)

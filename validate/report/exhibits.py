@@ -4,7 +4,7 @@ Every part of a report is drawn and encoded by itself, so that workers can draw 
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -20,7 +20,6 @@ from validate.report.export.tables import write_chart, write_table
 from validate.report.scenes import gl
 from validate.report.scenes.maps import Range, drawn, legible, ranges
 
-_LONG = ("body",)  # sections that take longest to draw: begun first
 Part = Exhibit | Callable[[Any], Exhibit | None]  # a section makes its exhibit of the result
 S = TypeVar("S")
 I = TypeVar("I")
@@ -32,11 +31,11 @@ class Beside(Protocol):
     waits for the values, in the order of the items."""
 
     def __call__(
-        self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]
+        self, function: Callable[[Any, Any], Any], shared: Any, items: Iterable[Any]
     ) -> Callable[[], list[Any]]: ...
 
 
-def in_turn(function: Callable[[S, I], T], shared: S, items: Sequence[I]) -> Callable[[], list[T]]:
+def in_turn(function: Callable[[S, I], T], shared: S, items: Iterable[I]) -> Callable[[], list[T]]:
     """As `Beside`, in this process once the values are asked for."""
     return lambda: [function(shared, item) for item in items]
 
@@ -61,25 +60,31 @@ class DrawnExhibit:
 
 def draw_all(result: HasMethods, found: Iterable[Part]) -> tuple[DrawnExhibit, ...]:
     """As `drawing`, in this process."""
-    return drawing(result, found)()
+    return drawing(result, enumerate(found))()
 
 
 def drawing(
-    result: HasMethods, parts: Iterable[Part], beside: Beside = in_turn
+    result: HasMethods, parts: Iterable[tuple[int, Part]], beside: Beside = in_turn
 ) -> Callable[[], tuple[DrawnExhibit, ...]]:
-    """Begin to draw exhibits, or what sections make of the result; what it returns waits for them.
-    Maps of one scale have common colours.
+    """Begin to draw exhibits, or what sections make of the result, each as it comes with its place
+    among them; what it returns waits for them all. Maps of one scale have common colours.
 
-    Raises `ComparisonError` naming what stands twice: names become files and anchors.
+    What is returned raises `ComparisonError` naming what stands twice: names become files and
+    anchors.
     """
-    every = tuple(parts)
-    _require_distinct([p for p in every if isinstance(p, Exhibit)])
-    order = sorted(range(len(every)), key=lambda i: getattr(every[i], "anchor", "") not in _LONG)
-    begun = beside(_part, (result, gl.known()), [every[i] for i in order])
+    places: list[int] = []
+
+    def coming() -> Iterator[Part]:
+        for place, part in parts:
+            places.append(place)
+            yield part
+
+    begun = beside(_part, (result, gl.known()), coming())
 
     def finished() -> tuple[DrawnExhibit, ...]:
-        found = dict(zip(order, begun(), strict=True))
-        made = [one for i in range(len(every)) if (one := found[i]) is not None]
+        found = begun()
+        order = sorted(range(len(found)), key=places.__getitem__)
+        made = [one for i in order if (one := found[i]) is not None]
         exhibits = [one.exhibit for one in made]
         _require_distinct(exhibits)
         clear = legible(m for e in exhibits for m in e.maps)
@@ -108,8 +113,9 @@ def _part(of: tuple[HasMethods, tuple[str, ...]], part: Part) -> DrawnExhibit | 
         *map(regime_map.picture, exhibit.regimes),
     )
     first = (*map(intervals.picture, exhibit.intervals), *exhibit.pictures)
-    brought = tuple(encoded(p) for p in first)
-    return DrawnExhibit(replace(exhibit, pictures=brought), tuple(encoded(p) for p in drawings))
+    brought, files = tuple(map(encoded, first)), tuple(map(encoded, exhibit.files))
+    whole = replace(exhibit, pictures=brought, files=files)
+    return DrawnExhibit(whole, tuple(map(encoded, drawings)))
 
 
 def _map(known: tuple[str, ...], shown: tuple[NodeMap, Range]) -> Picture:

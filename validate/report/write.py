@@ -3,6 +3,8 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,9 +55,9 @@ def write_report(
 
     def fill(fresh: Path) -> None:
         write_lines(lines, fresh)
-        table = table_of(result, content, folder.name)
+        table = cache(lambda: table_of(result, content, folder.name))
         _fill(result, table, fresh, content, by, told, beside)
-        write_long_table(table, fresh)
+        write_long_table(table(), fresh)
         if vtu:
             from validate.report.export.paraview import write_series
 
@@ -97,7 +99,7 @@ def _silent(_: str) -> None:
 
 def _fill(
     result: Result,
-    table: LongTable,
+    table: Callable[[], LongTable],
     folder: Path,
     content: Json,
     made: Made,
@@ -106,23 +108,26 @@ def _fill(
 ) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import drawing, in_turn, write_files
+    from validate.report.page.body_view import body_view
     from validate.report.page.html import page
     from validate.report.replay.mcap import write_replay
     from validate.report.sections.provenance import how
-    from validate.report.sections.sections import parts
+    from validate.report.sections.sections import SECTIONS, parts
 
     for name in ("tables", "figures", "runs"):
         (folder / name).mkdir()
-    shown = drawing(result, (*parts(result, table), how(result, made)), beside or in_turn)
+    last = (len(SECTIONS), how(result, made))
+    shown = drawing(result, chain(parts(result, table), [last]), beside or in_turn)
     progress("runs")
     write_json(content, folder / MARK)
     write_fields(result, folder / "runs")
     progress("replay")
     write_replay(result, folder / "replay.mcap")
+    view = body_view(result)
     progress("figures")
     drawn = shown()
     for exhibit in drawn:
         write_files(exhibit, folder)
     progress("page")
-    text = page(result, drawn, content["created"], band(result))
+    text = page(result, drawn, content["created"], band(result), view)
     (folder / "report.html").write_text(text, "utf-8")

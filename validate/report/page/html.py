@@ -26,7 +26,6 @@ from validate.report.charts.intervals import shares
 from validate.report.charts.style import DPI
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import across, caption, shown, word_columns
-from validate.report.page.body_view import body_view
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
 from validate.report.views.numbers import duration, with_unit
@@ -83,11 +82,16 @@ class Live:
 
 
 def page(
-    result: Result, exhibits: Iterable[DrawnExhibit], created: str, band: tuple[str, str]
+    result: Result,
+    exhibits: Iterable[DrawnExhibit],
+    created: str,
+    band: tuple[str, str],
+    view: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the whole report as one HTML text that needs no other file and no request.
 
-    `band` is the colour class and the word before the result's sentence. Without scripts the page
+    `band` is the colour class and the word before the result's sentence, `view` the body that
+    turns. Without scripts the page
     shows the still pictures and every row.
     """
     colour, word = band
@@ -99,7 +103,6 @@ def page(
         {f"intervals_{i.name}": forest(i, links) for e in shown for i in e.exhibit.intervals},
     )
     body = next((p for p in first if p.name == "body"), None)
-    view = body_view(result)
     if view is not None:  # it shows what another picture of the body would
         first = [p for p in first if p is body or p.name == _CHECKS]
     own = [e.anchor for e in result.exhibits] if result.methods else []

@@ -44,6 +44,7 @@ _LINE, _BAR = 0.13, 0.44  # inches of a line of text, of the colour bars below a
 _PAGE = 9.0  # inches that a sheet may be high
 _ROOMY = 1.0  # inches of a colour bar with a number in its middle
 _LEAST = 1e-9  # what is smaller, of mm, %, Pa or of what differs, is rounding
+_AT_REST = 1e-3  # of the largest displacement: below it nothing has moved
 _DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
 _ERRORS = LinearSegmentedColormap.from_list("errors", ["#FFE0CC", PALETTE[1], "#4A1800"])
 _SIMULATED = "#FF4FD8"  # of an outline: no colour of the body
@@ -216,8 +217,11 @@ Rows = tuple[tuple[_Cell, ...], ...]
 
 
 def _rows(scene: BodyScene, coloured: Sequence[str], most: int) -> Rows:
-    """Instants of the displacement, then fields at the largest one: `most` panels in a row."""
-    frames = [(f, _DISPLACEMENT) for f in range(len(scene.labels))]
+    """Instants of the displacement but those at rest, then fields at the largest one: `most` panels
+    in a row."""
+    moved = np.abs(scene.methods[0].u()).max(axis=(1, 2))
+    there = np.flatnonzero(moved > _AT_REST * moved.max())
+    frames = [(f, _DISPLACEMENT) for f in there.tolist() or range(len(scene.labels))]
     hidden = scene.cut is not None and any(m.markers for m in scene.methods)
     at_worst = [(scene.worst, name) for name in (*[_ERROR] * hidden, *coloured)]
     if len(scene.methods) == 1:

@@ -80,30 +80,26 @@ class Begun:
         return Exhibit(self.anchor, self.title, **joined) if any(joined.values()) else None
 
 
-def parts(result: Result, table: LongTable) -> tuple[Begun | Exhibit, ...]:
-    """Return the sections, and the experiment's own exhibits and views after the compared pictures,
-    with the views that plug-ins and scripts added."""
+def parts(result: Result, table: Callable[[], LongTable]) -> Iterator[tuple[int, Begun | Exhibit]]:
+    """Yield the sections, and the experiment's own exhibits and views after the compared pictures,
+    with the views that plug-ins and scripts added; each with its place on the page.
+
+    The body takes longest to draw and comes first, before the long table is asked for.
+    """
+    order = sorted(enumerate(SECTIONS), key=lambda at: at[1].anchor != "body")
     known = {view.name: view for view in VIEWS}
-    found: list[Begun | Exhibit] = []
-    for s in SECTIONS:
+    for place, s in order:
         views = s.views if s.when(result) else ()
-        filled_ = tuple(filled(known[name], table) for name in views)
-        found.append(Begun(s.anchor, s.title, filled_, s.also))
+        filled_ = tuple(filled(known[name], table()) for name in views)
+        yield place, Begun(s.anchor, s.title, filled_, s.also)
         if s.anchor == "curves":
-            own = [filled(view, table) for view in result.views]
+            own = [filled(view, table()) for view in result.views]
             own += [
-                VIEWS.answer(v, lambda v: filled(v, table), Exhibit("", "")) for v in VIEWS.further
+                VIEWS.answer(v, lambda v: filled(v, table()), Exhibit("", ""))
+                for v in VIEWS.further
             ]
-            found += [*result.exhibits, *(e for e in own if any(getattr(e, n) for n in _LISTS))]
-    return tuple(found)
-
-
-def exhibits(result: Result, table: LongTable) -> Iterator[Exhibit]:
-    """What the parts show, where they apply."""
-    for part in parts(result, table):
-        made = part if isinstance(part, Exhibit) else part(result)
-        if made is not None:
-            yield made
+            shown = (e for e in own if any(getattr(e, n) for n in _LISTS))
+            yield from ((place, exhibit) for exhibit in (*result.exhibits, *shown))
 
 
 _LISTS = tuple(f.name for f in fields(Exhibit) if f.name not in ("anchor", "title"))
