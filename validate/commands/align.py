@@ -65,9 +65,28 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
 
     Every file is tried; where one cannot be aligned, nothing is written.
     """
-    _require_of_the_event(wanted)
+    # What only a correlation has is refused beside an event, which would not look at it
+    given = {"--within": wanted.within is not None, "--drift": wanted.straighten,
+             "--correlation": wanted.correlation != MIN_CORRELATION}  # fmt: skip
+    if wanted.event and any(given.values()):
+        said = ", ".join(name for name, is_given in given.items() if is_given)
+        raise UsageError(f"--event {wanted.event}: {said} belongs to the correlation; leave it out")
     try_file(out)
-    named = _by(files, by)
+    # What moves alike in the first file and each further one
+    if len(files) < 2:
+        raise UsageError(f"align: {len(files)} file; give at least 2")
+    if len(by) != len(files) - 1:
+        raise UsageError(
+            f"--by: {len(by)} given for {len(files) - 1} further files; give one for each, in "
+            "the order of the files"
+        )
+    for text in by:
+        if not all(map(str.strip, text.partition("="))):
+            raise UsageError(
+                f"--by {text}: expected CHANNEL=CHANNEL, a channel of the first and one of a "
+                f"further file"
+            )
+    named = [next(iter(pairs((text,), "--by").items())) for text in by]
     for file in files[1:]:
         if file.exists() and files[0].exists() and file.samefile(files[0]):
             raise UsageError(f"align: {file} is given twice; name another recording")
@@ -89,35 +108,13 @@ def align(files: Sequence[Path], out: Path, by: Sequence[str], wanted: HowAligne
     whole = together(first, found, out.stem)
     write_recording(whole, out)
     for pair, one in zip(taken, found, strict=True):
-        _drawn(pair, one.offset, out, several=len(others) > 1)
+        # The picture of both channels on one clock, beside what was written
+        own = f"-{pair.file.stem}" if len(others) > 1 else ""
+        picture = out.with_name(f"{out.stem}{own}-aligned.png")
+        drawing = aligned(pair.reference, pair.stream, pair.names, one.offset.seconds)
+        picture.write_bytes(png(drawing))
+        say(f"{picture}: both channels on one clock; check it", indent="  ")
     written(whole, out)
-
-
-def _require_of_the_event(wanted: HowAligned) -> None:
-    """What only a correlation has is refused beside an event, which would not look at it."""
-    given = {"--within": wanted.within is not None, "--drift": wanted.straighten,
-             "--correlation": wanted.correlation != MIN_CORRELATION}  # fmt: skip
-    if wanted.event and any(given.values()):
-        said = ", ".join(name for name, is_given in given.items() if is_given)
-        raise UsageError(f"--event {wanted.event}: {said} belongs to the correlation; leave it out")
-
-
-def _by(files: Sequence[Path], by: Sequence[str]) -> list[tuple[str, str]]:
-    """What moves alike in the first file and each further one."""
-    if len(files) < 2:
-        raise UsageError(f"align: {len(files)} file; give at least 2")
-    if len(by) != len(files) - 1:
-        raise UsageError(
-            f"--by: {len(by)} given for {len(files) - 1} further files; give one for each, in "
-            "the order of the files"
-        )
-    for one in by:
-        if not all(map(str.strip, one.partition("="))):
-            raise UsageError(
-                f"--by {one}: expected CHANNEL=CHANNEL, a channel of the first and one of a "
-                f"further file"
-            )
-    return [next(iter(pairs((one,), "--by").items())) for one in by]
 
 
 def _aligned(
@@ -136,7 +133,13 @@ def _aligned(
             f"{prefix}the clocks drift by {1e3 * drift.apart:.3g} ms over {drift.span:.4g} s; "
             "the offset's sd includes this drift. --drift corrects it"
         )
-    _tell_offset(pair, offset, prefix)
+    together = correlation_at(pair.reference, pair.stream, offset.seconds)
+    say(
+        f"{prefix}offset: {offset.seconds:+.6g} s, sd {offset.sd:.2g} s, by {offset.method}; "
+        f"{offset.count} samples ({100 * offset.coverage:.0f} %) lie within the first file's time; "
+        f"correlation {together:.3f}",
+        indent="  ",
+    )
     return pair, offset, drift if wanted.straighten else None
 
 
@@ -146,16 +149,6 @@ def _offset(reference: Signal, stream: Signal, wanted: HowAligned) -> Offset:
     longest = float(max(np.ptp(reference.t), np.ptp(stream.t)))
     within = wanted.within or longest
     return offset_by_correlation(reference, stream, within, wanted.coverage, wanted.correlation)
-
-
-def _tell_offset(pair: _Pair, offset: Offset, prefix: str) -> None:
-    together = correlation_at(pair.reference, pair.stream, offset.seconds)
-    say(
-        f"{prefix}offset: {offset.seconds:+.6g} s, sd {offset.sd:.2g} s, by {offset.method}; "
-        f"{offset.count} samples ({100 * offset.coverage:.0f} %) lie within the first file's time; "
-        f"correlation {together:.3f}",
-        indent="  ",
-    )
 
 
 def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
@@ -168,12 +161,3 @@ def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
         why = f"not known: half of the recording is not enough ({error})"
         say(f"{prefix}drift: {why}", indent="  ")
         return None
-
-
-def _drawn(pair: _Pair, offset: Offset, out: Path, *, several: bool) -> None:
-    """The picture of both channels on one clock, beside what was written."""
-    own = f"-{pair.file.stem}" if several else ""
-    picture = out.with_name(f"{out.stem}{own}-aligned.png")
-    drawing = aligned(pair.reference, pair.stream, pair.names, offset.seconds)
-    picture.write_bytes(png(drawing))
-    say(f"{picture}: both channels on one clock; check it", indent="  ")

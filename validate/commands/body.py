@@ -1,6 +1,5 @@
 """`validate body`: import a third-party mesh, check it and store it as npz."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,7 +40,12 @@ def body(
         try_file(out)
     found = _read(file, unit, edge, part)
     _require_size(file, found.mesh, unit, size)
-    mesh = _named(found.mesh, pairs(faces, "--face"))
+    # Facet sets by name, each where its words say
+    places = pairs(faces, "--face")
+    chosen = {
+        name: facets_of(found.mesh, place_of(words, found.mesh)) for name, words in places.items()
+    }
+    mesh = replace(found.mesh, facets={**found.mesh.facets, **chosen})
     mesh = quadratic(mesh) if curved else mesh
     say(str(file), "bold")
     table("", ["of the body", "what"], [[k, v] for k, v in {**facts(mesh), **found.told}.items()])
@@ -61,12 +65,6 @@ def body(
         told = "; ".join(f"{k} {v}" for k, v in found.told.items())
         write_mesh(mesh, out, f"{file.name}; {told}")
         say(f"{out}: {out.stat().st_size / 1e3:.0f} kB", indent="  ")
-
-
-def _named(mesh: Mesh, faces: Mapping[str, str]) -> Mesh:
-    """The mesh with facet sets by name, each where its words say."""
-    chosen = {name: facets_of(mesh, place_of(words, mesh)) for name, words in faces.items()}
-    return replace(mesh, facets={**mesh.facets, **chosen})
 
 
 def _read(file: Path, unit: str | None, edge: str | None, part: str | None) -> ForeignBody:

@@ -36,11 +36,22 @@ def calibrate(
     try_file(out)
     recording = read_recording(file)
     frames = recording.frame(topic)
-    _require_no_outlines(recording, topic)
+    # Outlines carry a pose and metres of their own, which would be those of before
+    old = [name for name, c in recording.contours.items() if c.images in ("", topic)]
+    if old:
+        raise UsageError(
+            f"outlines {old} would keep the old pose of '{topic}': calibrate first, then run "
+            "`validate outline`"
+        )
     known = {t.name: t for t in known_places(targets, unit)}
     seen = _seen(recording, frames, probe, known, points)
     found = image_plane(seen)
-    _require_plausible(found)
+    size = max(found.m_per_px)
+    if size > _LARGEST:
+        raise UsageError(
+            f"a pixel would be {1e3 * size:.4g} mm wide, above {1e3 * _LARGEST:g} mm: check the "
+            "unit of the targets"
+        )
     _told(seen, found, frames)
     frame = probe.partition("To")[0] or probe
     placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
@@ -49,25 +60,6 @@ def calibrate(
     done = replace(recording, frames=streams, metadata=metadata)
     write_recording(done, out)
     written(done, out)
-
-
-def _require_no_outlines(recording: Recording, topic: str) -> None:
-    """Outlines carry a pose and metres of their own, which would be those of before."""
-    old = [name for name, c in recording.contours.items() if c.images in ("", topic)]
-    if old:
-        raise UsageError(
-            f"outlines {old} would keep the old pose of '{topic}': calibrate first, then run "
-            "`validate outline`"
-        )
-
-
-def _require_plausible(found: ImagePlane) -> None:
-    size = max(found.m_per_px)
-    if size > _LARGEST:
-        raise UsageError(
-            f"a pixel would be {1e3 * size:.4g} mm wide, above {1e3 * _LARGEST:g} mm: check the "
-            "unit of the targets"
-        )
 
 
 def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:

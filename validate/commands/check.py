@@ -66,7 +66,13 @@ def check(
         motion = described(experiment)
         held = _document(content, declared=bool(experiment.published))
         found.append({**held, "motion": motion})
-        figures.append(_figures(experiment, content, holds=held["holds"]))
+        # What the page of printed figures shows of an experiment
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        figures.append({
+            "experiment": experiment.name, "title": experiment.title, "source": content["source"],
+            "checked": content["created"] or now, "holds": held["holds"],
+            "published": content["published"],
+        })  # fmt: skip
         if not as_json:
             _show(content, found[-1], detail)
         return bool(found[-1]["holds"])
@@ -94,15 +100,6 @@ def _writable(reports: Path, out: Path | None) -> Path | None:
         complain(f"no page of printed figures: {error}")
         return None
     return reports
-
-
-def _figures(experiment: Experiment, content: Json, *, holds: bool) -> Json:
-    """What the page of printed figures shows of an experiment."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return {
-        "experiment": experiment.name, "title": experiment.title, "source": content["source"],
-        "checked": content["created"] or now, "holds": holds, "published": content["published"],
-    }  # fmt: skip
 
 
 def _stored(experiment: Experiment, out: Path | None) -> Json | None:

@@ -53,7 +53,11 @@ def _drawn(
     """The page below `out`, else beside the first run; none, and a line, where that is closed."""
     beside = paths[0].resolve()
     beside = (beside if beside.is_dir() else beside.parent).parent
-    folder = (out or beside) / _name(found, paths, wanted)
+    # One folder for one comparison: of these runs, filtered and sorted so
+    first = found.runs[0].name.partition("+")[0]
+    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
+    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
+    folder = (out or beside) / f"compare-{first[:60]}-{mark}"
     try:
         try_results(folder, ())
     except UsageError as error:
@@ -62,14 +66,6 @@ def _drawn(
         complain(f"no charts: {error}")
         return None
     return write_comparison(found, document(found), folder)
-
-
-def _name(found: SideBySide, paths: tuple[Path, ...], wanted: Shown) -> str:
-    """One folder for one comparison: of these runs, filtered and sorted so."""
-    first = found.runs[0].name.partition("+")[0]
-    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
-    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
-    return f"compare-{first[:60]}-{mark}"
 
 
 def _show(found: SideBySide, *, everything: bool) -> None:

@@ -15,7 +15,10 @@ def show(as_json: bool) -> None:
     if as_json:
         print(json.dumps([_document(s) for s in data_sets()], ensure_ascii=False, indent=2))
         return
-    rows = [[s.name, s.title, s.licence, _size(s), _state(s)] for s in data_sets()]
+    rows = []
+    for s in data_sets():
+        size = f"{len(s.files)}, {sum(f.size for f in s.files) / 1e6:.2g} MB"
+        rows.append([s.name, s.title, s.licence, size, _state(s)])
     table("", ["name", "what", "licence", "files", "here"], rows)
     say("\n`validate data get NAME` downloads one; the licence of each applies.")
 
@@ -26,27 +29,23 @@ def get(name: str) -> None:
     if here := _where(data_set):
         say(f"{data_set.name} is already here: {relative(here / data_set.folder)}", indent="  ")
     elif data_set.brought:
-        _bring(data_set)
+        from validate.datasets.bring import bring
+
+        with progress(data_set.name) as told:
+            came = bring(data_set, told)
+        place = relative(cache_folder() / data_set.folder)
+        kept = len(data_set.brought) - len(came)
+        say(
+            f"{place}: {len(came)} files downloaded, {kept} already present; every hash is correct",
+            indent="  ",
+        )
+        if data_set.made:
+            say(f"{len(data_set.files) - len(data_set.brought)} files are not downloadable: "
+                f"{_made(data_set)}",
+                indent="  ")  # fmt: skip
     else:
         raise RecordingError(f"{data_set.name} cannot be downloaded: {_made(data_set)}")
     say(f"licence {data_set.licence}; cite: {data_set.citation} {data_set.page}", indent="  ")
-
-
-def _bring(data_set: DataSet) -> None:
-    from validate.datasets.bring import bring
-
-    with progress(data_set.name) as told:
-        came = bring(data_set, told)
-    place = relative(cache_folder() / data_set.folder)
-    kept = len(data_set.brought) - len(came)
-    say(
-        f"{place}: {len(came)} files downloaded, {kept} already present; every hash is correct",
-        indent="  ",
-    )
-    if data_set.made:
-        say(f"{len(data_set.files) - len(data_set.brought)} files are not downloadable: "
-            f"{_made(data_set)}",
-            indent="  ")  # fmt: skip
 
 
 def _made(data_set: DataSet) -> str:
@@ -75,10 +74,6 @@ def _state(data_set: DataSet) -> str:
     if not count:
         return "no" if data_set.brought else "no; not downloadable"
     return relative(place) if count == len(data_set.files) else f"{count} in {relative(place)}"
-
-
-def _size(data_set: DataSet) -> str:
-    return f"{len(data_set.files)}, {sum(f.size for f in data_set.files) / 1e6:.2g} MB"
 
 
 def _document(data_set: DataSet) -> dict[str, Any]:

@@ -188,7 +188,14 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
         "landmarks": Markers(parts[0].t[:1], found.names, found.places[None], found.sd, frame),
         "tip": Markers(t, ("tip",), x[:, None], found.sd, frame),
     }
-    done = _with(recording, how, streams, found.record)
+    named = {f"{how.tool}/{name}": stream for name, stream in streams.items()}
+    clock = recording.clock[f"{how.tool}/{TRANSLATION}"]
+    done = replace(
+        recording,
+        markers={**recording.markers, **named},
+        clock={**recording.clock, **dict.fromkeys(named, clock)},
+        metadata={**recording.metadata, f"landmarks/{how.tool}": found.record},
+    )
     write_recording(done, out)
     written(done, out)
 
@@ -291,19 +298,3 @@ def _record(how: HowDigitised, found: Digitised) -> dict[str, str]:
         "places that are no landmark": str(none),
         "pose": f"{matrix} (from the landmarks' frame to the tip's frame, m, row by row)",
     }
-
-
-def _with(
-    recording: Recording,
-    how: HowDigitised,
-    streams: Mapping[str, Markers],
-    record: Mapping[str, str],
-) -> Recording:
-    named = {f"{how.tool}/{name}": stream for name, stream in streams.items()}
-    clock = recording.clock[f"{how.tool}/{TRANSLATION}"]
-    return replace(
-        recording,
-        markers={**recording.markers, **named},
-        clock={**recording.clock, **dict.fromkeys(named, clock)},
-        metadata={**recording.metadata, f"landmarks/{how.tool}": record},
-    )

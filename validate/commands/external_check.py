@@ -4,7 +4,6 @@
 """
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -38,7 +37,11 @@ def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
             )
         )
     else:
-        _print(found)
+        head = ["scene", "solved", "quantity", "error", "exact", "unit"]
+        table("", head, [_row(row) for row in found])
+        for row in found:
+            if row.why:
+                say(f"{row.scene}: {row.why}", indent="  ")
     states = {row.state for row in found}
     return OK if "finished" in states and states <= set(_STATES) else FAILED
 
@@ -73,14 +76,6 @@ def job(
     mesh = made.document["mesh"]
     what = f"{mesh['cells']} {mesh['kind']}, {len(kept)} times"
     say(f"{folder}: job.json and mesh.vtu of {key}: {what}", indent="  ")
-
-
-def _print(found: Sequence[OffBy]) -> None:
-    head = ["scene", "solved", "quantity", "error", "exact", "unit"]
-    table("", head, [_row(row) for row in found])
-    for row in found:
-        if row.why:
-            say(f"{row.scene}: {row.why}", indent="  ")
 
 
 def _row(row: OffBy) -> list[str]:

@@ -25,9 +25,13 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
     if not all(here.values()):
         print("*: not here yet; `validate data get NAME` fetches it")
     for c in cards:
-        for text in (c.note, _hides(files[c.name])):
-            if text:
-                say(f"{relative(files[c.name])}: {text}", indent="  ")
+        # What a file of the user's stands for, when the package has one of that name
+        file = files[c.name]
+        theirs = experiment_files(shipped())
+        other = theirs.get(name_of(file), file).resolve() != file.resolve()
+        hides = "this file replaces the shipped experiment of this name" if other else ""
+        for text in filter(None, (c.note, hides)):
+            say(f"{relative(file)}: {text}", indent="  ")
 
 
 def _needs(found: Card, here: Mapping[str, bool]) -> str:
@@ -43,10 +47,3 @@ def _is_here(name: str) -> bool:
         return False
     places = searched(Path.cwd() / "experiments")
     return any(all(whole(p / found.folder / f.name, f) for f in found.files) for p in places)
-
-
-def _hides(file: Path) -> str:
-    """What a file of the user's stands for, when the package has one of that name."""
-    theirs = experiment_files(shipped())
-    other = theirs.get(name_of(file), file).resolve() != file.resolve()
-    return "this file replaces the shipped experiment of this name" if other else ""

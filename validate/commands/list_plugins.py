@@ -22,7 +22,8 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
 
 def show(as_json: bool) -> None:
     """Print every installed plug-in: kind, name, package, version and whether it is used."""
-    states = {plug_in: why for kind in _kinds() for plug_in, why in _states(kind)}
+    kinds = sorted({plug_in.kind for plug_in in plug_ins()})
+    states = {plug_in: why for kind in kinds for plug_in, why in _states(kind)}
     if as_json:
         listed = [{**asdict(plug_in), "left_out": why} for plug_in, why in states.items()]
         print(json.dumps(listed, ensure_ascii=False, indent=2))
@@ -33,10 +34,6 @@ def show(as_json: bool) -> None:
             print(line)
     else:
         print("no plug-ins are installed; docs/developers/plugins.md shows how to write one")
-
-
-def _kinds() -> list[str]:
-    return sorted({plug_in.kind for plug_in in plug_ins()})
 
 
 def _states(kind: str) -> tuple[tuple[PlugIn, str], ...]:

@@ -52,7 +52,18 @@ def run(
     start = time.time_ns()
     with scheduled(wanted=realtime):
         done = _lived(made, seconds, listen)
-    said = _members(done, made) | {"realtime": realtime}
+    # What is told, SI
+    said: dict[str, Any] = {
+        "experiment": made.experiment.name, "method": made.method, "source": done.kind,
+        "rate_hz": done.rate, "ticks": done.ticks, "missed": done.missed,
+        "answered": len(done.t), "findings": dict(sorted(done.findings.items())),
+        "force_limit": made.stepper.limit, "times": {}, "recording": None,
+    }  # fmt: skip
+    groups = {"due to force": done.late, "work": done.work,
+              "work, changes of contact": done.work[done.changed > 0]}  # fmt: skip
+    said["times"] = {k: _quantiles(v) for k, v in groups.items() if len(v)}
+    said["largest_force"] = float(np.linalg.norm(done.F, axis=1).max()) if len(done.F) else None
+    said["realtime"] = realtime
     if len(done.t):
         write_recording(written(done, made, start), file)
         said["recording"] = str(file)
@@ -74,21 +85,6 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun
         host, port = source.address
         complain(f"listens on {host} port {port} (UDP), see docs/how-to/live.md; Ctrl-C ends it")
         return live(made.stepper, source, seconds)
-
-
-def _members(done: LiveRun, made: Prepared) -> dict[str, Any]:
-    """What is told, SI."""
-    said: dict[str, Any] = {
-        "experiment": made.experiment.name, "method": made.method, "source": done.kind,
-        "rate_hz": done.rate, "ticks": done.ticks, "missed": done.missed,
-        "answered": len(done.t), "findings": dict(sorted(done.findings.items())),
-        "force_limit": made.stepper.limit, "times": {}, "recording": None,
-    }  # fmt: skip
-    groups = {"due to force": done.late, "work": done.work,
-              "work, changes of contact": done.work[done.changed > 0]}  # fmt: skip
-    said["times"] = {k: _quantiles(v) for k, v in groups.items() if len(v)}
-    said["largest_force"] = float(np.linalg.norm(done.F, axis=1).max()) if len(done.F) else None
-    return said
 
 
 def _quantiles(seconds: Floats) -> dict[str, float]:

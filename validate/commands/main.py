@@ -51,7 +51,9 @@ def main(argv: list[str] | None = None) -> None:
 
 def run(argv: list[str]) -> int:
     """The exit code of a command; known errors print one line, a bug its traceback."""
-    _tell_warnings()
+    log = logging.getLogger("validate")
+    if not any(isinstance(handler, _OneLine) for handler in log.handlers):
+        log.addHandler(_OneLine())
     try:
         given = tuple(argv)
         return int(cli.main(argv, prog_name="validate", standalone_mode=False, obj=given) or 0)
@@ -88,12 +90,6 @@ class _OneLine(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         complain(record.getMessage())
-
-
-def _tell_warnings() -> None:
-    log = logging.getLogger("validate")
-    if not any(isinstance(handler, _OneLine) for handler in log.handlers):
-        log.addHandler(_OneLine())
 
 
 def _bug() -> int:

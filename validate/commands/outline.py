@@ -36,7 +36,9 @@ def outline(
     try_file(out)
     images = topic or _only(recording)
     frames = recording.frame(images)
-    _require_free(recording, name)
+    # Outlines that this command made may be made again
+    if name in recording.streams and f"found/{name}" not in recording.metadata:
+        raise UsageError(f"{recording.name} already has a stream '{name}': choose --name OTHER")
     marks: tuple[PlaceSaid, ...] = ()
     if drawn is None:
         contours, told, marks = _found(frames, images, given)
@@ -74,12 +76,6 @@ def _only(recording: Recording) -> str:
     return next(iter(recording.frames))
 
 
-def _require_free(recording: Recording, name: str) -> None:
-    """Outlines that this command made may be made again."""
-    if name in recording.streams and f"found/{name}" not in recording.metadata:
-        raise UsageError(f"{recording.name} already has a stream '{name}': choose --name OTHER")
-
-
 def _found(
     frames: Frames, images: str, given: dict[str, Any]
 ) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
@@ -90,21 +86,6 @@ def _found(
                 given["shape"], given["bright"])  # fmt: skip
     with progress("outlines") as told:
         found = followed(frames, hint, images, told, given["confidence"])
-    _warned(found)
-    return found.contours, _told(found, hint), _marks(found, hint)
-
-
-def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
-    """What was said, a radius alone about the outline, and the other regions."""
-    first = found.contours.outlines[0].mean(axis=0)
-    said = PlaceSaid("as given", first if hint.centre is None else hint.centre, hint.radius, True)
-    others = (
-        PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
-    )
-    return (*([] if hint.centre is None and hint.radius is None else [said]), *others)
-
-
-def _warned(found: FollowedOutline) -> None:
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
@@ -116,6 +97,17 @@ def _warned(found: FollowedOutline) -> None:
     if found.without:
         i, why = next(iter(found.without.items()))
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
+    return found.contours, _told(found, hint), _marks(found, hint)
+
+
+def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
+    """What was said, a radius alone about the outline, and the other regions."""
+    first = found.contours.outlines[0].mean(axis=0)
+    said = PlaceSaid("as given", first if hint.centre is None else hint.centre, hint.radius, True)
+    others = (
+        PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
+    )
+    return (*([] if hint.centre is None and hint.radius is None else [said]), *others)
 
 
 def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:

@@ -184,17 +184,12 @@ def _row(check: Json, *, several: bool) -> list[str]:
         drawn = bar(check["value"], doubt, limit)
     else:
         drawn = bar(check["value"], 0.0, doubt) if 0 < doubt < float("inf") else ""
-    return [name, drawn, _numbers(check)]
-
-
-def _numbers(check: Json) -> str:
-    """0.102 ± 0.271 of 0.410 mm: the error, its 2 u_val and the limit in one unit."""
-    u_val, limit = check["u_val"], check["limit"]
-    doubt = None if u_val is None else 2 * u_val
+    # 0.102 ± 0.271 of 0.410 mm: the error, its 2 u_val and the limit in one unit
+    half = None if u_val is None else 2 * u_val
     factor, unit = scale(check["unit"]), shown_unit(check["unit"])
-    if unit == "Pa" and max(abs(v or 0.0) for v in (check["value"], doubt, limit)) >= 1000:
+    if unit == "Pa" and max(abs(v or 0.0) for v in (check["value"], half, limit)) >= 1000:
         factor, unit = 1e-3, "kPa"
     error = "0" if error_shown(check) == "below noise" else significant(check["value"] * factor)
-    bound = "no bound" if doubt is None else significant(doubt * factor)
+    bound = "no bound" if half is None else significant(half * factor)
     of = "" if limit is None else f" of {significant(limit * factor)}"
-    return f"{error} ± {bound}{of} {unit}".strip()
+    return [name, drawn, f"{error} ± {bound}{of} {unit}".strip()]

@@ -80,7 +80,12 @@ def filters(
         return OK
     found = done.found
     if common.detail == "full":
-        _filters_in_full(found)
+        # Every column of every ranking, as the report has them
+        for ranking in found.rankings:
+            made = ranking_table(found, ranking, "")
+            cells = [[_text(v) for v in row] for row in made.rows]
+            under = f" with {named(ranking.condition)}" if ranking.condition else ""
+            table(f"Ranking by {found.by}{under}, all columns", made.headings, cells)
     answer(_filter_passages(found, common.detail), found.done, done.page, common.detail)
     return OK
 
@@ -120,7 +125,15 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
     choice = done.found
     if not printed(done.page, common):
         if common.detail == "full":
-            _choice_in_full(choice)
+            facts = [[f.name, f.value, f.means] for f in choice.facts]
+            table("Key figures of the scene", ("quantity", "value", "suggests"), facts)
+            evidence = [[c.rung, c.evidence] for c in choice.ladder]
+            table("Evidence", ("candidate", "evidence"), evidence)
+            if choice.excluded:
+                head = ("candidate", "cell", "at least / µs", "why")
+                table("Excluded by a lower bound", head, [
+                    [e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded
+                ])  # fmt: skip
         answer(_choice_passages(choice), choice.trade.done, done.page, common.detail)
     return OK if choice.pick is not None else FAILED
 
@@ -214,15 +227,6 @@ def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
     return rows(head, cells)
 
 
-def _filters_in_full(found: FilterStudy) -> None:
-    """Every column of every ranking, as the report has them."""
-    for ranking in found.rankings:
-        made = ranking_table(found, ranking, "")
-        cells = [[_text(v) for v in row] for row in made.rows]
-        under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        table(f"Ranking by {found.by}{under}, all columns", made.headings, cells)
-
-
 def _text(entry: Entry | TableCell) -> str:
     value = plain(entry)
     if value is None:
@@ -281,16 +285,6 @@ def _choice_passages(choice: Choice) -> list[Passage]:
         Passage("Candidate methods", ladder, 4),
         sentences(choice.rejected, keep=1, most=4),
     ]
-
-
-def _choice_in_full(choice: Choice) -> None:
-    facts = [[f.name, f.value, f.means] for f in choice.facts]
-    table("Key figures of the scene", ("quantity", "value", "suggests"), facts)
-    evidence = [[c.rung, c.evidence] for c in choice.ladder]
-    table("Evidence", ("candidate", "evidence"), evidence)
-    if choice.excluded:
-        cells = [[e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded]
-        table("Excluded by a lower bound", ("candidate", "cell", "at least / µs", "why"), cells)
 
 
 def _warned(texts: Sequence[str]) -> Passage:

@@ -38,6 +38,10 @@ def swinging_trial(
         return with_law(replace(base, body=_block_mesh(size, per, element, level)), law)
 
     fine = (2, 4) if quick else (2, 4, 8)
+    along = int(np.argmax(per))
+    share = [(a, b) for a in (0.25, 0.5, 0.75) for b in (0.25, 0.5, 0.75)]
+    ends = np.array([np.insert(np.array(s), along, 1.0) for s in share])
+    axis = np.array([np.insert(np.array([0.5, 0.5]), along, s) for s in (0.25, 0.5, 0.75)])
     return Trial(
         build=build,
         size=lambda level: size[1] / level,
@@ -46,7 +50,7 @@ def swinging_trial(
         steps=steps[:2] if quick else steps,
         inputs=inputs,
         frames=frames,
-        points=_spread_points(size, int(np.argmax(per))),
+        points=np.asarray(np.vstack([ends, axis]) * np.array(size)),
         reference=("P2", 4 if quick else 6),
         best=exact_in_time,
         solvers=candidates(SwingingBody(steps, _SMALL, _MEDIUM)),
@@ -63,11 +67,3 @@ def _block_mesh(size: tuple[float, ...], per: tuple[int, ...], element: str, lev
     if element == "H8":
         return grid(size, cells)
     return quadratic(box(size, cells)) if element == "P2" else box(size, cells)
-
-
-def _spread_points(size: tuple[float, ...], along: int) -> Floats:
-    """Nine points on the free end across axis `along` and three on the axis to it."""
-    share = [(a, b) for a in (0.25, 0.5, 0.75) for b in (0.25, 0.5, 0.75)]
-    ends = np.array([np.insert(np.array(s), along, 1.0) for s in share])
-    axis = np.array([np.insert(np.array([0.5, 0.5]), along, s) for s in (0.25, 0.5, 0.75)])
-    return np.asarray(np.vstack([ends, axis]) * np.array(size))

@@ -7,7 +7,7 @@ t_1), over the distance of the halves' middles.
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,6 +59,10 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
         raise RecordingError(f"topics {twice} occur in several recordings; rename them first")
     start = min(r.t0_ns for r in recordings)
     parts = [moved(r, (r.t0_ns - start) / 1e9) for r in recordings]
+    origins = {
+        f"{i + 1}": f"{r.name}: {', '.join(r.streams)}; {r.source.path} sha256 {r.source.sha256}"
+        for i, r in enumerate(recordings)
+    }
     return Recording(
         name=name,
         source=Source(" + ".join(r.source.path for r in recordings), "", 0, "merged"),
@@ -66,7 +70,7 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
         **by_kind({k: s for r in parts for k, s in r.streams.items()}),
         clock={k: c for r in parts for k, c in r.clock.items()},
         unread={k: why for r in parts for k, why in r.unread.items()},
-        metadata={**_records(recordings), "merged": _origins(recordings)},
+        metadata={**_records(recordings), "merged": origins},
     )
 
 
@@ -83,13 +87,6 @@ def _records(recordings: Sequence[Recording]) -> dict[str, Record]:
             key = name if single else f"{name}/{origin}"
             found[key if key not in found or single else f"{key}#{i + 1}"] = record
     return found
-
-
-def _origins(recordings: Sequence[Recording]) -> Mapping[str, str]:
-    return {
-        f"{i + 1}": f"{r.name}: {', '.join(r.streams)}; {r.source.path} sha256 {r.source.sha256}"
-        for i, r in enumerate(recordings)
-    }
 
 
 # -------------------------------------------------------------------------------------------------
@@ -185,15 +182,13 @@ def together(reference: Recording, others: Sequence[Moved], name: str) -> Record
     for one in others:
         for topic in one.recording.streams:
             found = shift(found, topic, one.offset)
-    return replace(found, metadata={**found.metadata, **_drift_records(others)})
-
-
-def _drift_records(others: Sequence[Moved]) -> dict[str, dict[str, str]]:
-    found = {f"clock_drift/{one.recording.name}": one.drift for one in others if one.drift}
-    return {
-        name: {"rate": repr(drift.rate), "sd": repr(drift.sd), "about_s": repr(drift.middle)}
-        for name, drift in found.items()
-    }
+    drifts = {
+        f"clock_drift/{one.recording.name}": {
+            "rate": repr(d.rate), "sd": repr(d.sd), "about_s": repr(d.middle),
+        }
+        for one in others if (d := one.drift)
+    }  # fmt: skip
+    return replace(found, metadata={**found.metadata, **drifts})
 
 
 def require_other_topics(recordings: Sequence[Recording]) -> None:

@@ -203,20 +203,17 @@ def _unknown(path: Path) -> str:
     if size == 0:
         return "the file is empty (0 bytes); record or copy it again"
     start = head(path)
-    what = "text" if _is_text(start) else "binary data"
-    return (
-        f"unknown format ({what}, {size} bytes, begins with {start[:8].hex()}); if it is one of "
-        f"{names}, name it with --as"
-    )
-
-
-def _is_text(start: bytes) -> bool:
-    """Whether bytes are printable UTF-8, cut anywhere."""
+    # Printable UTF-8, cut anywhere
     try:
         text = start.decode("utf-8")
     except UnicodeDecodeError as error:
         text = start[: error.start].decode("utf-8") if len(start) - error.start < 4 else ""
-    return bool(text) and all(c.isprintable() or c in "\r\n\t" for c in text)
+    printable = bool(text) and all(c.isprintable() or c in "\r\n\t" for c in text)
+    what = "text" if printable else "binary data"
+    return (
+        f"unknown format ({what}, {size} bytes, begins with {start[:8].hex()}); if it is one of "
+        f"{names}, name it with --as"
+    )
 
 
 _BEGIN, _END = "<!-- {}: written by docs/format_tables.py -->", "<!-- end of {} -->"

@@ -118,8 +118,16 @@ def answered(
         else:
             found[question.key] = question.default
     if left:
-        raise UsageError(_missing(tuple(left.values())))
-    _require_known(given, found)
+        named = "; ".join(f"{q.key} ({q.text})" for q in left.values())
+        raise UsageError(
+            f"{len(left)} question{'s are' if len(left) > 1 else ' is'} open: {named}. Answer "
+            "in a terminal, or with --answers FILE; --questions prints such a file"
+        )
+    unknown = [key for key in given if key not in found]
+    if unknown:
+        raise UsageError(
+            f"no question has the key {', '.join(unknown)}; {nearest_names(unknown[0], set(found))}"
+        )
     return found
 
 
@@ -181,19 +189,3 @@ def _prompted(question: Question) -> str:
             return question.checked(str(answer))
         except UsageError as error:
             say(str(error), "yellow", "  ")
-
-
-def _missing(left: Sequence[Question]) -> str:
-    named = "; ".join(f"{q.key} ({q.text})" for q in left)
-    return (
-        f"{len(left)} question{'s are' if len(left) > 1 else ' is'} open: {named}. Answer in a "
-        "terminal, or with --answers FILE; --questions prints such a file"
-    )
-
-
-def _require_known(given: Answers, found: Answers) -> None:
-    odd = [key for key in given if key not in found]
-    if odd:
-        raise UsageError(
-            f"no question has the key {', '.join(odd)}; {nearest_names(odd[0], set(found))}"
-        )

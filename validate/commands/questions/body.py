@@ -48,7 +48,6 @@ from validate.commands.recording_summary import beside
 from validate.errors import UsageError
 from validate.pipeline.bodies.markers import AS_SEEN
 from validate.pipeline.bodies.mesh import unknowns_of
-from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cost import FEWEST_STATES, RUNS, newton_seconds, states_within
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
@@ -124,13 +123,16 @@ def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
 
 def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> list[Question]:
     by = found.get("moved.by")
+    signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N", "Pa")]
+    moving = ("markers",) if recording.markers else ()
+    released = (RELEASE,) if recording.markers else ()
     asked = [
         Question(
             "moved.by",
             f"what loads the body; {NOTED}: a place was moved, and only notes record its motion; "
             f"{RELEASE}: a place was held and let go",
             open=True,
-            choices=_movers(recording),
+            choices=(*signals, *moving, "gravity", NOTED, *released),
         )
     ]
     if by is None:
@@ -157,12 +159,6 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
                               "direction (glued, gripped); false: it slides", open=True,
                               choices=("true", "false")))  # fmt: skip
     return asked
-
-
-def _movers(recording: Recording) -> tuple[str, ...]:
-    signals = [t for t, s in recording.signals.items() if s.unit in ("m", "N", "Pa")]
-    moving = ("markers",) if recording.markers else ()
-    return (*signals, *moving, "gravity", NOTED, *((RELEASE,) if recording.markers else ()))
 
 
 def _of_the_supports(mesh: Mesh | None) -> list[Question]:
@@ -283,7 +279,14 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         maker = "touching" if pressed else "solid"
         methods = _methods(found["law"], maker, _cells(found, mesh, order))
         accepted = "solid" if found["law"] != "linear" else "linear"
-    declared = _beside(here, folder)
+    # Files as they are found from the experiment's folder
+    declared, streams = here, here.settings.seen
+    if isinstance(body := here.scene.body, MeshFile):
+        file = beside(Path(body.file), folder / "x.py")
+        declared = declared.with_scene(body=replace(body, file=file))
+    if streams.layout not in (AS_SEEN, RECORDED):
+        layout = beside(Path(streams.layout), folder / "x.py")
+        declared = declared.with_settings(seen=replace(streams, layout=layout))
     return {
         "imports": imports((declared.scene, declared.settings), {
             "validate.compare.verdict": ("Accept",),
@@ -299,17 +302,6 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
             for name in _ACCEPTED if name in _judged(found)
         ),
     }  # fmt: skip
-
-
-def _beside(here: Tree, folder: Path) -> Tree:
-    """With files as they are found from the experiment's folder."""
-    body, seen = here.scene.body, here.settings.seen
-    if isinstance(body, MeshFile):
-        here = here.with_scene(body=replace(body, file=beside(Path(body.file), folder / "x.py")))
-    if seen.layout not in (AS_SEEN, RECORDED):
-        layout = beside(Path(seen.layout), folder / "x.py")
-        here = here.with_settings(seen=replace(seen, layout=layout))
-    return here
 
 
 def _few(recording: Recording, found: Answers, mesh: Mesh | None) -> bool:

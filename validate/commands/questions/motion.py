@@ -88,7 +88,8 @@ def proposal(recording: Recording, p: Tree, folder: Path) -> Proposal:
     """Dynamic where the recorded motion has what statics would miss, against the body's first mode
     (or rings down, where its modulus is unknown)."""
     try:
-        shown = motion_of(recording, _topic(recording, p))
+        topic = p.settings.seen.markers
+        shown = motion_of(recording, topic if topic in recording.markers else None)
     except ValidateError as none:
         return Proposal(STATIC, str(none))
     first = _first(recording, p, folder) if p.scene.material.E else None
@@ -96,10 +97,6 @@ def proposal(recording: Recording, p: Tree, folder: Path) -> Proposal:
     if shown.inertia_matters(first):
         return Proposal(DYNAMIC, f"{facts}: inertia matters above {FRACTION:.2g} of it")
     return Proposal(STATIC, f"{facts}: slow enough for statics")
-
-
-def _topic(recording: Recording, p: Tree) -> str | None:
-    return p.settings.seen.markers if p.settings.seen.markers in recording.markers else None
 
 
 def _first(recording: Recording, p: Tree, folder: Path) -> float | None:

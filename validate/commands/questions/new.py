@@ -6,7 +6,7 @@ ends, never as code.
 
 import re
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from string import Template
@@ -29,7 +29,6 @@ from validate.commands.questions.kind import NewKind
 from validate.commands.questions.plates import PLATES
 from validate.commands.recording_summary import beside, channels, plain, topics
 from validate.commands.recordings import ask_back
-from validate.compare.result import Kind
 from validate.errors import SceneError, UsageError
 from validate.pipeline.run.estimate import RunEstimate, estimated
 from validate.pipeline.run.twin_record import kind_of_recordings
@@ -57,7 +56,13 @@ def new(
     What the recording does not tell is taken from the file `answers`, asked on a terminal, or left
     open; `questions` only lists it.
     """
-    path = _checked_path(name, out)
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in {*sys.stdlib_module_names, "validate"}:
+        raise UsageError(
+            f"experiment '{name}': expected a name of a-z, 0-9 and _ that no Python module has"
+        )
+    path = out or Path("experiments") / f"{name}.py"
+    if path.name != f"{name}.py":
+        raise UsageError(f"-o {path}: the file must have the experiment's name, {name}.py")
     if not questions:
         require_new((path,), (source, *((answers,) if answers else ())), force=force)
         try_folder(path, _LARGEST)
@@ -92,7 +97,10 @@ def new(
         found = coarser
     for line in kind.assumed(recording, found):
         complain(line)
-    for topic in _unused(recording, kind.used(recording, found)):
+    # The topics that the experiment leaves out; logs of repeats are in their mean and scatter
+    used = kind.used(recording, found)
+    mean = used if "repeats" in recording.metadata else ()
+    for topic in [t for t in topics(recording) if t not in used and t.split("/")[0] not in mean]:
         complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
     if expected:
@@ -111,23 +119,6 @@ def _about(expected: RunEstimate) -> str:
         f"about {float(f'{expected.seconds:.1g}'):.0f} s, "
         f"{expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} unknowns at most (estimated)"
     )
-
-
-def _unused(recording: Recording, used: Collection[str]) -> list[str]:
-    """The topics that an experiment leaves out; logs of repeats are in their mean and scatter."""
-    mean = used if "repeats" in recording.metadata else ()
-    return [t for t in topics(recording) if t not in used and t.split("/")[0] not in mean]
-
-
-def _checked_path(name: str, out: Path | None) -> Path:
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in {*sys.stdlib_module_names, "validate"}:
-        raise UsageError(
-            f"experiment '{name}': expected a name of a-z, 0-9 and _ that no Python module has"
-        )
-    path = out or Path("experiments") / f"{name}.py"
-    if path.name != f"{name}.py":
-        raise UsageError(f"-o {path}: the file must have the experiment's name, {name}.py")
-    return path
 
 
 def fitting(recording: Recording) -> tuple[NewKind, ...]:
@@ -192,6 +183,7 @@ def written(
     `folder`."""
     template = Template((Path(__file__).parent / kind.template).read_text("utf-8"))
     title = f"{plain(recording.name)}: measured against {kind.against}"
+    declared = kind_of_recordings((recording,))
     return template.substitute(
         kind.fields(recording, source, folder, found),
         name=repr(name),
@@ -199,15 +191,10 @@ def written(
         title_text=repr(title),
         source=plain(Path(source).name).replace("\\", "/").replace('"', "'"),
         source_text=repr(plain(Path(source).name)),
-        kind=_declared(kind_of_recordings((recording,))),
+        kind="" if declared == "measured" else f" kind={declared!r},",
         recording=repr(source),
         channels="\n".join(f"#   {line}".rstrip() for line in channels(recording)),
     )
-
-
-def _declared(kind: Kind) -> str:
-    """The argument that declares what the recording says that it is; none for a measured one."""
-    return "" if kind == "measured" else f" kind={kind!r},"
 
 
 def _called(name: str, path: Path) -> str:

@@ -1,8 +1,7 @@
 """Questions about images that accompany a log: visible surface and image plane."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields as attributes
-from typing import Any
 
 import numpy as np
 
@@ -73,10 +72,15 @@ def _of_the_inclusion(found: Answers) -> list[Question]:
 def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
     pose = recording.contour(found.get("outline.topic", next(iter(recording.contours)))).pose
     posed = not np.array_equal(pose, np.eye(4))
+
+    def check(text: str) -> None:
+        if text != _RECORDED:
+            with_values(Compression(), {"outline.origin": text})
+
     asked = [
         Question("outline.origin", f"position of the images' first pixel {_FRAME}, as "
                  f"-12mm,0mm,30mm; {_RECORDED}: take the recorded pose", _RECORDED if posed else "",
-                 "the recording has a pose", open=not posed, check=_path("outline.origin")),
+                 "the recording has a pose", open=not posed, check=check),
     ]  # fmt: skip
     if found.get("outline.origin", _RECORDED) not in ("", _RECORDED):
         asked += [
@@ -91,10 +95,6 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
         limit_question("contour", "distance between outlines", "m"),
         reason_question("contour"),
     ]  # fmt: skip
-
-
-def _path(path: str) -> Callable[[str], Any]:
-    return lambda text: None if text == _RECORDED else with_values(Compression(), {path: text})
 
 
 def used(recording: Recording, found: Answers) -> set[str]:

@@ -18,7 +18,6 @@ from validate.pipeline.bodies.drive import (
     zeroed_force,
 )
 from validate.pipeline.bodies.markers import (
-    BodyAt,
     compared_markers,
     leading,
     listed_names,
@@ -53,9 +52,32 @@ def place(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -> Regis
     compared: list[Observation] = []
     findings: tuple[str, ...] = ()
     if p.settings.seen.force:
-        compared.append(_force(recording, p, kind, drive, rest))
+        # Force on the moved place, against its motion
+        topic = str(p.settings.seen.force)
+        force = zeroed_force(recording, p, kind, rest + p.settings.seen.still)
+        y = np.interp(drive.t, force.t, force.y[:, 0])
+        far = int(np.abs(drive.y[:, 0]).argmax())
+        if y[far] * drive.y[far, 0] < 0 and abs(y[far]) > 5 * force.sd:
+            raise RegistrationError(
+                f"'{topic}' is {y[far]:.4g} N where '{drive.name}' is {1e3 * drive.y[far, 0]:.3g} "
+                f"mm: force and motion must have the same sign; reverse one at import, with --map "
+                f"force=COLUMN:UNIT:-"
+            )
+        compared.append(observed_force(recording, p, force, drive.t, y[:, None]))
     if p.settings.seen.markers:
-        markers, findings = _markers(recording, p, (scene.mesh, folder))
+        # All markers that move nothing themselves, from where they stood at rest
+        at = (scene.mesh, folder)
+        part = compared_markers(recording, p, at)
+        source, unseen, samples = rested(
+            recording.marker(markers_topic(recording, p)), p.settings.seen.still
+        )
+        found = since_rest(part, at[0], noise(source), samples, p.settings.seen.stands)
+        bare = [n for n in source.names if n not in (*part.names, *leading(p.scene))]
+        left = (("not visible at rest", unseen), ("not in the layout", bare))
+        findings = tuple(
+            f"markers {why} are left out: {listed_names(names)}" for why, names in left if names
+        )
+        markers = replace(found, together=_TOGETHER)
         _require_along(p, markers, kind, float(drive.y[-1, 0]))
         compared.append(markers)
     if p.settings.seen.outline:
@@ -106,41 +128,6 @@ def _instants(recording: Recording, p: Tree) -> tuple[Floats, float]:
 
 
 # --- what is compared -----------------------------------------------------------------------------
-
-
-def _force(
-    recording: Recording, p: Tree, kind: Kind, drive: SignalObservation, rest: float
-) -> SignalObservation:
-    """Force on the moved place against its motion; raises `ComparisonError` where that is none of
-    the run's, `RegistrationError` for a force that falls as the place moves."""
-    topic, t = str(p.settings.seen.force), drive.t
-    force = zeroed_force(recording, p, kind, rest + p.settings.seen.still)
-    y = np.interp(t, force.t, force.y[:, 0])
-    far = int(np.abs(drive.y[:, 0]).argmax())
-    if y[far] * drive.y[far, 0] < 0 and abs(y[far]) > 5 * force.sd:
-        raise RegistrationError(
-            f"'{topic}' is {y[far]:.4g} N where '{drive.name}' is {1e3 * drive.y[far, 0]:.3g} mm: "
-            f"force and motion must have the same sign; reverse one at import, with --map "
-            f"force=COLUMN:UNIT:-"
-        )
-    return observed_force(recording, p, force, t, y[:, None])
-
-
-def _markers(
-    recording: Recording, p: Tree, at: BodyAt
-) -> tuple[MarkerObservation, tuple[str, ...]]:
-    """All markers that move nothing themselves, from where they stood at rest."""
-    part = compared_markers(recording, p, at)
-    source, unseen, samples = rested(
-        recording.marker(markers_topic(recording, p)), p.settings.seen.still
-    )
-    found = since_rest(part, at[0], noise(source), samples, p.settings.seen.stands)
-    bare = [n for n in source.names if n not in (*part.names, *leading(p.scene))]
-    left = (("not visible at rest", unseen), ("not in the layout", bare))
-    said = tuple(
-        f"markers {why} are left out: {listed_names(names)}" for why, names in left if names
-    )
-    return replace(found, together=_TOGETHER), said
 
 
 def _require_along(p: Tree, markers: MarkerObservation, kind: Kind, amount: float) -> None:

@@ -166,7 +166,8 @@ def steps_of(p: Tree, cut: Recording) -> Floats:
         parts = max(1, int(np.ceil(interval * _PER_PERIOD * f - 1e-9)))
     else:
         parts = max(1, int(np.ceil(interval / p.settings.motion.dt - 1e-9)))
-    ends = [float(s.t[-1]) for name, s in cut.streams.items() if name in _used(p, topic)]
+    used = {mover(p.scene).name, p.settings.seen.force, p.settings.seen.outline, topic}
+    ends = [float(s.t[-1]) for name, s in cut.streams.items() if name in used]
     count = int(np.floor(min([clock[-1], *ends]) / interval + 1e-6)) * parts
     if count > _MOST:
         raise UsageError(
@@ -174,12 +175,6 @@ def steps_of(p: Tree, cut: Recording) -> Floats:
             "longer motion.dt"
         )
     return np.asarray(interval / parts * np.arange(1, count + 1), dtype=np.float64)
-
-
-def _used(p: Tree, topic: str | None) -> set[str]:
-    seen = p.settings.seen
-    names = (mover(p.scene).name, seen.force, seen.outline, topic)
-    return {str(name) for name in names if name}
 
 
 # --- registration ---------------------------------------------------------------------------------
@@ -201,7 +196,8 @@ def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -
         )
     compared: list[Observation] = []
     if p.settings.seen.force:
-        compared.append(_force(begun.recording, p, kind))
+        force = zeroed_force(begun.recording, p, kind, 0.0)
+        compared.append(observed_force(begun.recording, p, force, force.t, force.y))
     if p.settings.seen.markers:
         compared.append(moving_markers(begun, p, at))
     said, film = tuple[str, ...](), tuple[Selection, ...]()
@@ -240,12 +236,6 @@ def moving_markers(begun: Started, p: Tree, at: BodyAt) -> MarkerObservation:
     return replace(
         since, t=since.t[1:], x=since.x[1:], sd_t=float(np.hypot(since.sd_t, begun.sd_t))
     )
-
-
-def _force(cut: Recording, p: Tree, kind: Kind) -> SignalObservation:
-    """The force on the moved place, sample by sample."""
-    force = zeroed_force(cut, p, kind, 0.0)
-    return observed_force(cut, p, force, force.t, force.y)
 
 
 def _windows(

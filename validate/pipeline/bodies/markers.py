@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.errors import ComparisonError, RecordingError, RegistrationError, UsageError
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.readers import recognised
-from validate.recording.types import Contours, Markers, Recording
+from validate.recording.types import Markers, Recording
 from validate.register.clocks import clock_sd
 from validate.register.markers.displacements import noise, rested
 from validate.register.markers.fitting import MarkerFit
@@ -19,7 +19,7 @@ from validate.register.markers.measures import FEWEST
 from validate.register.markers.quality import as_declared
 from validate.register.observation import nearest_sample
 from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
-from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
+from validate.register.outlines.plane import cavity_sampler, section
 from validate.scene.mesh import Mesh
 from validate.scene.places import pose_of
 from validate.scene.scene import Scene
@@ -49,7 +49,14 @@ def observed_outline(
     if p.settings.seen.pose == "declared":
         contours = replace(contours, pose=_pose(p, p.settings.seen.origin))
     if p.settings.seen.pose == "fitted":
-        contours = replace(contours, pose=_fitted(p, contours, wall, rest))
+        # The images through the body's middle, the outline's centroid at rest on the section's
+        low, high = wall.rest.min(axis=0), wall.rest.max(axis=0)
+        pose = _pose(p, tuple(((low + high) / 2).tolist()))
+        still = contours.outlines[nearest_sample(contours.t, rest, "outlines")]
+        shown = section(wall.rest, wall.triangles, pose)
+        off = enclosed(shown)[1] - enclosed(still)[1]
+        pose[:3, 3] += pose[:3, :2] @ off
+        contours = replace(contours, pose=pose)
         at = ", ".join(f"{1e3 * x:.2f}" for x in contours.pose[:3, 3])
         said = (
             f"Images of '{topic}': their origin at ({at}) mm was fitted: the outline at rest has "
@@ -61,17 +68,6 @@ def observed_outline(
 
 def _pose(p: Tree, origin: tuple[float, ...]) -> Floats:
     return pose_of(origin, p.settings.seen.image_x, p.settings.seen.image_y)
-
-
-def _fitted(p: Tree, contours: Contours, wall: SurfaceSampler, rest: float) -> Floats:
-    """The images through the body's middle, the outline's centroid at rest on the section's."""
-    low, high = wall.rest.min(axis=0), wall.rest.max(axis=0)
-    pose = _pose(p, tuple(((low + high) / 2).tolist()))
-    still = contours.outlines[nearest_sample(contours.t, rest, "outlines")]
-    shown = section(wall.rest, wall.triangles, pose)
-    off = enclosed(shown)[1] - enclosed(still)[1]
-    pose[:3, 3] += pose[:3, :2] @ off
-    return pose
 
 
 # -------------------------------------------------------------------------------------------------
@@ -86,7 +82,19 @@ def registered(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
     topic = markers_topic(recording, p)
     markers, _, _ = rested(recording.marker(topic), p.settings.seen.still)
     if p.settings.seen.layout == AS_SEEN:
-        return _declared(recording, replace(markers, sd=noise(markers)), p, mesh)
+        # The frame they were recorded in is the body's: one marker is enough, as nothing is fitted
+        markers = replace(markers, sd=noise(markers))
+        if p.settings.seen.registration != MarkerFit():
+            raise UsageError(
+                f"seen.registration needs a fit, but seen.layout = '{AS_SEEN}' fits nothing; name "
+                f"a layout, or leave seen.registration out"
+            )
+        rest = markers.x[0]
+        return observe_markers(
+            markers, dict(zip(markers.names, rest, strict=True)), mesh, name=topic, stands=np.inf,
+            sd_t=clock_sd(recording, topic),
+            registration=as_declared(markers.names, rest, markers.sd),
+        )  # fmt: skip
     layout = layout_of(recording, p.settings.seen.layout, folder)
     kept = [i for i, n in enumerate(markers.names) if n in layout]
     if not kept:
@@ -107,21 +115,6 @@ def registered(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
     return observe_markers(
         markers, layout, mesh, how=p.settings.seen.registration, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
-    )  # fmt: skip
-
-
-def _declared(recording: Recording, markers: Markers, p: Tree, mesh: Mesh) -> MarkerObservation:
-    """Markers in the frame that they were recorded in, which is said to be the body's: one is
-    enough, as nothing is fitted. Raises `UsageError` for settings of a fit."""
-    if p.settings.seen.registration != MarkerFit():
-        raise UsageError(
-            f"seen.registration needs a fit, but seen.layout = '{AS_SEEN}' fits nothing; name a "
-            f"layout, or leave seen.registration out"
-        )
-    topic, rest = markers_topic(recording, p), markers.x[0]
-    return observe_markers(
-        markers, dict(zip(markers.names, rest, strict=True)), mesh, name=topic, stands=np.inf,
-        sd_t=clock_sd(recording, topic), registration=as_declared(markers.names, rest, markers.sd),
     )  # fmt: skip
 
 

@@ -167,25 +167,20 @@ def static_scene(recording: Recording, p: Tree, model: Changes, folder: Path) ->
     found from the `folder`."""
     E = modulus_in(p.settings.by_method, model_name(model))
     changed = changed_by(p, {**model, **({} if E is None else {"material.E": E})})
-    _require_known(recording, changed)
-    mesh = mesh_of(changed, folder)
-    at = (mesh, folder)
-    tracked = tuple(placed_points(recording, p, part, at) for part in changed.scene.tracked)
-    return replace(changed.scene, tracked=tracked).resolved(mesh)
-
-
-def _require_known(recording: Recording, p: Tree) -> None:
-    """Raises `UsageError` for what a quarter does not show, and for an indenter without motion;
-    `SceneError` for a drive that lies along no axis."""
-    part, seen = mover(p.scene), p.settings.seen
-    drive_kind(recording, p)
-    if getattr(p.scene.body, "copies", 1) > 1 and (seen.markers or seen.outline):
+    # What a quarter does not show, an indenter without motion, a drive along no axis
+    part, seen = mover(changed.scene), changed.settings.seen
+    drive_kind(recording, changed)
+    if getattr(changed.scene.body, "copies", 1) > 1 and (seen.markers or seen.outline):
         raise UsageError(
             "the body is a quarter, of which only the force can be compared; set "
             "seen.markers=none and seen.outline=none, or declare the whole body"
         )
     if isinstance(part, Drive) and sorted(np.abs(part.direction)) != [0.0, 0.0, 1.0]:
         raise SceneError(f"drive '{part.name}' along {part.direction}: expected an axis, as -z")
+    mesh = mesh_of(changed, folder)
+    at = (mesh, folder)
+    tracked = tuple(placed_points(recording, p, part, at) for part in changed.scene.tracked)
+    return replace(changed.scene, tracked=tracked).resolved(mesh)
 
 
 # --- what is uncertain ----------------------------------------------------------------------------
@@ -231,7 +226,18 @@ def _affordable(experiment: Experiment, p: Tree, folder: Path) -> Experiment:
     assert uncertainty is not None
     if p.settings.mesh.budget and pressing(p.scene) is None:
         if p.settings.seen.states * newton_seconds(finest) > MESHES:
-            uncertainty = replace(uncertainty, stand_in=_linear_of(experiment, p))
+            # The linear method of the same element, of each accepted method at large strain
+            kinds = {n: (law_of(m, p), element_of(m, p)) for n, m in experiment.methods.items()}
+            uncertainty = replace(
+                uncertainty,
+                stand_in={
+                    name: linear
+                    for name in experiment.accepted
+                    if kinds[name][0] != "linear"
+                    for linear, kind in kinds.items()
+                    if kind == ("linear", kinds[name][1])
+                },
+            )
         if (1 + len(uncertainty.inputs) + uncertainty.draws) * linear_seconds(N) > INPUTS:
             uncertainty = replace(uncertainty, draws=0)
     return replace(experiment, uncertainty=uncertainty)
@@ -282,16 +288,6 @@ def _finer_settings(
         found |= {f"methods.{n}.body.element": "quadratic" for n in own}
         found |= {"body.element": "quadratic"} if body.element == "linear" else {}
     return found
-
-
-def _linear_of(experiment: Experiment, p: Tree) -> dict[str, str]:
-    """Of each accepted method at large strain, the linear one of the same element."""
-    kinds = {n: (law_of(m, p), element_of(m, p)) for n, m in experiment.methods.items()}
-    return {
-        name: linear
-        for name in experiment.accepted if kinds[name][0] != "linear"
-        for linear, kind in kinds.items() if kind == ("linear", kinds[name][1])
-    }  # fmt: skip
 
 
 def _order_of(method: Method, p: Tree) -> int:

@@ -201,11 +201,8 @@ class _Bench:
         assert ladder is not None
         last = int(np.flatnonzero(np.isin(self.seen.t, self.cell.t[self.low]))[-1])
         return on_meshes(
-            self.p, ladder, E, lambda p: self.fit(self._whole(name, p, last + 1)).scale
+            self.p, ladder, E, lambda p: self.fit(self.forces(name, p, steps=last + 1)).scale
         )
-
-    def _whole(self, name: str, p: Tree, steps: int) -> Floats:
-        return self.forces(name, p, steps=steps)
 
     def moved(self) -> Mapping[str, _Moved]:
         """Every uncertain input but the fit's noise, by the surrogate."""

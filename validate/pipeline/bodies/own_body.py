@@ -100,7 +100,13 @@ class ExperimentBody:
     def _refines(self, p: Parameter) -> bool:
         changed = with_values(self.parameters, {p.path: _scaled(p, 2.0)})
         try:
-            return _same_body(self.scene.mesh, self._built(changed).mesh)
+            # Other nodes, the same body
+            other = self._built(changed).mesh
+            extents = np.allclose(
+                np.ptp(self.scene.mesh.nodes, axis=0), np.ptp(other.nodes, axis=0), rtol=_SAME
+            )
+            volume = np.isclose(_volume(self.scene.mesh), _volume(other), rtol=_SAME)
+            return bool(extents and volume) and len(self.scene.mesh.nodes) != len(other.nodes)
         except ValidateError:
             return False
 
@@ -165,13 +171,6 @@ def _scaled(p: Parameter, factor: float) -> str:
     if p.type.startswith("int"):
         return str(max(1, round(p.default * factor)))
     return repr(float(p.default / factor))
-
-
-def _same_body(one: Mesh, other: Mesh) -> bool:
-    """Whether the nodes are other ones and the body is the same."""
-    extents = np.allclose(np.ptp(one.nodes, axis=0), np.ptp(other.nodes, axis=0), rtol=_SAME)
-    volume = np.isclose(_volume(one), _volume(other), rtol=_SAME)
-    return bool(extents and volume) and len(one.nodes) != len(other.nodes)
 
 
 def _volume(mesh: Mesh) -> float:

@@ -101,7 +101,11 @@ def _first_order(one: Calibrated, experiment: Experiment, used: Any) -> dict[str
 
     def again(change: Callable[[Any], Any]) -> float:
         """The parameter with other parameters of the model."""
-        moved = _changed(problem, one, change).residual(x)
+        parts = tuple(
+            replace(part, parameters=change(with_free(part.parameters, one.values)))
+            for part in problem.parts
+        )
+        moved = replace(problem, parts=parts).residual(x)
         if len(moved) != len(base):
             return float("nan")
         return e.value - float(slope @ (moved - base)) / square
@@ -118,28 +122,11 @@ def _first_order(one: Calibrated, experiment: Experiment, used: Any) -> dict[str
     if declared.mesh is not None and len(problem.parts) == 1 and e.value > 0:
         here = with_free(problem.parts[0].parameters, one.values)
         try:
-            meshes = on_meshes(here, declared.mesh, e.value, _on_mesh(again))
+            meshes = on_meshes(here, declared.mesh, e.value, lambda p: again(lambda _: p))
         except ValidateError:  # a ladder of fewer than three sizes
             return found
         found["mesh"] = meshes.u * e.value
     return {name: u for name, u in found.items() if np.isfinite(u)}
-
-
-def _on_mesh(again: Callable[[Callable[[Any], Any]], float]) -> Callable[[Any], float]:
-    """The parameter on the mesh that parameters have."""
-
-    def modulus(changed: Any) -> float:
-        return again(lambda _: changed)
-
-    return modulus
-
-
-def _changed(problem: Problem, one: Calibrated, change: Callable[[Any], Any]) -> Problem:
-    parts = tuple(
-        replace(part, parameters=change(with_free(part.parameters, one.values)))
-        for part in problem.parts
-    )
-    return replace(problem, parts=parts)
 
 
 def _moves_itself(one: Calibrated, used: Any, change: Callable[[Any], Any]) -> float | None:

@@ -37,18 +37,13 @@ def asked(
     if twice:
         raise UsageError(f"--parameters: {twice[0]} is given twice; give it once")
     experiment = experiment if experiment.calibrations else _on_all(experiment, tuple(named))
-    return experiment, _shared_out(experiment, parameters, named)
-
-
-def _shared_out(experiment: Experiment, parameters: Any, named: Sequence[Free]) -> FreeOf:
-    """Every parameter to the calibration that declares it, the rest to the first one used; what
-    stands open there goes with it."""
+    # Every parameter to the calibration that declares it, the rest to the first one used
     own = [[f for f in named if f.path in c.paths] for c in experiment.calibrations]
     foreign = [f for f in named if not any(f in mine for mine in own)]
     first = next((i for i, mine in enumerate(own) if mine), 0)
     own[first] += foreign
     still = open_free(experiment, parameters)
-    return tuple(
+    return experiment, tuple(
         (*mine, *(f for f in left if f.path not in {m.path for m in mine})) if mine else ()
         for mine, left in zip(own, still, strict=True)
     )

@@ -1,6 +1,6 @@
 """Calibration as a least-squares problem: free parameters -> whitened residuals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -70,7 +70,16 @@ class Problem:
             at = ", ".join(f"{k} = {v:.6g}" for k, v in values.items())
             raise ComparisonError(f"'{name}' {ends[0].state} at {at}: {ends[0].why}")
         pairs = zip(followed.registered, followed.runs, strict=True)
-        return _named(part, [r for pair in pairs for r in residuals(*pair)])
+        # Those that calibrate
+        found = [r for pair in pairs for r in residuals(*pair)]
+        for wanted in part.on.quantities:
+            if not any(wanted in (r.quantity, r.name) for r in found):
+                there = ", ".join(dict.fromkeys(r.name for r in found)) or "none"
+                raise ComparisonError(
+                    f"{part.name}: no residual '{wanted}' for the calibration, 0 matched samples; "
+                    f"there are {', '.join(there.split(', ')[:_SHOWN])}"
+                )
+        return [r for r in found if {r.quantity, r.name} & set(part.on.quantities)]
 
 
 @dataclass(frozen=True)
@@ -89,18 +98,6 @@ class Calibrated:
         """The residuals and recordings that served, in words."""
         each = (f"{', '.join(p.on.quantities)} of {p.name}" for p in self.problem.parts)
         return " and ".join(each)
-
-
-def _named(part: Part, found: Sequence[Residual]) -> list[Residual]:
-    """Those that calibrate; every name must be one."""
-    for wanted in part.on.quantities:
-        if not any(wanted in (r.quantity, r.name) for r in found):
-            there = ", ".join(dict.fromkeys(r.name for r in found)) or "none"
-            raise ComparisonError(
-                f"{part.name}: no residual '{wanted}' for the calibration, 0 matched samples; "
-                f"there are {', '.join(there.split(', ')[:_SHOWN])}"
-            )
-    return [r for r in found if {r.quantity, r.name} & set(part.on.quantities)]
 
 
 def with_free(parameters: Any, values: Mapping[str, float]) -> Any:

@@ -1,6 +1,6 @@
 """Verdicts of the accepted methods: u_num from meshes and steps, u_input from declared inputs."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
@@ -27,7 +27,7 @@ from validate.errors import ComparisonError
 from validate.fem.assembly.locate import probe_rows
 from validate.pipeline.checks.consistency import claims_hold
 from validate.pipeline.checks.numerical_uncertainty import Refined, mesh_errors, variants
-from validate.pipeline.experiment.experiment import Change, EffectSpec, Input, Uncertainty, Variant
+from validate.pipeline.experiment.experiment import EffectSpec, Input, Uncertainty, Variant
 from validate.pipeline.run.method_run import MethodRun
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.outlines.outlines import OutlineObservation
@@ -197,20 +197,17 @@ def _joint_variants(runs: ExperimentRuns) -> list[Variant]:
 def _drawn(uncertainty: Uncertainty, row: Floats) -> Variant:
     """The surrogate with every input off by its number (inputs,) of standard uncertainties."""
     off = [z * np.array(i.off) for i, z in zip(uncertainty.inputs, row, strict=True) if i.off]
-    return Variant(
-        uncertainty.surrogate,
-        _together(uncertainty.inputs, row),
-        off=tuple(np.sum(off, axis=0).tolist()) if off else (),
-    )
 
-
-def _together(inputs: Sequence[Input], draw: Floats) -> Change:
     def change(parameters: Any) -> Any:
-        for source, z in zip(inputs, draw.tolist(), strict=True):
+        for source, z in zip(uncertainty.inputs, row.tolist(), strict=True):
             parameters = source.move(parameters, z)
         return parameters
 
-    return change
+    return Variant(
+        uncertainty.surrogate,
+        change,
+        off=tuple(np.sum(off, axis=0).tolist()) if off else (),
+    )
 
 
 def _own_doubt(mine: MethodRun) -> dict[str, list[Sensitivity]]:

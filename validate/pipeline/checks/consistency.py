@@ -9,7 +9,6 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.score import Score
 from validate.estimate.consistency import (
     Consistency,
-    Whiteness,
     chi_square_quantile,
     nees_consistency,
     nis_consistency,
@@ -148,12 +147,10 @@ def _white_rows(followed: MethodRun) -> list[tuple[Entry, ...]]:
         if (sd > 0).sum() < 3 * _LAGS:
             continue
         white = whiteness(traces[name].y, sd, _LAGS)
-        rows.append((followed.label, name.removeprefix("innovation."), *_white(white)))
+        component, lag_1 = name.removeprefix("innovation."), float(white.autocorrelation[0])
+        verdict = "yes" if white.white else "no"
+        rows.append((followed.label, component, white.p, lag_1, white.samples, verdict))
     return rows
-
-
-def _white(w: Whiteness) -> tuple[Entry, ...]:
-    return (w.p, float(w.autocorrelation[0]), w.samples, "yes" if w.white else "no")
 
 
 def _chart(followed: MethodRun) -> Chart:

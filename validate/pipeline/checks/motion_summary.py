@@ -7,7 +7,6 @@ from validate.pipeline.bodies.first_modes import assumed_density, first_frequenc
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.origins import Opened, opened
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.types import Recording
 from validate.report.sections.motion_words import motion_lines
 from validate.scene.scene import Scene
 
@@ -21,12 +20,8 @@ def described(experiment: Experiment) -> tuple[str, ...]:
         found = opened(experiment, experiment.parameters)
     except ValidateError:
         return ()
-    lines = _lines(found.recordings)
+    lines = motion_lines(found.recordings[0]) if found.recordings else ()
     return (*lines, *_modes(experiment, found)) if lines else ()
-
-
-def _lines(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
-    return motion_lines(recordings[0]) if recordings else ()
 
 
 def _modes(experiment: Experiment, found: Opened) -> tuple[str, ...]:

@@ -45,7 +45,8 @@ class Refined:
     def of(self, residual: Residual, limit: float) -> dict[str, GridConvergence | None]:
         """By part; None where fewer than two meshes or steps compare the same points."""
         immaterial = _IMMATERIAL * limit if isfinite(limit) else 0.0
-        rounding = max(_ROUNDING * _scale(residual), immaterial)
+        ends = (residual.simulated or 0.0, residual.measured or 0.0)
+        rounding = max(_ROUNDING * float(max(rms(residual.values), *np.abs(ends))), immaterial)
         return {part: self._converged(part, residual, rounding) for part in self._runs}
 
     def numerical(self, residual: Residual, limit: float = inf) -> Numerical:
@@ -66,16 +67,16 @@ class Refined:
             sizes = [mesh.size(p) for p in changed]
         else:
             own = self._nominal(part)
-            sizes = [own.until / (own.steps * v.split) for v in self._splits(name)]
+            sizes = [
+                own.until / (own.steps * v.split)
+                for v in variants(self._uncertainty, name)["time step"]
+            ]
         if len(set(sizes)) < min(2, len(sizes)):
             raise ComparisonError(
                 f"{name}, {part}: sizes {', '.join(f'{s:.3g}' for s in sizes)}; u_num needs two "
                 "different sizes; declare more mesh or step sizes"
             )
         return sizes
-
-    def _splits(self, name: str) -> list[Variant]:
-        return variants(self._uncertainty, name)["time step"]
 
     def _nominal(self, part: str) -> Varied:
         found = self._runs[part][0]
@@ -96,12 +97,9 @@ class Refined:
             meshes.add(nodes)
         if len(answers) < 2 or self._sizes[part][0] not in answers:
             return None
-        return convergence(list(answers), list(answers.values()), 0, self._formal(part), rounding)
-
-    def _formal(self, part: str) -> float:
         ladder = self._uncertainty.mesh if part == "mesh" else self._uncertainty.steps
         assert ladder is not None
-        return ladder.order
+        return convergence(list(answers), list(answers.values()), 0, ladder.order, rounding)
 
     def _words(self, part: str, found: GridConvergence | None) -> str:
         if found is None:
@@ -131,12 +129,6 @@ def _solved(runs: ExperimentRuns, variant: Variant) -> Varied | None:
         if variant == Variant(variant.method):
             raise
         return None
-
-
-def _scale(residual: Residual) -> float:
-    """The largest number behind a residual."""
-    ends = (residual.simulated or 0.0, residual.measured or 0.0)
-    return float(max(rms(residual.values), *np.abs(ends)))
 
 
 def mesh_errors(refined: Refined | None, residuals: Mapping[str, Residual]) -> dict[str, float]:

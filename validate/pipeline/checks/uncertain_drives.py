@@ -70,19 +70,15 @@ def drive_inputs(scene: AnyScene, seen: Registered) -> tuple[Input, ...]:
 def _deviations(scene: AnyScene, drive: SignalObservation, first: int) -> Iterator[Floats]:
     """Errors (columns of the drive,) of one standard deviation each, independent of each other."""
     wide = drive.y.shape[1]
-    follower = _follower(scene, first, wide)
+    # The set of nodes whose tracked points are these inputs
+    follower: Prescribed | None = None
+    if isinstance(scene, Scene):
+        own = scene.inputs[first : first + wide]
+        follower = next((p for p in scene.tracked if p.inputs == own), None)
     if follower is not None:
         yield from follower.deviations(drive.sd)
     elif drive.sd > 0:
         yield from drive.sd * np.eye(wide)
-
-
-def _follower(scene: AnyScene, first: int, wide: int) -> Prescribed | None:
-    """The set of nodes whose tracked points are these inputs."""
-    if not isinstance(scene, Scene):
-        return None
-    own = scene.inputs[first : first + wide]
-    return next((p for p in scene.tracked if p.inputs == own), None)
 
 
 def _as_it_is(parameters: Any, z: float) -> Any:

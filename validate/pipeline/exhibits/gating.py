@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series, TableCell
@@ -63,22 +62,19 @@ def doubt(f: MethodRun, name: str) -> str:
             f"the interval does not hold: NIS {nis.mean:.3g} per degree of freedom, at most "
             f"{nis.band_999.high:.3g} by chance: the model differs in kind from the truth"
         )
-    left, (other, tie) = _last(f, f"{_OF}{name}.left"), _tied(f, name)
-    if left <= LEFT:
-        return ""
-    words = f"not identifiable from these markers: {left:.2g} of the sd at the start is left"
-    return f"{words}; known only together with {other}, correlation {tie:.3f}" if other else words
-
-
-def _tied(f: MethodRun, name: str) -> tuple[str, float]:
-    """The parameter that this one moves with most, and how; none below `TIED`."""
+    # The parameter that this one moves with most, if it does
     found = [("", 0.0)]
     for trace in f.run.traces:
         pair = trace.removeprefix(_BETWEEN).split("~")
         if trace.startswith(_BETWEEN) and name in pair:
             found.append((next(p for p in pair if p != name), _last(f, trace)))
     most = max(found, key=lambda pair: abs(pair[1]))
-    return most if abs(most[1]) >= TIED else ("", 0.0)
+    other, tie = most if abs(most[1]) >= TIED else ("", 0.0)
+    left = _last(f, f"{_OF}{name}.left")
+    if left <= LEFT:
+        return ""
+    words = f"not identifiable from these markers: {left:.2g} of the sd at the start is left"
+    return f"{words}; known only together with {other}, correlation {tie:.3f}" if other else words
 
 
 def _last(f: MethodRun, trace: str) -> float:
@@ -176,19 +172,15 @@ def _rejected(f: MethodRun) -> int:
 def _gated_row(f: MethodRun, marker: str) -> tuple[Entry, ...]:
     far, t = f.run.traces[_FAR + marker].y, f.own_time
     off = far > 0
-    looks = int((_passed(f, marker) | off).sum())
+    # At which steps (nt,) a sample of the marker reached the filter
+    names = [f"innovation.{marker}.{c}.sd" for c in "xyz"]
+    found = [f.run.traces[name].y > 0 for name in names if name in f.run.traces]
+    looks = int((np.any(found, axis=0) | off).sum())
     share = _sum(f, "gate.expected") / max(_sum(f, "gate.tested"), 1.0)
     when: tuple[Entry, ...] = (None, None, None)
     if off.any():
         when = (float(t[off][0]), float(t[off][-1]), float(far.max()))
     return (f.case or "recorded", f.label, marker, looks, int(off.sum()), share * looks, *when)
-
-
-def _passed(f: MethodRun, marker: str) -> NDArray[np.bool_]:
-    """At which steps (nt,) a look of the marker reached the filter."""
-    names = [f"innovation.{marker}.{c}.sd" for c in "xyz"]
-    found = [f.run.traces[name].y > 0 for name in names if name in f.run.traces]
-    return np.asarray(np.any(found, axis=0))
 
 
 def _gated_chart(f: MethodRun) -> Chart:

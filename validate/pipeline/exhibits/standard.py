@@ -149,7 +149,9 @@ def speed_rows(experiment: Experiment, main: Mapping[str, MethodRun]) -> tuple[R
     cost = _real_time(base) if base else None
     found: list[RowBlock] = []
     for name, f in main.items():
-        factor, limit = _real_time(f), _limit(f)
+        trace = f.run.traces.get("critical_step")
+        limit = float(trace.y.min()) if trace is not None and len(trace.y) else None
+        factor = _real_time(f)
         if factor is None:
             continue
         parts = max(float(f.run.traces["updates"].y[0]), 1.0) if limit else 1.0
@@ -175,12 +177,6 @@ def _real_time(f: MethodRun) -> float | None:
 def _step(t: Floats) -> float:
     """Length s of a run's steps to times t (nt,) s: the first one starts at 0, or stays there."""
     return float(t[0]) if t[0] > 0 or len(t) < 2 else float(t[1] - t[0])
-
-
-def _limit(f: MethodRun) -> float | None:
-    """The critical step s that an explicit run watched, the least of the run."""
-    trace = f.run.traces.get("critical_step")
-    return float(trace.y.min()) if trace is not None and len(trace.y) else None
 
 
 def _maps(shown: Mapping[str, MethodRun]) -> Exhibit | None:

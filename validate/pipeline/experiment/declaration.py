@@ -25,7 +25,6 @@ from validate.former_names import new_name
 from validate.parameters import describe, has_path, nearest_names
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.experiment_kinds import DECLARED, completed, of_a_kind
-from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import follows
 from validate.pipeline.experiment.variation import ByPath, Shift, Values
 from validate.register.sensing import SENSORS
@@ -44,7 +43,10 @@ def require_paths(experiment: Experiment, file: Path) -> None:
         except ValidateError as error:
             raise UsageError(f"{file}{_line(file, what)}: {error}") from error
     for name, method in experiment.methods.items():
-        for path in _unknown(method, parameters):
+        # Paths that a method changes, or takes a value from ("as PATH")
+        scene = method.scene if isinstance(method.scene, ByPath) else ByPath({})
+        taken = (value[3:] for value in scene.values() if follows(value))
+        for path in (path for path in (*scene, *taken) if not has_path(parameters, path)):
             known = {p.path for p in describe(parameters)}
             raise UsageError(
                 f"{file}{_line(file, (path,))}: method '{name}' changes the unknown parameter "
@@ -67,13 +69,6 @@ def _changes(experiment: Experiment) -> Iterator[tuple[tuple[str, ...], Any]]:
     for change in (*cases, *effects, experiment.quick):
         if isinstance(change, Values):
             yield tuple(path for path, _ in change.by_path), change
-
-
-def _unknown(method: Method, parameters: Any) -> tuple[str, ...]:
-    """Paths that a method changes, or takes a value from ("as PATH")."""
-    scene = method.scene if isinstance(method.scene, ByPath) else ByPath({})
-    taken = (value[3:] for value in scene.values() if follows(value))
-    return tuple(path for path in (*scene, *taken) if not has_path(parameters, path))
 
 
 def _line(file: Path, paths: tuple[str, ...]) -> str:
@@ -144,9 +139,9 @@ def _encoded(value: Any, at: str) -> Any:
 
 def _object(value: Any, at: str) -> dict[str, Any]:
     """The fields that differ from their defaults, and what makes the object of them."""
-    found: dict[str, Any] = (
-        {"type": type(value).__name__} if _is_ours(type(value)) else {"like": at.lstrip(".")}
-    )
+    kind = type(value)
+    ours = classes().get(kind.__name__) is kind
+    found: dict[str, Any] = {"type": kind.__name__} if ours else {"like": at.lstrip(".")}
     declared = DECLARED if isinstance(value, Experiment) and of_a_kind(value) else None
     for f in fields(value):
         own = getattr(value, f.name)
@@ -164,10 +159,6 @@ def _is_default(f: Any, value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return bool(value.shape == default.shape and (value == default).all())
     return bool(value == default)
-
-
-def _is_ours(kind: type) -> bool:
-    return classes().get(kind.__name__) is kind
 
 
 def classes() -> Mapping[str, type]:

@@ -417,7 +417,14 @@ class Experiment:
         if scene is not None or settings is not None:
             object.__setattr__(self, "parameters", Tree(recording, scene, settings))
         self._vary(variations)
-        self._find_from(self.path.parent if self.path else Path())
+        # Mesh files of a declared body are found from the experiment's folder
+        folder = self.path.parent if self.path else Path()
+        if isinstance(self.build, Built):
+            object.__setattr__(self, "build", replace(self.build, folder=folder))
+        declared = self.uncertainty
+        if declared and declared.mesh and isinstance(declared.mesh.size, CellSize):
+            mesh = replace(declared.mesh, size=CellSize(folder))
+            object.__setattr__(self, "uncertainty", replace(declared, mesh=mesh))
         object.__setattr__(self, "methods", MappingProxyType(dict(self.methods)))
         object.__setattr__(self, "quick", change_of(self.quick))
 
@@ -462,15 +469,6 @@ class Experiment:
             several = tuple(v for v in opens if v.on == on)
             by = Calibration(next(iter(self.accepted)), several, (Calibrates(on),))
             object.__setattr__(self, "calibrations", (*self.calibrations, by))
-
-    def _find_from(self, folder: Path) -> None:
-        """Mesh files of a declared body are found from the experiment's folder."""
-        if isinstance(self.build, Built):
-            object.__setattr__(self, "build", replace(self.build, folder=folder))
-        declared = self.uncertainty
-        if declared and declared.mesh and isinstance(declared.mesh.size, CellSize):
-            mesh = replace(declared.mesh, size=CellSize(folder))
-            object.__setattr__(self, "uncertainty", replace(declared, mesh=mesh))
 
     @property
     def complete(self) -> bool:

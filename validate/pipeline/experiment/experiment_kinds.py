@@ -27,12 +27,8 @@ def kinds() -> Mapping[type, Callable[..., Experiment]]:
     return MappingProxyType({
         MeasuredBody: measured_body,
         Compression: compression,
-        InclusionTest: _without_folder(inclusion_test),
+        InclusionTest: lambda *, folder, **given: inclusion_test(**given),
     })  # fmt: skip
-
-
-def _without_folder(make: Callable[..., Experiment]) -> Callable[..., Experiment]:
-    return lambda *, folder, **given: make(**given)
 
 
 def of_a_kind(experiment: Experiment) -> bool:

@@ -40,7 +40,13 @@ def with_simulators(experiment: Experiment, commands: Sequence[str]) -> Experime
     accepted = next(iter(experiment.accepted), next(iter(methods), ""))
     for command in commands:
         words(command)
-        methods[_named(command, methods)] = _as(methods, accepted, command)
+        # A free name after the script: `felupe` for `python felupe_simulator.py`
+        stems = [Path(word).stem for word in shlex.split(command) if not word.startswith("-")]
+        last = next((s for s in stems[1:] if s), stems[0])
+        name = re.sub(r"\W+", "_", _SUFFIX.sub("", last)) or "external"
+        while name in methods:
+            name += "_2"
+        methods[name] = _as(methods, accepted, command)
     return replace(experiment, methods=methods) if commands else experiment
 
 
@@ -54,13 +60,3 @@ def _as(methods: dict[str, Method], accepted: str, command: str) -> Method:
     moving = handles is not None and handles.inertia
     settings = ExternalSimulator(command, inertia=moving, levels=0 if moving else _LEVELS)
     return replace(like, label=label, settings=settings, markers=(), steps=None, chosen="")
-
-
-def _named(command: str, taken: dict[str, Method]) -> str:
-    """Return a free name after the script: `felupe` for `python felupe_simulator.py`."""
-    stems = [Path(word).stem for word in shlex.split(command) if not word.startswith("-")]
-    last = next((s for s in stems[1:] if s), stems[0])
-    name = re.sub(r"\W+", "_", _SUFFIX.sub("", last)) or "external"
-    while name in taken:
-        name += "_2"
-    return name

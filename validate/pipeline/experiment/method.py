@@ -75,9 +75,7 @@ class Method:
         Raises `UsageError` where a user set one of these to something else: a value that is neither
         the experiment's, nor the default, nor that of the method as `declared`.
         """
-        return replace(self.settings, **self._taken(given, declared or Method()))
-
-    def _taken(self, given: Mapping[str, Any], declared: "Method") -> dict[str, Any]:
+        declared = declared or Method()
         defaults = {f.name: f.default for f in fields(self.settings)}
         mine = {k: v for k, v in given.items() if k in defaults}
         if "dt" in mine:
@@ -90,4 +88,4 @@ class Method:
                     f"{name} = {own} of '{self.label}': the experiment sets {value}; change the "
                     f"experiment's parameter"
                 )
-        return mine
+        return replace(self.settings, **mine)

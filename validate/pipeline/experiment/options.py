@@ -49,19 +49,15 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     picked = {name: methods[name] for name in chosen}
     given = with_values(parameters, mine)
-    _require_read(mine, picked)
-    return given, picked
-
-
-def _require_read(values: Mapping[str, str], methods: Mapping[str, Method]) -> None:
-    """Raises `UsageError` for a value of the scene that every method replaces by its own."""
-    for path, text in values.items():
-        own = [_changed(m).get(path) for m in methods.values()]
+    # A value of the scene that every method replaces by its own is not read
+    for path, text in mine.items():
+        own = [_changed(m).get(path) for m in picked.values()]
         read = (v is None or str(v) == text or str(v)[:2] in ("x ", "+ ", "- ") for v in own)
         if own and not any(read):
             followed = sorted({str(v)[3:] for v in own if str(v).startswith("as ")})
             instead = ", ".join((*followed, *(() if followed else (f"methods.NAME.{path}",))))
             raise UsageError(f"{path}: every method has a value of its own; set {instead}")
+    return given, picked
 
 
 def chosen_cases(experiment: Experiment, options: Options) -> tuple[Case, ...]:

@@ -36,37 +36,31 @@ def opened(experiment: Experiment, parameters: Any) -> Opened:
     Raises `UsageError` for what neither they nor the user say, with the line of the file.
     """
     recordings = experiment.load(parameters, folder_of(experiment))
-    stated = _common([experiment.stated(r) for r in recordings])
+    # What all recordings say alike
+    each = [experiment.stated(r) for r in recordings]
+    first = each[0] if each else {}
+    stated = {k: v for k, v in first.items() if all(same(o.get(k), v) for o in each)}
     taken = tuple(p.path for p in describe(parameters) if p.default is None and p.path in stated)
     filled = with_values(parameters, {path: repr(stated[path]) for path in taken})
     missing = tuple(p for p in describe(filled) if p.missing)
     if missing:
-        raise UsageError(_asked(experiment, missing))
+        file = experiment.path or Path(experiment.name)
+        tree = ast.parse(file.read_text("utf-8"))
+        named = "; ".join(
+            f"{os.path.relpath(file)}:{_line(tree, p.path)}: {p.path} ({p.unit}) is not set"
+            for p in missing
+        )
+        sets = " ".join(f"--set {p.path}=VALUE" for p in missing)
+        raise UsageError(
+            f"{named}. The recording does not contain it: measure it and write it there, or "
+            f"pass {sets}"
+        )
     return Opened(recordings, filled, stated, taken)
-
-
-def _common(stated: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """What all recordings say alike."""
-    first = stated[0] if stated else {}
-    return {k: v for k, v in first.items() if all(same(o.get(k), v) for o in stated)}
 
 
 def same(value: Any, stated: float) -> bool:
     """Return whether a value is the recording's, as it is written into a file."""
     return isinstance(value, int | float) and math.isclose(value, stated, rel_tol=_WRITTEN)
-
-
-def _asked(experiment: Experiment, missing: Sequence[Parameter]) -> str:
-    path = experiment.path or Path(experiment.name)
-    tree = ast.parse(path.read_text("utf-8"))
-    named = "; ".join(
-        f"{os.path.relpath(path)}:{_line(tree, p.path)}: {p.path} ({p.unit}) is not set"
-        for p in missing
-    )
-    sets = " ".join(f"--set {p.path}=VALUE" for p in missing)
-    return (
-        f"{named}. The recording does not contain it: measure it and write it there, or pass {sets}"
-    )
 
 
 def _line(tree: ast.AST, parameter: str) -> int:

@@ -112,7 +112,10 @@ class Shift:
         """One standard uncertainty of this value of a path, in its SI unit."""
         kind, amount, _ = _parts(self.rule, path)
         unit = value_at(parameters, path)[1]
-        size = _amount(parameters, amount, path, "1" if kind == "relative" else unit)
+        if split(amount) is None:  # the value of the parameter that is named
+            size = float(value_at(parameters, amount)[0] or 0.0)
+        else:
+            size = _number(amount, path, "1" if kind == "relative" else unit)
         return size * abs(value) if kind == "relative" else size
 
     def _moved(self, parameters: Any, path: str, z: float) -> Any:
@@ -139,13 +142,6 @@ def _parts(rule: str, path: str) -> tuple[str, str, tuple[str, ...]]:
     if kind not in ("relative", "absolute") or not amount:
         raise UsageError(f"{path}: rule '{rule}': expected for example {_RULES}")
     return kind, amount, tuple(bounds)
-
-
-def _amount(parameters: Any, text: str, path: str, unit: str) -> float:
-    """A number with its unit, or the value of the parameter that is named."""
-    if split(text) is not None:
-        return _number(text, path, unit)
-    return float(value_at(parameters, text)[0] or 0.0)
 
 
 def _number(text: str, path: str, unit: str) -> float:

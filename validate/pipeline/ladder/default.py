@@ -20,7 +20,6 @@ from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.ladder.ladder import (
     LARGEST,
     QUALITY,
-    LawPair,
     Rival,
     StabilityBody,
     Trial,
@@ -109,7 +108,19 @@ def _trial(own: ExperimentBody, quick: bool) -> Trial:
     meshes, reference = _meshes(own, _QUICK_UNKNOWNS if quick else _UNKNOWNS, quick)
     loading = _loading(own)
     dt, frames = _steps_and_frames(loading, quick)
-    solvers, pair = _solvers(own, meshes, dt, loading)
+    # All that handle the scene, and what its law costs on the coarsest mesh
+    levels = next(iter(meshes.values()))
+    element, coarse, medium = list(meshes)[-1], levels[0], levels[len(levels) // 2]
+    own_law = own.scene.material.law
+    law: LawName = "neo_hooke" if own_law == "linear" else own_law
+    if loading.dynamic:
+        pair = swinging_pair(element, coarse, dt[0], law)
+        every = candidates(SwingingBody(dt, coarse, medium, law))
+    else:
+        cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
+        pair = still_pair(element, coarse, dt[0], cavities, law)
+        every = candidates(StillBody(cavities, dt[0], table, medium, coarse, law))
+    solvers = tuple(s for s in every if _handles(s, dt[0], own.scene))
 
     def build(element: str, level: int, law: LawName) -> Scene:
         return with_law(of_element(own.at(level), element), law)
@@ -241,27 +252,6 @@ def _steps_and_frames(loading: _Loading, quick: bool) -> tuple[tuple[float, ...]
     return ((2 * dt, dt) if quick else (2 * dt, dt, dt / 2)), frames
 
 
-def _solvers(
-    own: ExperimentBody,
-    meshes: Mapping[str, tuple[int, ...]],
-    steps: tuple[float, ...],
-    loading: _Loading,
-) -> tuple[tuple[Rival, ...], LawPair]:
-    """All that handle the scene, and what its law costs on the coarsest mesh."""
-    levels = next(iter(meshes.values()))
-    element, coarse, medium = list(meshes)[-1], levels[0], levels[len(levels) // 2]
-    own_law = own.scene.material.law
-    law: LawName = "neo_hooke" if own_law == "linear" else own_law
-    if loading.dynamic:
-        pair = swinging_pair(element, coarse, steps[0], law)
-        every = candidates(SwingingBody(steps, coarse, medium, law))
-    else:
-        cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
-        pair = still_pair(element, coarse, steps[0], cavities, law)
-        every = candidates(StillBody(cavities, steps[0], table, medium, coarse, law))
-    return tuple(s for s in every if _handles(s, steps[0], own.scene)), pair
-
-
 def _handles(solver: Rival, dt: float, scene: Scene) -> bool:
     scheme, body = solver.make(dt), with_law(scene, solver.law)
     if isinstance(scheme, CentralDifference) and scheme.precision == "single":
@@ -282,16 +272,12 @@ def _points(
     if not len(points):
         raise SceneError("the meshes have no common point; declare a ladder in the experiment")
     probes = [np.array(p.point)[None] for p in own.scene.probes]
-    return np.vstack([*probes, _spread(points)])
-
-
-def _spread(points: Floats) -> Floats:
-    """At most `_POINTS` of them, each the furthest from those before."""
+    # At most `_POINTS` of them, each the furthest from those before
     picked = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     while len(picked) < min(_POINTS, len(points)):
         away = np.linalg.norm(points[:, None] - points[picked], axis=2).min(axis=1)
         picked.append(int(np.argmax(away)))
-    return points[picked]
+    return np.vstack([*probes, points[picked]])
 
 
 # --- stability ------------------------------------------------------------------------------------

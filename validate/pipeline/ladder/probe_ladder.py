@@ -99,7 +99,13 @@ def touched_ladder(own: ExperimentBody, coarsest: int) -> TouchedLadder | None:
     wholes = [s for s in found.values() if isinstance(s, AsyncRegions)]
     if not wholes:
         return None
-    pad = max(wholes[0].pad, _MORE * _spacing(own.at(coarsest)))
+    # From the touched node to the nearest other one of its surface, m
+    scene = own.at(coarsest)
+    tool = scene.tools[0]
+    places = scene.mesh.nodes[nodes_of(scene.mesh, tool.facets)]
+    away = np.linalg.norm(places - np.array(tool.tip), axis=1)
+    others = np.linalg.norm(places - places[int(np.argmin(away))], axis=1)
+    pad = max(wholes[0].pad, _MORE * float(np.partition(others, 1)[1]))
     rivals = (_rival(label, replace(s, pad=pad)) for label, s in found.items())
     whole = replace(wholes[0], layers=(), rates=(), solvers=wholes[0].solvers[:1], pad=pad)
     return TouchedLadder(whole, tuple(rivals))
@@ -119,12 +125,3 @@ def _rung(settings: Any) -> tuple[Rung, bool]:
     if isinstance(settings, TouchedKrylov):
         return "modal", False
     return ("regions", True) if settings.layers else ("prefactored", False)
-
-
-def _spacing(scene: Scene) -> float:
-    """From the touched node to the nearest other one of its surface, m."""
-    tool = scene.tools[0]
-    places = scene.mesh.nodes[nodes_of(scene.mesh, tool.facets)]
-    away = np.linalg.norm(places - np.array(tool.tip), axis=1)
-    others = np.linalg.norm(places - places[int(np.argmin(away))], axis=1)
-    return float(np.partition(others, 1)[1])

@@ -127,15 +127,6 @@ def _behind() -> int:
     return os.sched_get_priority_min(os.SCHED_FIFO)
 
 
-def _first_too(threads: tuple[int, ...]) -> None:
-    """The stepper's own threads behind the loop and before all others, where the loop is first."""
-    if not (threads and hasattr(os, "sched_getscheduler")):
-        return
-    if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO:
-        for thread in threads:
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_behind()))
-
-
 def live(
     stepper: HandStepper,
     source: Places,
@@ -145,7 +136,11 @@ def live(
 ) -> LiveRun:
     """Run until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
-    _first_too(stepper.threads)
+    # The stepper's own threads behind the loop and before all others, where the loop is first
+    if stepper.threads and hasattr(os, "sched_getscheduler"):
+        first = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO
+        for thread in stepper.threads if first else ():
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_behind()))
     kept, skipped = _Ticked(), 0
     with quiet():
         try:
@@ -200,7 +195,11 @@ class _Model:
     def tick(self, t: float, x: Floats | None) -> float:
         """The force at t s with the tip at x (d,) m; 1 where the contact changed."""
         if x is None:
-            self._fade(t)
+            # Held for a moment, then less and less, then nothing
+            self.kept.counts["ticks without a new place"] += 1
+            share = (self._since + _ZERO - t) / (_ZERO - _HELD)
+            self.force = self._given * min(max(share, 0.0), 1.0)
+            self.flags = (self.flags & (CONTACT | LIMITED)) | (FADED if share < 1 else 0)
             return 0.0
         state = self.stepper.step(self.state, x - self.rest)
         if state.failure:
@@ -217,10 +216,3 @@ class _Model:
         self.kept.counts["force limited"] += limited
         self.kept.places.append((t, x, self.force))
         return numbers[f"{name}.changed"]
-
-    def _fade(self, t: float) -> None:
-        """Held for a moment, then less and less, then nothing."""
-        self.kept.counts["ticks without a new place"] += 1
-        share = (self._since + _ZERO - t) / (_ZERO - _HELD)
-        self.force = self._given * min(max(share, 0.0), 1.0)
-        self.flags = (self.flags & (CONTACT | LIMITED)) | (FADED if share < 1 else 0)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -47,16 +48,11 @@ def recorded_sides(recording: Recording) -> dict[str, float]:
 
 def _record(recording: Recording) -> dict[str, float]:
     """The numbers above zero of the record `specimen`."""
-    said = {k: _above_zero(v) for k, v in recording.metadata.get("specimen", {}).items()}
-    return {k: v for k, v in said.items() if v is not None}
-
-
-def _above_zero(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and value > 0 else None
+    numbers = {}
+    for key, text in recording.metadata.get("specimen", {}).items():
+        with suppress(ValueError):
+            numbers[key] = float(text)
+    return {k: v for k, v in numbers.items() if math.isfinite(v) and v > 0}
 
 
 @dataclass(frozen=True)

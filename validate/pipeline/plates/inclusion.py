@@ -155,16 +155,16 @@ def inclusion_test(
 ) -> Experiment:
     """Return the experiment; inputs are varied with the first method of linear elements (none: the
     last), which is cheap."""
-    cheap = [n for n, m in methods.items() if _linear(parameters, m)]
+    cheap = [
+        n
+        for n, m in methods.items()
+        if bool(changed_by(parameters, m.scene or {}).scene.body.element == "linear")
+    ]
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, load,
         place=_place, kind=kind, variations=(MESHES, *INPUTS),
         uncertainty=Uncertainty(surrogate=(*cheap, *reversed(list(methods)))[0]),
     )  # fmt: skip
-
-
-def _linear(tree: Tree, method: Method) -> bool:
-    return bool(changed_by(tree, method.scene or {}).scene.body.element == "linear")
 
 
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
@@ -203,7 +203,9 @@ def placed(
     stage = driving(recording, streams.stage, "m")
     signals = []
     for topic in streams.signals:
-        unit = _unit(recording, topic)
+        # Where the unit is absent or of another kind, the one to be asked for
+        found = recording.signals.get(topic)
+        unit = found.unit if found is not None and found.unit in _TRACES else "N"
         name, trace = _TRACES[unit]
         signals.append(validating(recording, topic, unit, quantity=name, trace=trace))
         require_rising(stage, signals[-1])
@@ -220,12 +222,6 @@ def placed(
     said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
     said = (*said, *_misplaced(measured, inclusion(recording, tree)))
     return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
-
-
-def _unit(recording: Recording, topic: str) -> str:
-    """The unit of a signal; where it is absent or of another kind, the one to be asked for."""
-    found = recording.signals.get(topic)
-    return found.unit if found is not None and found.unit in _TRACES else "N"
 
 
 def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:

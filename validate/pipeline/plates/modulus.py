@@ -49,7 +49,6 @@ from validate.pipeline.plates.scene import (
 from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import Cylinder
-from validate.scene.scene import Scene
 
 _UNIT = 1e3  # Pa
 _STEPS = 20  # of the curve to the strain limit, as the run's own table has them
@@ -111,7 +110,7 @@ def identify_pressed(
     first = next((n for n in accepted if n in methods), next(iter(methods)))
     order = (first, *(n for n in methods if n != first))
     given = settings.E_bonded is not None
-    wanted = [n for n in order if not _has_modulus(methods[n])
+    wanted = [n for n in order if "material.E" not in (methods[n].scene or {})
               and not (given and ends_of(own[n]) == "bonded")] or [first]  # fmt: skip
     found: dict[str, _Fitting] = {}
     for name in wanted:
@@ -120,7 +119,13 @@ def identify_pressed(
         if same is None:
             found[name] = one
         else:
-            _require_alike(one, same)
+            # Methods of one model have one modulus
+            a, b = (f.changed.scene.material for f in (one, same))
+            if a != b:
+                raise UsageError(
+                    f"methods.{one.name}: another material than {same.name}, of the same model "
+                    f"({one.model}), whose modulus is identified; set methods.{one.name}.material.E"
+                )
     entries = tuple((f.model, f.E, f.toe) for f in found.values())
     bonded = next((f.E for f in found.values() if f.ends == "bonded"), None)
     fitted = replace(
@@ -132,24 +137,14 @@ def identify_pressed(
     values = tuple(b.value(first=n == first) for n, b in budgets.items())
     rest = tuple(_of_rival(n, f) for n, f in found.items() if n not in judged)
     notes = [f"{sentence(v)}." for v in values] + [f"{line}." for line in rest]
+    ratios = tuple(
+        {b.f.model: b.meshes.ratios[i] for b in budgets.values() if i < len(b.meshes.ratios)}
+        for i in range(len(ladder.levels))
+    )
     return Identified(
         fitted, (), tuple(notes), calibrated=("force@fit",), values=values,
-        inputs=_inputs(budgets, declared), mesh=_ladder(ladder, budgets),
+        inputs=_inputs(budgets, declared), mesh=reidentified(ladder, ratios),
     )  # fmt: skip
-
-
-def _require_alike(one: "_Fitting", same: "_Fitting") -> None:
-    """Raises `UsageError` for methods of one model whose materials differ: it has one modulus."""
-    a, b = (f.changed.scene.material for f in (one, same))
-    if a != b:
-        raise UsageError(
-            f"methods.{one.name}: another material than {same.name}, of the same model "
-            f"({one.model}), whose modulus is identified; set methods.{one.name}.material.E"
-        )
-
-
-def _has_modulus(method: Method) -> bool:
-    return "material.E" in (method.scene or {})
 
 
 def _log(recording: Recording, tree: Tree, folder: Path) -> _Log:
@@ -217,7 +212,7 @@ class _Fitting:
         reach = _BEYOND * limit * height + abs(self.log.fit.toe) * height
         if law == "linear":
             # One solution: displacement and force are in proportion.
-            unit = _stiffness(built)
+            unit = float(responses(build_system(built)).reactions[0, 0])
             return UnitCurve(np.array([0.0, reach]), np.array([0.0, unit * reach]), E)
         step = self.p.limit * height / _STEPS
         grid: Floats = step * np.arange(np.ceil(reach / step) + 1.0)
@@ -232,11 +227,6 @@ class _Fitting:
         return fit.scale * curve(self.log.d[beyond] - fit.shift)
 
 
-def _stiffness(scene: Scene) -> float:
-    """Force N of 1 m of the linear law."""
-    return float(responses(build_system(scene)).reactions[0, 0])
-
-
 class _Budget:
     """What one standard uncertainty of every input makes of a method's modulus."""
 
@@ -244,7 +234,16 @@ class _Budget:
         self.f, p = f, f.p
         fit, E = f.fit, f.E
         self._own = self._linear_stiffness(f.tree)
-        self.meshes = on_meshes(f.tree, self._cheapest(ladder), E, self._on_mesh)
+        # Without the finest level where every mesh has the exact, uniform solution
+        f = self.f
+        fewer = replace(ladder, levels=ladder.levels[:2])
+        sizes = {ladder.size(f.tree), *(ladder.size(change(f.tree)) for change in fewer.levels)}
+        self.meshes = on_meshes(
+            f.tree,
+            fewer if f.linear and self._uniform and len(sizes) == 3 else ladder,
+            E,
+            self._on_mesh,
+        )
         zero = f.fitted(f.curve, f.log.offset_sd)
         coarse = f.curve.coarser
         step = abs(f.fitted(coarse).scale - E) / 3 if coarse is not None else 0.0
@@ -279,10 +278,14 @@ class _Budget:
             found[name] = f.curve.scaled(gain * along, along)
         held = self._stiffer(tree, _OTHER[f.ends])
         found["friction"] = f.curve.scaled(1 + r.friction * (held - 1))
-        nu = _less_compressible(tree)
+        # Moved up by one standard uncertainty, or down where that ends at .5
+        nu, off = tree.scene.material.nu, tree.settings.ranges.nu
+        moved = tree.given({"material.nu": nu + off if nu + off < 0.4999 else nu - off})
         if not (f.linear and self._uniform):
             found["Poisson ratio"] = (
-                f.curve.scaled(self._stiffer(nu)) if f.linear else f.curve_of(nu, f.E, f.p.limit)
+                f.curve.scaled(self._stiffer(moved))
+                if f.linear
+                else f.curve_of(moved, f.E, f.p.limit)
             )
         return found
 
@@ -303,13 +306,6 @@ class _Budget:
         f = self.f
         found = f.curve_of(tree, _UNIT, f.p.fit_to, law="linear", ends=ends)
         return float(found.force[-1] / found.d[-1])
-
-    def _cheapest(self, ladder: MeshLadder) -> MeshLadder:
-        """Without its finest level where every mesh has the exact, uniform solution."""
-        f = self.f
-        fewer = replace(ladder, levels=ladder.levels[:2])
-        sizes = {ladder.size(f.tree), *(ladder.size(change(f.tree)) for change in fewer.levels)}
-        return fewer if f.linear and self._uniform and len(sizes) == 3 else ladder
 
     def value(self, *, first: bool) -> IdentifiedValue:
         f, p = self.f, self.f.p
@@ -353,12 +349,6 @@ def _larger(tree: Tree, path: str, size: float) -> Tree | None:
     return tree.given({path: size}) if isinstance(tree.scene.body, Cylinder) else None
 
 
-def _less_compressible(tree: Tree) -> Tree:
-    """The Poisson ratio moved by one standard uncertainty: up, or down where that ends at .5."""
-    nu, off = tree.scene.material.nu, tree.settings.ranges.nu
-    return tree.given({"material.nu": nu + off if nu + off < 0.4999 else nu - off})
-
-
 # --- what identification leaves uncertain in predictions ------------------------------------------
 
 
@@ -396,14 +386,6 @@ def _left(b: _Budget, name: str) -> float:
     """What an input still does to the force beyond the window after E is identified again."""
     f = b.f
     return effect(f.predicted(f.curve, f.fit), f.predicted(b.curves[name], b.moved[name]))
-
-
-def _ladder(ladder: MeshLadder, budgets: Mapping[str, _Budget]) -> MeshLadder:
-    ratios = tuple(
-        {b.f.model: b.meshes.ratios[i] for b in budgets.values() if i < len(b.meshes.ratios)}
-        for i in range(len(ladder.levels))
-    )
-    return reidentified(ladder, ratios)
 
 
 def _of_rival(name: str, f: _Fitting) -> str:

@@ -18,7 +18,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Selection, nearest_samples
-from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
+from validate.register.outlines.outlines import enclosed, observe_outlines
 from validate.register.outlines.plane import cavity_sampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -49,11 +49,6 @@ class PressedOutline:
             raise UsageError(f"outline: holds {self.holds} (1 to 50), sd {self.sd} (0 or above)")
 
 
-def _with_surface(mesh: Mesh) -> Mesh:
-    """The mesh with the facet set of all of its surface."""
-    return replace(mesh, facets={WHOLE: mesh.surface, **mesh.facets})
-
-
 def with_outline(
     seen: Registered, recording: Recording, card: PressedOutline, mesh: Mesh
 ) -> Registered:
@@ -64,7 +59,7 @@ def with_outline(
     `RegistrationError` where the outlines are of something else than the surface.
     """
     contours = _posed(recording.contour(str(card.topic)), card)
-    mesh = _with_surface(mesh)
+    mesh = replace(mesh, facets={WHOLE: mesh.surface, **mesh.facets})
     mesh.facet_nodes(card.surface)
     stage = seen.drives[0]
     at, held = _instants(contours, stage, card)
@@ -72,7 +67,16 @@ def with_outline(
         contours, cavity_sampler(mesh, card.surface, None, 4), float(at[0]), name=str(card.topic),
         sd_t=clock_sd(recording, str(card.topic)),
     )  # fmt: skip
-    _require_alike(found, mesh, card)
+    # They enclose about as much
+    area, _ = enclosed(found.simulated(np.zeros_like(mesh.nodes)))
+    shown, _ = enclosed(found.measured(found.rest))
+    if not area / _LIKE < shown < _LIKE * area:
+        raise RegistrationError(
+            f"the outlines '{card.topic}' enclose {1e4 * shown:.3g} cm2, the section of the body's "
+            f"'{card.surface}' with the images {1e4 * area:.3g} cm2: they show something else. "
+            f"Set outline.surface to a facet set of a mesh file (an inclusion's wall); --set "
+            f"outline.topic=none leaves them out"
+        )
     others = [o.name for o in seen.compared]
     holds = tuple(
         Selection(f"{1e3 * d:.3g}mm", at[i : i + 1], "the nearest image", of=(found.name,))
@@ -127,18 +131,6 @@ def _instants(
             f"'{card.topic}': the body does not move between its outlines; set outline.topic=none"
         )
     return stage.t[steps], stage.y[steps, 0]
-
-
-def _require_alike(found: OutlineObservation, mesh: Mesh, card: PressedOutline) -> None:
-    area, _ = enclosed(found.simulated(np.zeros_like(mesh.nodes)))
-    seen, _ = enclosed(found.measured(found.rest))
-    if not area / _LIKE < seen < _LIKE * area:
-        raise RegistrationError(
-            f"the outlines '{card.topic}' enclose {1e4 * seen:.3g} cm2, the section of the body's "
-            f"'{card.surface}' with the images {1e4 * area:.3g} cm2: they show something else. "
-            f"Set outline.surface to a facet set of a mesh file (an inclusion's wall); --set "
-            f"outline.topic=none leaves them out"
-        )
 
 
 # --- what is uncertain ----------------------------------------------------------------------------

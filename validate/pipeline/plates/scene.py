@@ -139,16 +139,14 @@ class BuiltPressed(Built):
     ) -> Scene:
         own = dict(changes or {})
         if "material.E" not in own:
-            own["material.E"] = self._modulus(changed_by(tree, own))
+            tree = changed_by(tree, own)
+            p, scene = tree.settings, tree.scene
+            held: float | None = p.E_bonded if ends_of(scene) == "bonded" else None
+            identified = modulus_in(p.by_method, self.model(tree))
+            own["material.E"] = float(identified or held or scene.material.E or 1.0)
         return super().__call__(recording, tree, own)
 
     def model(self, tree: Tree) -> str:
         """Return the name of the model with these parameters, a method's changes among them."""
         order = mesh_of(None, tree, self.folder).order
         return model_name(tree.scene.material.law, ends_of(tree.scene), order)
-
-    def _modulus(self, tree: Tree) -> float:
-        p, scene = tree.settings, tree.scene
-        held: float | None = p.E_bonded if ends_of(scene) == "bonded" else None
-        identified = modulus_in(p.by_method, self.model(tree))
-        return float(identified or held or scene.material.E or 1.0)

@@ -130,15 +130,16 @@ def _differences(experiment: Experiment, content: Json) -> Iterator[str]:
         yield "other recordings"
     if {m["name"] for m in content["methods"]} != set(experiment.methods):
         yield "other methods"
-    if not _as_declared(experiment, found.parameters, content["parameters"]):
+    # Every stored value is the one that would be used now, or was identified then
+    stored = content["parameters"]
+    used = describe(found.parameters) + describe(experiment.methods, "methods.")
+    same = {p.path for p in used} == stored.keys()
+    if not (
+        same
+        and all(
+            stored[p.path]["origin"] == "identified"
+            or stored[p.path]["value"] == recorded(p.default)
+            for p in used
+        )
+    ):
         yield "other parameters"
-
-
-def _as_declared(experiment: Experiment, parameters: Any, stored: Json) -> bool:
-    """Whether every stored value is the one that would be used now, or was identified then."""
-    now = describe(parameters) + describe(experiment.methods, "methods.")
-    same = {p.path for p in now} == stored.keys()
-    return same and all(
-        stored[p.path]["origin"] == "identified" or stored[p.path]["value"] == recorded(p.default)
-        for p in now
-    )

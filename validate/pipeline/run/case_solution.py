@@ -51,7 +51,8 @@ def solve(
         _refused(refused) if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True)
     )
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
-    done = tuple(replace(run, memory=run.memory or _own_peak()) for run in done)
+    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # bytes, of this process
+    done = tuple(replace(run, memory=run.memory or peak) for run in done)
     return MethodRun(name, _label(method, scene), case, scene, seen, done, stacked(found))
 
 
@@ -78,11 +79,6 @@ def _registered(
     pairs = zip(recordings, scenes, strict=True)
     seen = tuple(experiment.place(r, parameters, s) for r, s in pairs)
     return tuple(one.shifted(off) for one in seen) if off else seen
-
-
-def _own_peak() -> int:
-    """Bytes that this process had at most until now."""
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _refused(why: str) -> Run:

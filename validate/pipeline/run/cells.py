@@ -208,8 +208,12 @@ class InStore:
         if not cells:
             return
         wanted = {cell.key: w for (w, truth, _), cell in self._cells.items() if not truth}
+        # The first of those that have a key in common, which asks for the most
+        once: dict[str, RunCell] = {}
+        for c in cells:
+            once.setdefault(c.key, c)
         plan = Plan(
-            self._job(runs), _each_once(cells), open_runs, run_cell, CellFound,
+            self._job(runs), tuple(once.values()), open_runs, run_cell, CellFound,
             bench=runs, enough=_enough, shares=True, beside=_TIMED_BESIDE,
             after=max(0, runs.pace.expected - len(cells)),
         )  # fmt: skip
@@ -268,14 +272,6 @@ class InStore:
             base = job_on(self._experiment, hashes, self._options.values, self._options.quick)
             self._jobs[at] = RunJob(replace(base, simulators=self._options.simulators), *at)
         return self._jobs[at]
-
-
-def _each_once(cells: Sequence[RunCell]) -> tuple[RunCell, ...]:
-    """The first of those that have a key in common, which asks for the most."""
-    found: dict[str, RunCell] = {}
-    for cell in cells:
-        found.setdefault(cell.key, cell)
-    return tuple(found.values())
 
 
 def _but_costs(run: Run) -> Run:

@@ -50,7 +50,6 @@ from validate.pipeline.experiment.origins import Opened, marked, opened
 from validate.pipeline.run.memory import coarser, require_room
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.pipeline.run.runs import ExperimentRuns, Solves
-from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.solve.external.scheme import ExternalSimulator
 
@@ -187,12 +186,14 @@ def _compared(
         *doubts(parameters_used, found.stated, found.recordings, first),
         *gate_warnings({name: main[name] for name in methods if name in experiment.accepted}),
     )
+    named = experiment.specimen or (lambda _: experiment.name)
+    declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
     return Result(
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
-        sentence=_doubtful(warnings)
-        + _opening(identified)
+        sentence=("With warnings on the input; " if warnings else "")
+        + (f"{identified.headline}; " if identified and identified.headline else "")
         + (f"{predicted(results)}. " if out.fitted else "")
         + verdict_sentence(results, runs.kind, quick=options.quick)
         + because
@@ -211,7 +212,7 @@ def _compared(
         kind=runs.kind,
         seed=experiment.seed,
         twin_notice="" if runs.kind == "measured" else experiment.twin_notice,
-        inputs=_inputs(experiment),
+        inputs=tuple(Declared(i.name, i.doc, i.source) for i in declared),
         joint=joint_inputs(runs) if any(m.accepted for m in results) else (),
         exhibits=tuple(
             captioned(exhibit, experiment.captions)
@@ -225,7 +226,7 @@ def _compared(
         rows=(*speed_rows(experiment, main), *told.rows),
         views=experiment.views,
         changed=out.differing,
-        specimens=_specimens(experiment, runs.recordings),
+        specimens=tuple(named(recording) for recording in runs.recordings),
         expected=() if options.quick else experiment.expected,
         identified_values=identified.values if identified else (),
     )
@@ -240,11 +241,6 @@ def _differences(followed: MethodRun, method: Method, failed: Failed) -> list[Di
         difference_of(followed, h, inertia) for h in followed.histories
         if any(f == q or f.startswith(f"{q}.") for f in failed for q in units[h.name])
     ]  # fmt: skip
-
-
-def _specimens(experiment: Experiment, recordings: tuple[Recording, ...]) -> tuple[str, ...]:
-    named = experiment.specimen or (lambda _: experiment.name)
-    return tuple(named(recording) for recording in recordings)
 
 
 def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, ...]) -> Experiment:
@@ -338,14 +334,6 @@ def _published(
     return tuple(figure for figure in figures if runs.whole or not figure.missing)
 
 
-def _doubtful(warnings: tuple[str, ...]) -> str:
-    return "With warnings on the input; " if warnings else ""
-
-
-def _opening(identified: Identified | None) -> str:
-    return f"{identified.headline}; " if identified and identified.headline else ""
-
-
 def _notes(
     remade: tuple[str, ...],
     identified: Identified | None,
@@ -369,8 +357,3 @@ def _notes(
         *locking,
     )
     return tuple(dict.fromkeys(said))
-
-
-def _inputs(experiment: Experiment) -> tuple[Declared, ...]:
-    declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
-    return tuple(Declared(i.name, i.doc, i.source) for i in declared)

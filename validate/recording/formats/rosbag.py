@@ -156,7 +156,21 @@ def read_bag(path: Path, options: Options) -> Recording:
     for file in map(member, members(path)) if path.is_dir() else (path,):
         open_file(file, ANY_SIZE).close()
         if file.suffix != ".mcap":
-            _require_whole(file)
+            # A database by its own count of pages, and nothing of it left in a log beside it
+            first = head(file, 32)
+            log = file.with_name(f"{file.name}-wal")
+            if log.is_file() and log.stat().st_size:
+                raise RecordingError(
+                    f"{file.name}: {log.stat().st_size} bytes are still in {log.name}; merge them "
+                    f"with: sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+                )
+            if first.startswith(_SQLITE):
+                page = int.from_bytes(first[16:18]) or 1
+                needs = (_PAGE if page == 1 else page) * int.from_bytes(first[28:32])
+                if (size := file.stat().st_size) < needs:
+                    raise RecordingError(
+                        f"{file.name}: {size} bytes, but its header declares {needs}: truncated"
+                    )
     found = decoded("validate.recording.formats.rosbag", path, extra="ros2")
     with tempfile.TemporaryDirectory(prefix="validate-") as folder:
         whole = Path(folder) / (path.name or "bag")  # errors name it
@@ -180,24 +194,6 @@ def _only_mcap(folder: Path) -> Path | None:
     names, packed = _told(folder)
     there = [member(f) for f in members(folder) if f.suffix == ".mcap"]
     return there[0] if len(there) == 1 and len(names) < 2 and not packed else None
-
-
-def _require_whole(path: Path) -> None:
-    """A database by its own count of pages, and nothing of it left in a log beside it."""
-    first = head(path, 32)
-    log = path.with_name(f"{path.name}-wal")
-    if log.is_file() and log.stat().st_size:
-        raise RecordingError(
-            f"{path.name}: {log.stat().st_size} bytes are still in {log.name}; merge them with: "
-            f"sqlite3 {path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
-        )
-    if first.startswith(_SQLITE):
-        page = int.from_bytes(first[16:18]) or 1
-        needs = (_PAGE if page == 1 else page) * int.from_bytes(first[28:32])
-        if (size := path.stat().st_size) < needs:
-            raise RecordingError(
-                f"{path.name}: {size} bytes, but its header declares {needs}: truncated"
-            )
 
 
 def _recognises(path: Path) -> bool:

@@ -109,16 +109,12 @@ def read_dicom(path: Path, options: Options) -> Recording:
         cut = tuple(np.ascontiguousarray(image[top:bottom, left:right]) for image in images)
         streams[topic] = Frames(t, cut, sides, np.eye(4), frame)
         told[f"{topic} px"] = f"{left}..{right} x {top}..{bottom} of {width} x {height}"
-    told |= {"kind": "images (DICOM)", "times": _timed(found, options), "levels": levels,
-             "scale": scale}  # fmt: skip
+    times = f"{options['rate']} Hz (entered)" if "rate" in options else str(found["timed"])
+    told |= {"kind": "images (DICOM)", "times": times, "levels": levels, "scale": scale}
     whole = "DICOM keeps no checksum: integrity not provable"
     name = path.resolve().name if path.is_dir() else path.stem
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, told)
-
-
-def _timed(found: Mapping[str, Any], options: Options) -> str:
-    return f"{options['rate']} Hz (entered)" if "rate" in options else str(found["timed"])
 
 
 def _regions(

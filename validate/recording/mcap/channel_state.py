@@ -312,7 +312,11 @@ class ChannelSeen:
         elif sample.image is not None:
             self._shapes.add(sample.image.shape)
         else:
-            self._outline(sample)
+            self._differs("each", lambda: own_of(self.channel.topic, [first, sample]))
+            if len(sample.values) < 3 and self._short is None:
+                self._short = self.count
+            if self._largest is None or _extent(sample) > _extent(self._largest):
+                self._largest = sample
         if sample.stamp_ns is not None:
             self._stamps.append(sample.stamp_ns)
         self.count += 1
@@ -324,14 +328,6 @@ class ChannelSeen:
                 check()
             except RecordingError as error:
                 self._changes[what] = str(error)
-
-    def _outline(self, sample: Sample) -> None:
-        first = self.first or sample
-        self._differs("each", lambda: own_of(self.channel.topic, [first, sample]))
-        if len(sample.values) < 3 and self._short is None:
-            self._short = self.count
-        if self._largest is None or _extent(sample) > _extent(self._largest):
-            self._largest = sample
 
     def stamps_ns(self) -> Ints | None:
         """int64 ns (n,), None when no message has a stamp.
@@ -356,25 +352,21 @@ class ChannelSeen:
             if what in self._changes:
                 raise RecordingError(self._changes[what])
         if self.schema in (CONTOUR, IMAGE):
-            self._require_alike(records)
+            pose_of(records, topic)
+            if self._short is not None:
+                raise RecordingError(
+                    f"{topic!r}: contours: outline {self._short} has fewer than 3 points"
+                )
+            if self.schema == IMAGE:
+                scale_of(records, topic)
+            if len(self._shapes) > 1:
+                raise RecordingError(
+                    f"{topic!r}: frames: images of different sizes {sorted(self._shapes)}"
+                )
         sample = self._largest or self.first
         assert sample is not None  # a channel without messages is not asked
         at = times_ns[:1]
         return stream_of(Collected(self.channel, self.schema, at, at, [sample]), t0, records)
-
-    def _require_alike(self, records: Mapping[str, Record]) -> None:
-        topic = self.channel.topic
-        pose_of(records, topic)
-        if self._short is not None:
-            raise RecordingError(
-                f"{topic!r}: contours: outline {self._short} has fewer than 3 points"
-            )
-        if self.schema == IMAGE:
-            scale_of(records, topic)
-        if len(self._shapes) > 1:
-            raise RecordingError(
-                f"{topic!r}: frames: images of different sizes {sorted(self._shapes)}"
-            )
 
 
 class AllSeen:

@@ -322,7 +322,13 @@ class _Walk:
             raise RecordingError(f"a message record of {end - at} bytes, at least 22 needed")
         channel, _, log, publish = MESSAGE_HEAD.unpack_from(data, at)
         if channel not in self._kept:
-            self._first_of(channel)
+            if channel not in self._channels:
+                raise RecordingError(f"a message of channel {channel}, undeclared")
+            declared = self._channels[channel]
+            schema, names = self._schemas.get(declared.schema_id), {m.name for m in self._metadata}
+            wanted = self._taker is not None and self._taker.wants(declared, schema, names)
+            self._log[channel], self._publish[channel] = array("Q"), array("Q")
+            self._kept[channel] = [] if wanted else None
         if self.messages >= MAX_MESSAGES:
             raise RecordingError(f"more than {MAX_MESSAGES} messages, the limit; split the file")
         self._log[channel].append(log)
@@ -332,15 +338,6 @@ class _Walk:
         if kept is not None:
             kept.append(data[at + MESSAGE_HEAD.size : end])
         return int(channel)
-
-    def _first_of(self, number: int) -> None:
-        if number not in self._channels:
-            raise RecordingError(f"a message of channel {number}, undeclared")
-        channel = self._channels[number]
-        schema, names = self._schemas.get(channel.schema_id), {m.name for m in self._metadata}
-        wanted = self._taker is not None and self._taker.wants(channel, schema, names)
-        self._log[number], self._publish[number] = array("Q"), array("Q")
-        self._kept[number] = [] if wanted else None
 
     def _hand_on(self) -> None:
         """What was kept of a chunk that is whole."""

@@ -168,7 +168,9 @@ def stream_of(raw: Collected, t0_ns: int, records: Mapping[str, Record]) -> Stre
     Raises `RecordingError`, with the topic, for samples that do not make one stream.
     """
     topic, first = raw.channel.topic, raw.samples[0]
-    t, frame, sd = _times(raw, t0_ns), _constant(raw, "frame"), _constant(raw, "sd")
+    require_forward(topic, raw.times_ns, t0_ns)
+    t: Floats = (raw.times_ns - t0_ns) / 1e9
+    frame, sd = _constant(raw, "frame"), _constant(raw, "sd")
     if raw.schema == MARKERS:
         x = np.stack([in_order(topic, i, s, first) for i, s in enumerate(raw.samples)])
         return _named(topic, lambda: Markers(t, first.names, x, sd, frame))
@@ -226,13 +228,6 @@ def require_forward(topic: str, ns: Ints, t0_ns: int) -> None:
             f"({before:.9f} s -> {after:.9f} s), {len(backward)} times in all; "
             "write the messages in order of their stamps"
         )
-
-
-def _times(raw: Collected, t0_ns: int) -> Floats:
-    ns = raw.times_ns
-    require_forward(raw.channel.topic, ns, t0_ns)
-    t: Floats = (ns - t0_ns) / 1e9
-    return t
 
 
 def _constant(raw: Collected, what: str) -> Any:

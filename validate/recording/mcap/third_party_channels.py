@@ -61,7 +61,12 @@ def gatherers(verified: Verified, options: Options) -> tuple[dict[int, Gathered]
     """
     fields = {key: unit for key, unit in options.items() if key not in (SCALE, WHITE)}
     own = ours(verified)
-    _require_topics(verified, fields)
+    topics = sorted(c.topic for c in verified.channels.values())
+    for name in fields:
+        if not any(name.startswith(f"{topic}.") for topic in topics):
+            listed = ", ".join(topics) or "none"
+            raise UsageError(f"--map {name}=...: no such key; known: {SCALE}, {WHITE}, TOPIC.FIELD "
+                             f"of the topics {listed}")  # fmt: skip
     found: dict[int, Gathered] = {}
     never: dict[str, str] = {}
     for number, channel in verified.channels.items():
@@ -74,15 +79,6 @@ def gatherers(verified: Verified, options: Options) -> tuple[dict[int, Gathered]
         else:
             found[number] = Gathered(channel, parts)
     return found, never
-
-
-def _require_topics(verified: Verified, fields: Mapping[str, str]) -> None:
-    topics = sorted(c.topic for c in verified.channels.values())
-    for key in fields:
-        if not any(key.startswith(f"{topic}.") for topic in topics):
-            listed = ", ".join(topics) or "none"
-            raise UsageError(f"--map {key}=...: no such key; known: {SCALE}, {WHITE}, TOPIC.FIELD "
-                             f"of the topics {listed}")  # fmt: skip
 
 
 def _parts(

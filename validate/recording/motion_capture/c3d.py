@@ -215,28 +215,21 @@ def _require_whole(path: Path) -> None:
 def _trial(found: Held) -> Record:
     """Its first frame and events, and what of a long one no parameter counts."""
     left = int(found["uncounted"])
+    # Events as the file states them; its times count as the trial's, which may begin earlier
+    times = 60 * found["event_times"][0] + found["event_times"][1]
+    names = distinct(found["events"].tolist(), len(times))
+    listed = "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True))
     told = {
         "first_frame": f"{int(found['first_frame'])} of the trial, time 0 here",
-        **_events(found),
     }
+    if listed:
+        told["events"] = f"{listed} (events of the trial, listed but not stored as a stream)"
     if left > BLOCK:
         told[LEFT_OUT] = (
             f"{left} bytes after frame {MOST}: its header cannot count further, and no parameter "
             f"does"
         )
     return told
-
-
-def _events(found: Held) -> dict[str, str]:
-    """Events as the file states them; its times count as the trial's, which may begin earlier."""
-    times = 60 * found["event_times"][0] + found["event_times"][1]
-    names = distinct(found["events"].tolist(), len(times))
-    told = "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True))
-    return (
-        {"events": f"{told} (events of the trial, listed but not stored as a stream)"}
-        if told
-        else {}
-    )
 
 
 def _recognises(path: Path) -> bool:

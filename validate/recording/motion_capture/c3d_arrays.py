@@ -55,15 +55,11 @@ def layout(path: Path, first: bytes) -> Layout:
     order = ">" if processor == BIG else "<"
     points, analog, begin, end = struct.unpack(f"{order}4H", first[2:10])
     (start,) = struct.unpack(f"{order}H", first[16:18])
-    size = (4 if _negative(processor, first) else 2) * (4 * points + analog)
+    # Where the header's scale is below 0, coordinates are floats, not integers
+    sign = {BIG: 0, _DEC: 1}.get(processor, 3)  # the byte of its highest bits
+    size = (4 if first[12 + sign] >= 128 else 2) * (4 * points + analog)
     frames = end - begin + 1 + (MOST + 1 if end < begin else 0)
     return Layout(processor, points, analog, frames, start, size)
-
-
-def _negative(processor: int, first: bytes) -> bool:
-    """Whether the header's scale is below 0: coordinates are floats, not integers."""
-    sign = {BIG: 0, _DEC: 1}.get(processor, 3)  # the byte of its highest bits
-    return first[12 + sign] >= 128
 
 
 def parts_beyond(path: Path, frames: int, copy: Path) -> Iterator[Path]:

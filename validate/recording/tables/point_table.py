@@ -228,7 +228,20 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
         line = layout.rows[int(np.argmax(np.isnan(instants)))].line
         raise RecordingError(f"{held.name}: line {line}: it has no time; correct it")
     if layout.whose is None:
-        _require_one_row_each(held, layout, instants)
+        # Rows of several points at each instant, whose names no column has: as rows in time,
+        # one point would jump between them.
+        count, column = len(instants) / len(np.unique(instants)), layout.instant or 0
+        if count >= 2 and len(layout.points) == 1:
+            raise RecordingError(
+                f"{held.name}: {count:.3g} rows at each '{layout.names[column]}', and no column "
+                "names the point of each row; add one called marker, or for a single point remove "
+                "that column"
+            )
+        if layout.time is None and (np.diff(instants) <= 0).any():
+            line = layout.rows[1 + int(np.argmax(np.diff(instants) <= 0))].line
+            raise RecordingError(f"{held.name}: line {line}: its '{layout.names[column]}' is not "
+                                 f"after the one before; correct it, or remove that "
+                                 f"column")  # fmt: skip
     elif layout.time is not None and "rate" in options:
         nth = np.unique(instants, return_inverse=True)[1]
         return np.asarray(nth / above_zero(options, "rate"))
@@ -236,38 +249,17 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
         return np.asarray((instants - instants.min()) / _frequency(held, layout, options))
     if "rate" in options:
         return np.arange(len(values)) / above_zero(options, "rate")
-    t = _seconds_of(held, layout, options) * instants
-    if layout.whose is None and (np.diff(t) <= 0).any():
-        at = 1 + int(np.argmax(np.diff(t) <= 0))
-        raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is not after "
-                             f"the one before; correct it, or give --map rate=HZ")  # fmt: skip
-    return np.asarray(t - t.min())
-
-
-def _require_one_row_each(held: TextRows, layout: PointLayout, instants: Floats) -> None:
-    """Refuses rows of several points at each instant whose names no column has: as rows in time,
-    one point would jump between them."""
-    count, column = len(instants) / len(np.unique(instants)), layout.instant or 0
-    if count >= 2 and len(layout.points) == 1:
-        raise RecordingError(
-            f"{held.name}: {count:.3g} rows at each '{layout.names[column]}', and no column names "
-            "the point of each row; add one called marker, or for a single point remove that column"
-        )
-    if layout.time is None and (np.diff(instants) <= 0).any():
-        line = layout.rows[1 + int(np.argmax(np.diff(instants) <= 0))].line
-        raise RecordingError(f"{held.name}: line {line}: its '{layout.names[column]}' is not "
-                             f"after the one before; correct it, or remove that "
-                             f"column")  # fmt: skip
-
-
-def _seconds_of(held: TextRows, layout: PointLayout, options: Options) -> float:
-    """Seconds of the unit of time."""
     name = layout.names[layout.time or 0]
     unit = options.get("time", layout.units[layout.time or 0])
     if not unit:
         raise UsageError(f"{held.name}: '{name}' has no unit; give --map time=s, or --map "
                          f"rate=HZ")  # fmt: skip
-    return si_factor(unit, "time")
+    t = si_factor(unit, "time") * instants
+    if layout.whose is None and (np.diff(t) <= 0).any():
+        at = 1 + int(np.argmax(np.diff(t) <= 0))
+        raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is not after "
+                             f"the one before; correct it, or give --map rate=HZ")  # fmt: skip
+    return np.asarray(t - t.min())
 
 
 def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:

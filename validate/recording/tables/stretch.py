@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.tables.blocks import parse_tables
 from validate.recording.tables.encoding import whole_file
-from validate.recording.tables.table import Column, Table
+from validate.recording.tables.table import Table
 from validate.recording.tables.vocabulary import words
 from validate.recording.types import Recording, Signal, Source
 from validate.units import si_factor
@@ -63,7 +63,9 @@ def signals_of(curve: Curve) -> dict[str, Signal]:
 
 
 def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
-    stretches, stresses = (_named(table, word) for word in ("stretch", "stress"))
+    stretches, stresses = (
+        [c for c in table.columns if word in words(c.name)] for word in ("stretch", "stress")
+    )
     if not len(stretches) == len(stresses) in (1, 2):
         labels = ", ".join(repr(c.label) for c in table.columns)
         raise RecordingError(
@@ -95,7 +97,3 @@ def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
             "in tension stress is positive and stretch above 1; correct the signs"
         )
     return Curve(stretch, stress), said if unit else f"{said}, from the header"
-
-
-def _named(table: Table, word: str) -> list[Column]:
-    return [c for c in table.columns if word in words(c.name)]

@@ -328,7 +328,8 @@ def recording_of(
     )
     sizes = sizes_of(mapping, specimen, kind)
     found = _found(table, said, sizes, kind)
-    picks, made = {role: one.pick for role, one in found.items()}, _made(found)
+    picks = {role: one.pick for role, one in found.items()}
+    made = {role: one for role, one in found.items() if one.words}
     kind = kind or next((one.kind for one in made.values() if one.kind), None)
     specimen = with_sizes(specimen, mapping)
     # All checks; the flips and what the derived columns said.
@@ -374,7 +375,11 @@ def recording_of(
         metadata={
             "header": dict(table.header),
             "specimen": {**shown, "test": flips.kind.name if flips.kind else "not stated"},
-            ASSUMED: {**_assumed(picks, flips), **_by_sizes(made), **_stop(table.header)},
+            ASSUMED: {
+                **_assumed(picks, flips),
+                **({"sizes": "; ".join(one.words for one in made.values())} if made else {}),
+                **_stop(table.header),
+            },
             "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
     )
@@ -419,14 +424,6 @@ def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
     if missing and not kind:
         asks[f"{ASK.removeprefix('give ')}, as neither strain nor stretch shows it"] = None
     return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
-
-
-def _made(found: Mapping[str, Sized]) -> dict[str, Sized]:
-    return {role: one for role, one in found.items() if one.words}
-
-
-def _by_sizes(made: Mapping[str, Sized]) -> Record:
-    return {"sizes": "; ".join(one.words for one in made.values())} if made else {}
 
 
 def _column(x: Floats) -> Floats:

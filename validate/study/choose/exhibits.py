@@ -31,9 +31,29 @@ def words(choice: Choice) -> Iterator[str]:
     if choice.pick is not None:
         first = f"the fastest cell that does (candidate '{choice.pick.solver.rung}')"
         yield f"{described(choice.pick, choice)} meets {asked}: {first}."
-        yield from _left_out(choice)
-        yield from _confirmed(choice)
-        yield from _as_fast(choice)
+        if choice.excluded:
+            n = len(choice.excluded)
+            who = "1 candidate was" if n == 1 else f"{n} candidates were"
+            yield (
+                f"{who} left out by a bound: on the coarsest mesh their step already takes longer "
+                "than that of the choice."
+            )
+        if choice.confirmed is not None:
+            ms = _MM * choice.confirmed.dt
+            yield (
+                f"Run again with a new state every {ms:.3g} ms, as the rate asks: "
+                f"{described(choice.confirmed, choice)}."
+            )
+        elif choice.trade.trial.dynamic:
+            yield "Its step is not longer than a tick of the rate."
+        # A cell of less error whose time the clock can hardly tell from the pick's
+        dynamic = choice.trade.trial.dynamic
+        limit = SAME_TIME * (choice.pick.time_s or 0.0)
+        rows = [r for r in _judged(choice) if (r.time_s or 0.0) <= limit]
+        equal = meeting(rows, choice.wanted, choice.by, dynamic)
+        best = min(equal, key=lambda r: error_of(r, choice.by) or 0.0, default=choice.pick)
+        if best is not choice.pick:
+            yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
     else:
         yield f"Nothing meets both {asked}."
         yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
@@ -58,39 +78,6 @@ def described(row: TradeRow, choice: Choice) -> str:
     step = f", steps of {_MM * row.dt:.3g} ms" if row.solver.stepped else ""
     reached = choice.trade.shown(error)
     return f"{row.label}{step}: {reached} at {1 / time:.4g} Hz ({_US * time:.3g} us)"
-
-
-def _left_out(choice: Choice) -> Iterator[str]:
-    if choice.excluded:
-        n = len(choice.excluded)
-        who = "1 candidate was" if n == 1 else f"{n} candidates were"
-        yield (
-            f"{who} left out by a bound: on the coarsest mesh their step already takes longer "
-            "than that of the choice."
-        )
-
-
-def _confirmed(choice: Choice) -> Iterator[str]:
-    if choice.confirmed is not None:
-        ms = _MM * choice.confirmed.dt
-        yield (
-            f"Run again with a new state every {ms:.3g} ms, as the rate asks: "
-            f"{described(choice.confirmed, choice)}."
-        )
-    elif choice.trade.trial.dynamic:
-        yield "Its step is not longer than a tick of the rate."
-
-
-def _as_fast(choice: Choice) -> Iterator[str]:
-    """A cell of less error whose time the clock can hardly tell from the pick's."""
-    assert choice.pick is not None
-    dynamic = choice.trade.trial.dynamic
-    limit = SAME_TIME * (choice.pick.time_s or 0.0)
-    rows = [r for r in _judged(choice) if (r.time_s or 0.0) <= limit]
-    equal = meeting(rows, choice.wanted, choice.by, dynamic)
-    best = min(equal, key=lambda r: error_of(r, choice.by) or 0.0, default=choice.pick)
-    if best is not choice.pick:
-        yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
 
 
 def _judged(choice: Choice) -> list[TradeRow]:

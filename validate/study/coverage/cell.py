@@ -14,7 +14,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.overall_verdict import judge_all
 from validate.compare.residual import Residual, residuals, stacked
-from validate.compare.verdict import Check, PointErrors, errors_of, name_of, nothing_compared
+from validate.compare.verdict import Check, errors_of, name_of, nothing_compared
 from validate.pipeline.run.case_solution import run_on
 from validate.pipeline.run.job import Job
 from validate.pipeline.run.method_run import MethodRun
@@ -208,12 +208,9 @@ def _measured(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[float
     statistics = {s.name: s.statistic for s in bench.given.stated}
     for k in numbers:
         for name, residual in bench.residuals(bench.given.base, bench.noise(k)).items():
-            found[name].append(_alone_of(errors_of(residual, statistics[name])))
+            errors = errors_of(residual, statistics[name])
+            found[name].append(float(errors.E[errors.worst(np.zeros(len(errors.E)))]))
     return {name: tuple(errors) for name, errors in found.items()}
-
-
-def _alone_of(errors: PointErrors) -> float:
-    return float(errors.E[errors.worst(np.zeros(len(errors.E)))])
 
 
 def _of_all(judged: Mapping[str, Judged]) -> dict[str, tuple[float, ...]]:

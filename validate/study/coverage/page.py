@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
-from validate.compare.coverage import Share, Term
+from validate.compare.coverage import Share
 from validate.compare.exhibit import NumberTable
 from validate.report.stored.json_values import members
 from validate.study.coverage.coverage_results import Power, Quantity
@@ -79,16 +79,12 @@ def _quantity(q: Quantity) -> dict[str, Any]:
         "finding": q.finding.word, "why": q.finding.words,
         "fault": q.finding.fault.name if q.finding.fault else None,
         "rms_E": q.spread, "u_val": q.u_val, "line_off": q.off,
-        "terms": [_term(t) for t in q.terms],
+        "terms": [{**asdict(t), "ratio": t.ratio} for t in q.terms],
     }  # fmt: skip
 
 
 def _share(s: Share) -> dict[str, Any]:
     return {**asdict(s), "value": s.value, "low": s.low, "high": s.high}
-
-
-def _term(t: Term) -> dict[str, Any]:
-    return {**asdict(t), "ratio": t.ratio}
 
 
 def _power(p: Power) -> dict[str, Any]:

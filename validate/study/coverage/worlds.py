@@ -80,7 +80,9 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     true = true_method(study.bench.runs.experiment, method)
     base = _readings(study, true, (World(),))[World()]
     read = _needed(base, method)
-    truth = _Truth(study, true, _stand_in(study, true), read)
+    declared = study.bench.runs.experiment.uncertainty
+    by = declared.stand_in.get(true, true) if declared else true
+    truth = _Truth(study, true, by, read)
     steps = truth.in_worlds(steps_of(study.inputs), base.seconds)
     sides, instead = _sides(truth, steps)
     # Of a body that is moved: the judged one's mesh and registration may stand in a cache.
@@ -94,7 +96,13 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     paths = tuple(p.path for p in wrong_paths(study.bench.runs.parameters))
     wrong, mistaken, lines = _mistaken(truth, paths, each)
     known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
-    moved = {k: r for k, r in known.items() if _moves(r, read)}
+    moved = {
+        k: r
+        for k, r in known.items()
+        if not all(
+            np.allclose(a, b, rtol=1e-9, atol=0.0) for a, b in zip(r.left, read.left, strict=True)
+        )
+    }
     drawn = {k: r.value for k, r in enumerate(solved) if r.value is not None}
     unsolved = _unsolved(method, [r.why for r in solved if r.value is None])
     return Worlds(
@@ -134,11 +142,6 @@ class _Truth:
         if record.value is None:
             return record
         return replace(record, value=self.read.plus(1.0, record.value, base))
-
-
-def _stand_in(study: Study, method: str) -> str:
-    declared = study.bench.runs.experiment.uncertainty
-    return declared.stand_in.get(method, method) if declared else method
 
 
 def _sides(
@@ -240,12 +243,6 @@ def _alike(record: Record[ExactReading], base: ExactReading) -> Record[ExactRead
         return replace(record, value=record.value.on(base))
     except ComparisonError as error:
         return replace(record, value=None, refused=str(error))
-
-
-def _moves(reading: ExactReading, base: ExactReading) -> bool:
-    return not all(
-        np.allclose(a, b, rtol=1e-9, atol=0.0) for a, b in zip(reading.left, base.left, strict=True)
-    )
 
 
 def _unsolved(method: str, why: list[str]) -> tuple[str, ...]:

@@ -128,9 +128,20 @@ class Bench:
         seed, or those that were measured."""
         parameters, method = set_up(self.experiment, self.job, cell, seed)
         if not self.experiment.repeats:
-            return self._on_measured(cell, method)
-        true, key = self._true(cell, parameters), _text(parameters)
-        made = dict(cell.condition).get(CASE, ""), key
+            loaded = self._measured(cell)
+            pairs = zip(loaded.recordings, self._tracked(cell, cell.seeds[0]), strict=True)
+            return tuple(
+                self._ready(
+                    loaded.experiment, recording, loaded.parameters, loaded.parameters, method,
+                    (cell.condition, i), tracked,
+                )
+                for i, (recording, tracked) in enumerate(pairs)
+            )  # fmt: skip
+        # The truth is another one where the condition is a case of the experiment
+        name = dict(cell.condition).get(CASE, "")
+        case = next((c for c in self.experiment.cases if c.name == name), None)
+        true = parameters if case is None else case.change(parameters)
+        made = name, _text(parameters)
         recording = self._recordings.get(made, lambda: self._made(true))
         experiment = self.experiment
         return tuple(
@@ -142,35 +153,14 @@ class Bench:
         """The same recordings as the filter has them whose registration gives the markers; none
         for that filter itself."""
         if cell.method == cell.tracker:
-            return (None,) * self._count(cell)
+            count = 1 if self.experiment.repeats else len(self._measured(cell).recordings)
+            return (None,) * count
         tracker = replace(cell, method=cell.tracker, settings=())
         return self.ready(tracker, seed)
-
-    def _count(self, cell: FilterCell) -> int:
-        if self.experiment.repeats:
-            return 1
-        return len(self._measured(cell).recordings)
-
-    def _true(self, cell: FilterCell, parameters: Any) -> Any:
-        """The parameters of the truth, where the condition is a case of the experiment."""
-        name = dict(cell.condition).get(CASE, "")
-        case = next((c for c in self.experiment.cases if c.name == name), None)
-        return parameters if case is None else case.change(parameters)
 
     def _made(self, true: Any) -> Recording:
         assert self.experiment.twin is not None
         return self.experiment.twin.made(true, lambda _: None)
-
-    def _on_measured(self, cell: FilterCell, method: Method) -> tuple[Ready, ...]:
-        loaded, seed = self._measured(cell), cell.seeds[0]
-        pairs = zip(loaded.recordings, self._tracked(cell, seed), strict=True)
-        return tuple(
-            self._ready(
-                loaded.experiment, recording, loaded.parameters, loaded.parameters, method,
-                (cell.condition, i), tracked,
-            )
-            for i, (recording, tracked) in enumerate(pairs)
-        )  # fmt: skip
 
     def _measured(self, cell: FilterCell) -> _Loaded:
         """What stands open is identified once, by the methods as they are declared."""

@@ -170,7 +170,7 @@ def _all_seeds(
             *_held_out(ready, fold, t, u, segments),
             *ahead_errors(t, offered.names, y, measured[i], segments),
         )
-        scaled = _scaled(y, measured[i], offered)
+        scaled = np.where(measured[i], y / offered.sd, np.nan)
         innovations = innovations_of(t, scaled, batch.log_likelihood[i], batch.dof, segments)
         truth = _against_truth(bench, first, probes)
         scored.append(Scored(truth, withheld, innovations, float(batch.nis[i].sum()), dof))
@@ -188,11 +188,6 @@ def _by_step(measurements: Measurements, offered: Measurements, t: Floats) -> Fl
         if step <= len(z):
             z[step - 1] = row
     return z
-
-
-def _scaled(y: Floats, measured: Floats, offered: Measurements) -> Floats:
-    """Innovations over the noise of their components (nt, m), NaN = none."""
-    return np.where(measured, y / offered.sd, np.nan)
 
 
 def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ...]]:

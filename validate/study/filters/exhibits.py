@@ -23,11 +23,15 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
     heats: list[Heat] = []
     words: list[str] = []
     for method in study.plan.methods:
-        axes = [a for a in _axes_of(study, method) if len(a.values) > 1]
+        prefix = f"{METHODS}{method}."
+        swept = [a for a in study.plan.axes if len(a.values) > 1]
+        axes = [a for a in swept if a.path.startswith(prefix)]
+        axes += [a for a in swept if not a.path.startswith(METHODS)]
         if not axes:
             continue
         fixed = _fixed(study, method, axes[2:])
-        cells = [c for c in _cells_of(study, method) if fixed.items() <= c.values.items()]
+        of_method = [c for c in study.plan.cells if c.method == method and not c.baseline]
+        cells = [c for c in of_method if fixed.items() <= c.values.items()]
         if fixed:
             words.append(f"{method}: the other axes are fixed at {named(fixed)}, its best cell.")
         if len(axes) == 1:
@@ -42,16 +46,6 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
              "count.", *words),
             charts=tuple(charts), heats=tuple(heats),
         )  # fmt: skip
-
-
-def _axes_of(study: FilterStudy, method: str) -> list[Axis]:
-    prefix = f"{METHODS}{method}."
-    of_method = [a for a in study.plan.axes if a.path.startswith(prefix)]
-    return of_method + [a for a in study.plan.axes if not a.path.startswith(METHODS)]
-
-
-def _cells_of(study: FilterStudy, method: str) -> list[FilterCell]:
-    return [c for c in study.plan.cells if c.method == method and not c.baseline]
 
 
 def _unit(study: FilterStudy) -> str:

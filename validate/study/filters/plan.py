@@ -262,7 +262,13 @@ def _require(
     known = experiment.methods
     for a in axes:
         if a.path == CASE:
-            _require_cases(experiment, a)
+            for value in a.values:
+                if value != RECORDED and not experiment.repeats:
+                    raise UsageError(
+                        f"no case '{value}' of {experiment.name}: its recording is measured, and "
+                        "only a twin has cases"
+                    )
+                require_case(experiment, value)
             continue
         if a.path == seed_path:
             raise UsageError(
@@ -278,16 +284,6 @@ def _require(
                 f"'{a.path}' is swept, but the method is not among {', '.join(methods)}; add it to "
                 "--methods"
             )
-
-
-def _require_cases(experiment: Experiment, axis: Axis) -> None:
-    for value in axis.values:
-        if value != RECORDED and not experiment.repeats:
-            raise UsageError(
-                f"no case '{value}' of {experiment.name}: its recording is measured, and only "
-                "a twin has cases"
-            )
-        require_case(experiment, value)
 
 
 def _require_values(settings: Any, path: str, axis: Axis) -> None:

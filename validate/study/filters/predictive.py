@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.engine.cell import Record
 from validate.study.filters.blocks import Blocks, blocks_of
 from validate.study.filters.plan import FilterCell
@@ -62,12 +61,7 @@ def predictive_likelihood(errors: PredictionErrors, blocks: Blocks) -> Innovatio
         return None
     outside = squares.sum(axis=-1, keepdims=True) - squares
     mean = np.divide(outside, others, out=np.zeros_like(outside), where=others > 0)
-    variance = np.maximum(_by_segment(mean, blocks, errors.counts.shape[-1]), errors.noise)
+    block = np.searchsorted(blocks.starts, np.arange(errors.counts.shape[-1]), side="right") - 1
+    variance = np.maximum(np.asarray(mean[..., block]), errors.noise)
     density = errors.counts * np.log(2 * np.pi * variance) + errors.squares / variance
     return Innovations(-0.5 * density.sum(axis=1), errors.counts.sum(axis=1), None, None)
-
-
-def _by_segment(values: Floats, blocks: Blocks, segments: int) -> Floats:
-    """Values (..., blocks) at the segments (..., segments) of their blocks."""
-    block = np.searchsorted(blocks.starts, np.arange(segments), side="right") - 1
-    return np.asarray(values[..., block])

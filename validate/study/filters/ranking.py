@@ -144,8 +144,13 @@ def _ranking(
 ) -> Ranking:
     scored = [(c, value) for c in cells if (value := records[c.key].value) is not None]
     failed = [(c, records[c.key].why) for c in cells if records[c.key].value is None]
-    scored, other = _comparable(scored, by)
-    order = sorted(scored, key=lambda one: interval(one[1].scores[by]).mean)
+    # Those scored on the most markers, and the others with the reason: fewer are another score
+    on = {c.key: frozenset(w.name for w in of_score(v.withheld, by)) for c, v in scored}
+    most = max(on.values(), key=len, default=frozenset())
+    kept = [(c, v) for c, v in scored if by in v.scores and (on[c.key] == most or by == LOG_LOSS)]
+    rest = [(c, v) for c, v in scored if c.key not in {k.key for k, _ in kept}]
+    other = [(c, _why_not(v, by, on[c.key], most)) for c, v in rest]
+    order = sorted(kept, key=lambda one: interval(one[1].scores[by]).mean)
     values = {c.key: value for c, value in order}
     names = {c.key: f"{c.name} ({named(c.settings)})" if c.settings else c.name for c, _ in order}
     blocks = blocks_of({names[key]: v for key, v in values.items()})
@@ -155,12 +160,19 @@ def _ranking(
     for i, (cell, value) in enumerate(order):
         better = dominator(i, [m.mean for m in means], times)
         difference = score_difference(value, order[0][1], by, blocks)
+        overlaps = tuple(j + 1 for j, s in enumerate(means) if j != i and means[i].overlaps(s))
         rows.append(
             Ranked(
-                i + 1, cell, value, means[i], _overlaps(i, means), difference, tied(difference),
+                i + 1,
+                cell,
+                value,
+                means[i],
+                overlaps,
+                difference,
+                tied(difference),
                 None if better is None else better + 1,
             )
-        )  # fmt: skip
+        )
     of_filters = {names[c.key]: v for c, v in order if v.nis is not None and not c.baseline}
     others = {names[c.key]: v for c, v in order if v.nis is None or c.baseline}
     chosen = nested(
@@ -176,15 +188,6 @@ def _segmented(order: ScoredCells, by: str) -> bool:
     return any(v.sums(by) is not None for _, v in order)
 
 
-def _comparable(scored: ScoredCells, by: str) -> tuple[ScoredCells, list[tuple[FilterCell, str]]]:
-    """Those scored on the most markers, and the others with the reason: fewer are another score."""
-    on = {c.key: frozenset(w.name for w in of_score(v.withheld, by)) for c, v in scored}
-    most = max(on.values(), key=len, default=frozenset())
-    kept = [(c, v) for c, v in scored if by in v.scores and (on[c.key] == most or by == LOG_LOSS)]
-    left = [(c, v) for c, v in scored if c.key not in {k.key for k, _ in kept}]
-    return kept, [(c, _why_not(v, by, on[c.key], most)) for c, v in left]
-
-
 def _why_not(value: FilterScores, by: str, names: frozenset[str], most: frozenset[str]) -> str:
     if by == LOG_LOSS and value.predictions is not None:
         return f"no {by}: its variance needs samples in two blocks of time"
@@ -194,10 +197,6 @@ def _why_not(value: FilterScores, by: str, names: frozenset[str], most: frozense
         f"scored on {', '.join(sorted(names)) or 'nothing'}, other cells on "
         f"{', '.join(sorted(most))}: give it two markers or more, or name --hold-out"
     )
-
-
-def _overlaps(i: int, scores: Sequence[SeedInterval]) -> tuple[int, ...]:
-    return tuple(j + 1 for j, s in enumerate(scores) if j != i and scores[i].overlaps(s))
 
 
 def tied(difference: SeedInterval) -> bool:

@@ -112,19 +112,15 @@ def _changes(cell: FilterCell, method: Method, *, quick: bool) -> list[FilterCha
     for what in ("process", "measurement", "start"):
         name = getattr(noise, what)
         if name and getattr(method.settings, name) != 0:
+            unit = type(method.settings).__dataclass_fields__[name].metadata.get("unit", "")
             changes += [
                 FilterChange(cell, f"{what} noise", name, f)
-                for f in _factors(method.settings, name)
+                for f in (_VARIANCE if unit == "m2" else _SD)
             ]
     if quick:
         return changes
     changes += [FilterChange(cell, "step", "", f) for f in _STEPS]
     return changes + [FilterChange(cell, "dropped samples", "", share) for share in _DROPPED]
-
-
-def _factors(settings: Any, name: str) -> tuple[float, float]:
-    unit = type(settings).__dataclass_fields__[name].metadata.get("unit", "")
-    return _VARIANCE if unit == "m2" else _SD
 
 
 def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
@@ -139,7 +135,18 @@ def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
 def _changed(ready: Ready, change: FilterChange) -> Ready:
     method, factor = ready.method, change.factor
     if change.what == "dropped samples":
-        return replace(ready, registered=_dropped(ready, factor))
+        # That share of the samples of all markers is missing
+        rng = np.random.default_rng(_SEED)
+
+        def without(sensor: Any) -> Any:
+            if not isinstance(sensor, MarkerObservation):
+                return sensor
+            x = sensor.x.copy()
+            x[rng.random(len(x)) < factor] = np.nan
+            return replace(sensor, x=x)
+
+        observations = tuple(without(o) for o in ready.registered.observations)
+        return replace(ready, registered=replace(ready.registered, observations=observations))
     if change.what == "step":
         split, stride = (round(1 / factor), 1) if factor < 1 else (1, round(factor))
         return replace(ready, method=replace(method, split=split, stride=stride))
@@ -152,21 +159,6 @@ def _changed(ready: Ready, change: FilterChange) -> Ready:
     return replace(
         ready, method=replace(method, settings=replace(method.settings, **{change.setting: scaled}))
     )
-
-
-def _dropped(ready: Ready, share: float) -> Any:
-    """The registered recording with that share of the samples of all markers missing."""
-    rng = np.random.default_rng(_SEED)
-
-    def without(sensor: Any) -> Any:
-        if not isinstance(sensor, MarkerObservation):
-            return sensor
-        x = sensor.x.copy()
-        x[rng.random(len(x)) < share] = np.nan
-        return replace(sensor, x=x)
-
-    observations = tuple(without(o) for o in ready.registered.observations)
-    return replace(ready.registered, observations=observations)
 
 
 # --- report -------------------------------------------------------------------------------------

@@ -120,7 +120,15 @@ def study(
     planned = plan(declared, options, axes(sweeps or _declared(declared, options)), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(declared, KIND, out) / CELLS, where, report)
-    _require_filters(planned, done)
+    # Where every filter failed, nothing is compared
+    known = planned.experiment.methods
+    cells = [c for c in planned.cells if known[c.method].markers and not c.baseline]
+    failed = [c for c in cells if done.records[c.key].value is None]
+    if cells and len(failed) == len(cells):
+        first = done.records[failed[0].key].why
+        raise ComparisonError(
+            f"all {len(cells)} settings of filters failed; the first, {failed[0].label}: {first}"
+        )
     done = replace(done, records=with_likelihoods(planned.cells, done.records))
     by = by or usual_score(done, in_turn=hold_out == EACH)
     _require_score(done, by)
@@ -134,18 +142,6 @@ def _declared(experiment: Experiment, options: Options) -> list[str]:
         s.text for s in experiment.sweeps
         if not s.path.startswith("methods.") or s.path.split(".")[1] in chosen
     ]  # fmt: skip
-
-
-def _require_filters(planned: FilterPlan, done: Finished[FilterScores]) -> None:
-    """Raises `ComparisonError` with the first reason where every filter failed."""
-    known = planned.experiment.methods
-    cells = [c for c in planned.cells if known[c.method].markers and not c.baseline]
-    failed = [c for c in cells if done.records[c.key].value is None]
-    if cells and len(failed) == len(cells):
-        first = done.records[failed[0].key].why
-        raise ComparisonError(
-            f"all {len(cells)} settings of filters failed; the first, {failed[0].label}: {first}"
-        )
 
 
 def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
@@ -200,14 +196,10 @@ def run_line(planned: FilterPlan, cell: FilterCell) -> str:
     methods = tuple(dict.fromkeys((*beside, cell.method)))
     values = {**dict(planned.job.values), **cell.values}
     case = values.pop(CASE, "")
-    kept = {k: v for k, v in values.items() if _concerns(k, methods)}
+    prefixes = tuple(f"{METHODS}{m}." for m in methods)
+    kept = {k: v for k, v in values.items() if not k.startswith(METHODS) or k.startswith(prefixes)}
     parts = ["validate", "run", experiment.name]
     for path, value in kept.items():
         parts += ["--set", f"{path}={value}"]
     parts += ["--case", case] if case else []
     return shlex.join([*parts, "--methods", ",".join(methods)])
-
-
-def _concerns(path: str, methods: Sequence[str]) -> bool:
-    prefixes = tuple(f"{METHODS}{m}." for m in methods)
-    return not path.startswith(METHODS) or path.startswith(prefixes)

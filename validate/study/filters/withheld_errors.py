@@ -325,14 +325,11 @@ def _of_sensor(sensor: Observation, run: Run, segments: Segments) -> list[Withhe
         if not len(t):
             continue
         for d in sensor.deviations(run, Selection(f"part {i + 1}", t)):
-            one = withheld.setdefault(d.quantity, _none(d.quantity, d.unit, segments))
+            none = np.zeros((2, 1, segments.count))
+            one = withheld.setdefault(d.quantity, Withheld(d.quantity, d.unit, *none))
             one.squares[0, i] = float((d.values**2).sum())
             one.counts[0, i] = len(d.values)
     return [w for w in withheld.values() if w.counts.any()]
-
-
-def _none(name: str, unit: str, segments: Segments) -> Withheld:
-    return Withheld(name, unit, np.zeros((1, segments.count)), np.zeros((1, segments.count)))
 
 
 # --- several recordings ---------------------------------------------------------------------------

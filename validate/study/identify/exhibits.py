@@ -103,7 +103,8 @@ def _correlations(one: Calibrated) -> Iterator[Heat]:
 
 def _starts(one: Calibrated) -> NumberTable:
     found = one.found
-    head = ("start", "chi-square / 1", *(f"{n} / {u}" for n, u in _named(one)),
+    named = zip(found.space.names, _si(one), strict=True)
+    head = ("start", "chi-square / 1", *(f"{n} / {shown_unit(u) or '1'}" for n, u in named),
             "evaluations", "ended")  # fmt: skip
     rows = tuple(
         (i + 1, f.chi_square if f.count else None,
@@ -117,7 +118,3 @@ def _starts(one: Calibrated) -> NumberTable:
 
 def _si(one: Calibrated) -> list[str]:
     return [units(one)[n] for n in one.found.space.names]
-
-
-def _named(one: Calibrated) -> list[tuple[str, str]]:
-    return [(n, shown_unit(u) or "1") for n, u in zip(one.found.space.names, _si(one), strict=True)]

@@ -137,14 +137,11 @@ class _Cells:
         return self._owner.finished(Plan(self._job, cells, open_bench, run_start, Fit))
 
     def sides(self, best: Fit, wanted: Sequence[tuple[int, int]], scale: float) -> Sequence[Side]:
-        cells = tuple(
-            _keyed(self._job, SideCell(self._of, best, i, sign, scale, self._words(i, sign)))
-            for i, sign in wanted
-        )
-        return self._owner.finished(Plan(self._job, cells, open_bench, run_side, Side))
-
-    def _words(self, i: int, sign: int) -> str:
-        return f"profile of {self._names[i]}, {'upwards' if sign > 0 else 'downwards'}"
+        cells = []
+        for i, sign in wanted:
+            label = f"profile of {self._names[i]}, {'upwards' if sign > 0 else 'downwards'}"
+            cells.append(_keyed(self._job, SideCell(self._of, best, i, sign, scale, label)))
+        return self._owner.finished(Plan(self._job, tuple(cells), open_bench, run_side, Side))
 
 
 def _keyed(job: Job, cell: Any) -> Any:

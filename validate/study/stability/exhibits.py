@@ -85,12 +85,9 @@ def _of_paper(
         return
     record = study.done.records[cell.key]
     limits = {s.scheme: s.predicted for s in (record.value or Stepped()).schemes}
-    for p in _at(points(cell, record, study.schemes), paper.dt):
-        yield paper, p, limits.get(p.scheme)
-
-
-def _at(found: Iterator[Point], dt: float) -> Iterator[Point]:
-    return (p for p in found if np.isclose(p.dt, dt, rtol=1e-6))
+    for p in points(cell, record, study.schemes):
+        if np.isclose(p.dt, paper.dt, rtol=1e-6):
+            yield paper, p, limits.get(p.scheme)
 
 
 # --- maps ----------------------------------------------------------------------------------------
@@ -117,6 +114,8 @@ def _map(study: Stability, name: str) -> RegimeMap | None:
     panels = tuple(_panel(study, s, [c for _, c in cells], found) for s in study.schemes)
     shown = tuple(_text(name, v) for v, _ in cells)
     marks = tuple(_marks(study, name, [v for v, _ in cells]))
+    hollow = any(not m.on_map for m in marks)
+    more = " Hollow: differs from the base in further quantities; see the table." if hollow else ""
     return RegimeMap(
         name,
         f"{study.experiment.name}: time step against {_LABELS[name].split(' / ')[0]}",
@@ -127,14 +126,8 @@ def _map(study: Stability, name: str) -> RegimeMap | None:
         _WORDS,
         panels,
         marks,
-        _caption(marks),
+        f"Line: predicted limit. Marks: settings of the papers.{more}",
     )
-
-
-def _caption(marks: tuple[Mark, ...]) -> str:
-    hollow = any(not m.on_map for m in marks)
-    more = " Hollow: differs from the base in further quantities; see the table." if hollow else ""
-    return f"Line: predicted limit. Marks: settings of the papers.{more}"
 
 
 def _rows(study: Stability, name: str) -> tuple[Turned, ...]:

@@ -69,8 +69,9 @@ def stability_cells(
     wanted = [base.base, *(p.variant for p in base.papers), drifting, *_swept(base, quick)]
     impossible = {replace(base.base, **{k: v}): word for k, v, word in IMPOSSIBLE}  # type: ignore[arg-type]
     impossible[replace(base.base, mesh=2 * base.meshes[-1])] = "unknowns"
+    # A printed material of nu = 0.5 must be refused.
     bare = (
-        StabilityCell(v, steps, v == drifting, impossible.get(v, _of_paper(v)))
+        StabilityCell(v, steps, v == drifting, impossible.get(v, "Poisson" if v.nu >= 0.5 else ""))
         for v in dict.fromkeys([*wanted, *impossible])
     )
     return tuple(replace(c, key=key_of(job, c)) for c in bare)
@@ -84,11 +85,6 @@ def drift_variant(base: StabilityBody) -> Turned:
 def axis(base: StabilityBody, name: str) -> tuple[Turned, ...]:
     """Return the variants along one axis from the base: nu, E, damping, quality or mesh."""
     return tuple(replace(base.base, **changes) for changes in _axes(base)[name])
-
-
-def _of_paper(v: Turned) -> str:
-    """Why a printed material must be refused; "" where it need not."""
-    return "Poisson" if v.nu >= 0.5 else ""
 
 
 def _axes(base: StabilityBody) -> dict[str, Pairs]:

@@ -159,7 +159,15 @@ def _predictions(study: Stability) -> Iterator[Prediction]:
         own = [s for r in study.ran for s in r.schemes if s.scheme == name]
         yield (_limit if declared()[name].limit else _no_limit)(name, own)
     yield _drift(study.ran)
-    yield _refusals(study)
+    # Exactly those that cannot be are refused, each for its own reason
+    wrong = []
+    for cell in study.cells:
+        refused = study.done.records[cell.key].refused
+        if bool(refused) != bool(cell.expected) or cell.expected not in refused:
+            wrong.append(f"{cell.variant}: '{refused}'")
+    expected = sum(1 for c in study.cells if c.expected)
+    refusal = wrong[0] if wrong else "refused exactly where required, for the right reason"
+    yield Prediction("refusals", len(wrong), 0, expected, not wrong and expected > 0, refusal)
     failed = [r.failed for r in study.done.records.values() if r.failed]
     why = failed[0] if failed else ""
     yield Prediction("variants that failed", len(failed), 0, len(study.cells), not failed, why)
@@ -197,15 +205,3 @@ def _drift(ran: tuple[Stepped, ...]) -> Prediction:
     holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE
     why = "energy of conservative schemes over 1e5 undamped steps in float64"
     return Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)
-
-
-def _refusals(study: Stability) -> Prediction:
-    """Exactly those that cannot be are refused, each for its own reason."""
-    wrong = []
-    for cell in study.cells:
-        refused = study.done.records[cell.key].refused
-        if bool(refused) != bool(cell.expected) or cell.expected not in refused:
-            wrong.append(f"{cell.variant}: '{refused}'")
-    count = sum(1 for c in study.cells if c.expected)
-    why = wrong[0] if wrong else "refused exactly where required, for the right reason"
-    return Prediction("refusals", len(wrong), 0, count, not wrong and count > 0, why)

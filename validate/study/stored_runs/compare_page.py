@@ -6,7 +6,7 @@ from typing import Any
 from validate.compare.exhibit import Exhibit, NumberTable, Picture
 from validate.report.views.records import table
 from validate.study.loose_page import write_loose
-from validate.study.stored_runs.score_comparison import Pair, Row, SideBySide, pairs
+from validate.study.stored_runs.score_comparison import Pair, SideBySide, pairs
 
 _PICTURES = 6  # pairs that are drawn
 _DRAWN = 40  # scores of a picture
@@ -41,16 +41,12 @@ def _pair(number: int, pair: Pair) -> Exhibit:
 def _pictures(number: int, pair: Pair) -> tuple[Picture, ...]:
     from validate.report.charts.changes import picture
 
-    changed = [(_label(r), r.changes[1]) for r in pair.rows]
+    changed = [(f"{r.method}: {r.score}" if r.method else r.score, r.changes[1]) for r in pair.rows]
     drawn = [(name, c) for name, c in changed if c is not None][:_DRAWN]
     if not drawn or number > _PICTURES:
         return ()
     labels, changes = zip(*drawn, strict=True)
     return (picture(f"changes_{number}", f"From {pair.one} to {pair.other}", labels, changes),)
-
-
-def _label(row: Row) -> str:
-    return f"{row.method}: {row.score}" if row.method else row.score
 
 
 def _parameters(found: SideBySide) -> Exhibit:

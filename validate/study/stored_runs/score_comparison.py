@@ -115,11 +115,25 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
     if len(runs) < 2:
         raise UsageError(f"{len(runs)} run to compare; give two or more report folders")
     runs = tuple(runs)
-    names = _distinct([r.name for r in runs])
-    columns, found = _by_method(runs, names)
+    # The names, numbered where two folders share one
+    folders = [r.name for r in runs]
+    names = tuple(
+        name if folders.count(name) == 1 else f"{name} ({folders[: i + 1].count(name)})"
+        for i, name in enumerate(folders)
+    )
+    # Columns are runs
+    keys = dict.fromkeys(k for r in runs for k in r.scores)
+    shared = [k for k in keys if sum(k in r.scores for r in runs) >= 2]
+    columns, found = names, [(k, [r.scores.get(k) for r in runs]) for k in shared]
     by_score = not found
     if by_score:
-        columns, found = _by_score(runs, names)
+        # Columns are methods of runs; a score must be there in two of the runs
+        of_runs = [(i, m) for i, r in enumerate(runs) for m in r.methods]
+        of_run = [{score for _, score in r.scores} for r in runs]
+        scores = dict.fromkeys(score for r in runs for _, score in r.scores)
+        twice = [s for s in scores if sum(s in own for own in of_run) >= 2]
+        columns = tuple(f"{names[i]}: {m}" for i, m in of_runs)
+        found = [(("", s), [runs[i].scores.get((m, s)) for i, m in of_runs]) for s in twice]
     warnings = list(_warnings(runs, names))
     rows = []
     for (method, score), values in found:
@@ -134,33 +148,13 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
         have = "; ".join(
             f"{n} has {len(r.scores)} scores" for n, r in zip(names, runs, strict=True)
         )
-        raise ComparisonError(f"0 scores shared, nothing compared: {have}" + _also(warnings))
+        raise ComparisonError(
+            f"0 scores shared, nothing compared: {have}" + (f"; {warnings[-1]}" if warnings else "")
+        )
     return SideBySide(runs, columns, tuple(rows), _parameters(runs), tuple(warnings), by_score)
 
 
-def _also(warnings: Sequence[str]) -> str:
-    return f"; {warnings[-1]}" if warnings else ""
-
-
 Found = list[tuple[tuple[str, str], list[LongRow | None]]]
-
-
-def _by_method(
-    runs: tuple[StoredRun, ...], names: tuple[str, ...]
-) -> tuple[tuple[str, ...], Found]:
-    keys = dict.fromkeys(k for r in runs for k in r.scores)
-    shared = [k for k in keys if sum(k in r.scores for r in runs) >= 2]
-    return names, [(k, [r.scores.get(k) for r in runs]) for k in shared]
-
-
-def _by_score(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> tuple[tuple[str, ...], Found]:
-    """Columns are methods of runs; a score must be there in two of the runs."""
-    pairs = [(i, m) for i, r in enumerate(runs) for m in r.methods]
-    of_run = [{score for _, score in r.scores} for r in runs]
-    scores = dict.fromkeys(score for r in runs for _, score in r.scores)
-    shared = [s for s in scores if sum(s in own for own in of_run) >= 2]
-    columns = tuple(f"{names[i]}: {m}" for i, m in pairs)
-    return columns, [(("", s), [runs[i].scores.get((m, s)) for i, m in pairs]) for s in shared]
 
 
 def _warnings(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> list[str]:
@@ -214,14 +208,6 @@ def _run(table: LongTable) -> StoredRun:
         tuple(str(i["sha256"]) for i in head["inputs"]),
         bool(head.get("quick", False)),
         tuple(str(m["name"]) for m in methods if m.get("accepted")),
-    )
-
-
-def _distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, numbered where two folders share one."""
-    return tuple(
-        name if names.count(name) == 1 else f"{name} ({names[: i + 1].count(name)})"
-        for i, name in enumerate(names)
     )
 
 

@@ -235,18 +235,6 @@ def _refused(dt: float, error: ValidateError) -> Stride:
     return Stride(dt, failed=" ".join(f"refused: {error}".split()))
 
 
-def _whole(trial: Trial, solver: SceneSolver, system: System, dt: float) -> Stride:
-    """Of a solver that is given all times at once: its own seconds and memory."""
-    t, start = trial.times(dt), perf_counter()
-    run = solver.solve(system.scene, t, trial.inputs(t))
-    unknowns, setup = len(system.free), run.setup_s or perf_counter() - start
-    stride = Stride(dt, None, unknowns, setup, run.step_s, 0.0, run.memory, "its own")
-    if not run.finished:
-        return replace(stride, step=None, failed=f"{run.outcome.state}: {run.outcome.why}")
-    at = np.round(trial.frames / dt).astype(np.int64) - 1
-    return _answered(stride, trial, system, replace(run, at=at, u=run.u[at]))
-
-
 def _stride(
     trial: Trial,
     scheme: Scheme | SceneSolver,
@@ -256,14 +244,30 @@ def _stride(
     budget: float,
 ) -> Stride:
     if isinstance(scheme, SceneSolver):
-        return _whole(trial, scheme, system, dt)
+        # A solver that is given all times at once: its own seconds and memory
+        t, began = trial.times(dt), perf_counter()
+        run = scheme.solve(system.scene, t, trial.inputs(t))
+        unknowns, setup = len(system.free), run.setup_s or perf_counter() - began
+        stride = Stride(dt, None, unknowns, setup, run.step_s, 0.0, run.memory, "its own")
+        if not run.finished:
+            return replace(stride, step=None, failed=f"{run.outcome.state}: {run.outcome.why}")
+        at = np.round(trial.frames / dt).astype(np.int64) - 1
+        return _answered(stride, trial, system, replace(run, at=at, u=run.u[at]))
     stepper = scheme.prepare(system)
-    warmed = _warm(trial, stepper)
+    # The largest inputs, after a step under them where there is a table to be filled
+    warmed = trial.largest_inputs
+    if not trial.dynamic:
+        stepper.step(stepper.rest(), warmed)
     setup = perf_counter() - start
-    tried = _tried(trial, stepper, dt, setup)
+    first = _march(trial, stepper, dt, setup, _FIRST)
+    short = first.step_s is not None and first.step_s.p50 * _PROBED < _PROBE_S
+    tried = _march(trial, stepper, dt, setup, _PROBED) if first.finished and short else first
+    # Matrices that were asked for, of K, M and C (with the lumped masses)
+    made = [name for name in ("K", "M", "C", "masses") if name in system.__dict__]
+    assembled = " ".join("m" if name == "masses" else name for name in made) or "none"
     stride = Stride(
         dt, None, len(system.free), setup, None, _field_seconds(stepper, warmed),
-        held_bytes(stepper), _assembled(system),
+        held_bytes(stepper), assembled,
     )  # fmt: skip
     if not tried.finished:
         return replace(stride, failed=f"{tried.outcome.state}: {tried.outcome.why}")
@@ -279,20 +283,6 @@ def _stride(
     return _answered(replace(stride, step=run.step_s), trial, system, run)
 
 
-def _warm(trial: Trial, stepper: Stepper) -> Floats:
-    """The largest inputs, after a step under them where there is a table to be filled."""
-    largest = trial.largest_inputs
-    if not trial.dynamic:
-        stepper.step(stepper.rest(), largest)
-    return largest
-
-
-def _tried(trial: Trial, stepper: Stepper, dt: float, setup: float) -> Run:
-    run = _march(trial, stepper, dt, setup, _FIRST)
-    short = run.step_s is not None and run.step_s.p50 * _PROBED < _PROBE_S
-    return _march(trial, stepper, dt, setup, _PROBED) if run.finished and short else run
-
-
 def _field_seconds(stepper: Stepper, inputs: Floats) -> float:
     """Median seconds of forming all displacements of a state."""
     state = stepper.step(stepper.rest(), inputs)
@@ -305,9 +295,3 @@ def _timed(call: Callable[[], object]) -> float:
     start = perf_counter()
     call()
     return perf_counter() - start
-
-
-def _assembled(system: System) -> str:
-    """Matrices that were asked for, of K, M and C (with the lumped masses)."""
-    made = [name for name in ("K", "M", "C", "masses") if name in system.__dict__]
-    return " ".join("m" if name == "masses" else name for name in made) or "none"

@@ -150,17 +150,14 @@ def _shares(trade: Trade) -> Exhibit:
         "One row for every solver, element and mesh: the step with the least error. "
         "cells.csv has all steps."
     )
-    least = table("shares", "Components of each error", _least(trade.rows), columns, note)
-    return Exhibit("shares", "Mesh error and solver error", words, (least,), (_mesh_chart(trade),))
-
-
-def _least(rows: Iterable[TradeRow]) -> list[TradeRow]:
+    # The step with the least error of every solver, element and mesh
     best: dict[tuple[str, str, int], TradeRow] = {}
-    for r in rows:
-        key = (r.solver.name, r.element, r.level)
-        if r.error is not None and (key not in best or r.error < (best[key].error or 0.0)):
-            best[key] = r
-    return list(best.values())
+    for row in trade.rows:
+        key = (row.solver.name, row.element, row.level)
+        if row.error is not None and (key not in best or row.error < (best[key].error or 0.0)):
+            best[key] = row
+    least = table("shares", "Components of each error", list(best.values()), columns, note)
+    return Exhibit("shares", "Mesh error and solver error", words, (least,), (_mesh_chart(trade),))
 
 
 def _mesh_chart(trade: Trade) -> Chart:
