@@ -5,6 +5,7 @@ Lengths m, colours 0..1, rotations x y z w.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,12 @@ class Rgba:
 
     @property
     def message(self) -> Color:
-        return Color(r=self.r, g=self.g, b=self.b, a=self.a)
+        return _colour(self.r, self.g, self.b, self.a)
+
+
+@cache
+def _colour(r: float, g: float, b: float, a: float) -> Color:
+    return Color(r=r, g=g, b=b, a=a)
 
 
 def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> bytes:
@@ -137,7 +143,7 @@ def surface(
         pose=_AT_ORIGIN,
         points=_points(np.round(points, 6)),
         color=Rgba(1.0, 1.0, 1.0).message,
-        colors=[Rgba(*shade).message for shade in np.round(colours, 3).tolist()],
+        colors=[_colour(*shade) for shade in np.round(colours, 3).tolist()],
         indices=triangles.ravel().tolist(),
     )
     return _entity(ns, frame, name, notes, triangles=[drawn])
