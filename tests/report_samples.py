@@ -1,8 +1,10 @@
 """A small synthetic result: a cube between plates, two recordings of force, nothing optional."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from validate.compare.effects import Change, Effect
 from validate.compare.exhibit import Exhibit
@@ -18,6 +20,7 @@ from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.report.long_table import LongTable
+from validate.report.scenes import gl
 from validate.report.sections.sections import Begun, parts
 from validate.report.stored.store import document
 from validate.report.write import table_of
@@ -170,6 +173,12 @@ def bare_result() -> Result:
 def table(result: Result) -> LongTable:
     """The long table of a result."""
     return table_of(result, document(result, "2026-11-21T04:00:00Z"), result.name)
+
+
+def no_gl() -> None:
+    """Skip what draws bodies; a failure where OpenGL is meant to be."""
+    assert os.environ.get("VALIDATE_REQUIRE_GL") != "1", gl.HOW_TO_GET
+    pytest.skip("no OpenGL library (VALIDATE_REQUIRE_GL=1 makes this a failure)")
 
 
 def parts_of(result: Result) -> list[tuple[int, Begun | Exhibit]]:

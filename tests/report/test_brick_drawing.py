@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from report_samples import no_gl
 
 from experiments.bending_rod.body import bending_rod
 from validate.report.scenes import gl
@@ -50,7 +51,7 @@ def test_a_surface_is_whole_and_bends_as_its_elements_do(kind: Kind) -> None:
 def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
     """Its own local coordinates of the 27 nodes, in its order, are the places of ours."""
     if not gl.available():
-        pytest.skip(gl.HOW_TO_GET)
+        no_gl()
     from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
 
     from validate.report.scenes.stills import vtk_order

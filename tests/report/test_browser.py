@@ -365,6 +365,31 @@ def test_a_saved_picture_names_what_it_shows(browser: str, report: Path, tmp_pat
 
 
 @pytest.mark.slow
+def test_the_body_is_saved_on_white_from_a_dark_page(
+    browser: str, report: Path, tmp_path: Path
+) -> None:
+    action = f"""{PICTURES} {ROWS} const canvas = document.querySelector(".viewer canvas");
+      URL.createObjectURL = blob => {{ found.blob = blob; return "#"; }};
+      all(".viewer button").find(b => b.textContent === "Save SVG").click();
+      found.text = await found.blob.text(); delete found.blob;
+      const whole = await rows(), room = (whole.length - canvas.height) / 2;
+      found.white = Math.max(...whole.slice(room, -room)); // of the picture between its words
+      const pen = document.createElement("canvas").getContext("2d");
+      tell(window, "resize"); picture(); pen.drawImage(canvas, 0, 0);
+      found.corner = [...pen.getImageData(0, 0, 1, 1).data];"""
+    dark = "--blink-settings=preferredColorScheme=0"
+    found, _ = look(browser, report, tmp_path, 1280, action, dark)
+    top = ElementTree.fromstring(found["text"])
+    (image,) = top.iter("{http://www.w3.org/2000/svg}image")
+    assert image.get("href", "").startswith("data:image/png;base64,")
+    words = [one.text or "" for one in top.iter("{http://www.w3.org/2000/svg}text")]
+    assert words[0] == "soft <cube>"
+    assert "2 mm; displacement / mm: 0 to " in words[1]
+    assert found["white"] == 255
+    assert max(found["corner"][:3]) < 230  # of the page itself
+
+
+@pytest.mark.slow
 def test_images_have_a_slider_and_are_all_there_without_scripts(
     browser: str, tmp_path: Path
 ) -> None:
@@ -392,7 +417,8 @@ def test_images_have_a_slider_and_are_all_there_without_scripts(
 @pytest.mark.slow
 def test_zeros_on_a_logarithmic_axis_are_gaps(browser: str, tmp_path: Path) -> None:
     x = np.arange(4.0)
-    series = (Series("falls", x, np.array([10.0, 1.0, 0.0, -1.0])), Series("none", x, 0 * x))
+    series = (Series("falls", x, np.array([10.0, 1.0, 0.0, -1.0])), Series("none", x, 0 * x),
+              Series("tiny", x, np.full(4, 4e-66)))  # 67 decades stop uPlot  # fmt: skip
     chart = Chart("logs", "Logarithmic", "t / s", "error / mm", series, log="y")
     page = of(replace(small_result(), exhibits=(Exhibit("l", "L", charts=(chart,)),)))(
         tmp_path / "r"

@@ -14,7 +14,7 @@ import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import parts_of, sections_of, small_result
+from report_samples import no_gl, parts_of, sections_of, small_result
 from tracking_samples import AT, STEPS, WHY, T, failed_result, swing, tracking_result
 
 from validate.checksums import unsealed
@@ -203,7 +203,7 @@ def test_captions_of_maps_have_units(made: dict[str, DrawnExhibit]) -> None:
 @pytest.mark.slow
 def test_maps_are_rendered_where_gl_is(result: Result) -> None:
     if not gl.available():
-        pytest.skip("no OpenGL")
+        no_gl()
     from validate.report.scenes.stills import rendered
 
     shown_map = result.exhibits[1].maps[0]

@@ -87,6 +87,9 @@ def _method(
             "measured": _packed(seen.measured, "<f4"),
             "simulated": _packed(seen.simulated, "<f4"), "inside": seen.inside,
         },
+        "probes": shown.probes and {
+            "rest": _packed(shown.probes[0], "<f4"), "moved": _packed(shown.probes[1], "<f4"),
+        },
         "outlines": [
             {"measured": _packed(measured, "<f4"), "simulated": _packed(simulated, "<f4")}
             for measured, simulated in shown.outlines

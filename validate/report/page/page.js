@@ -12,6 +12,15 @@
     return one;
   };
   const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const written = (x, y, words, more = "") => { // words in a drawing, escaped
+    const one = make("span", {}, String(words));
+    return `<text x="${x}" y="${y}" ${more}>${one.innerHTML}</text>`;
+  };
+  const saved = (name, drawing) => {
+    const link = make("a", { href: URL.createObjectURL(new Blob([drawing], { type: "image/svg+xml" })), download: `${name}.svg` });
+    link.click();
+    URL.revokeObjectURL(link.href);
+  };
   const shown = value => value == null ? "–" : String(Number(value.toPrecision(4)));
 
   // --- sections: a link opens what it leads to --------------------------------------------------
@@ -132,12 +141,7 @@
     }, uPlot.join(tables), box);
     for (const row of box.querySelectorAll(".u-series.branch")) row.hidden = true;
     const save = make("button", { type: "button" }, "Save SVG");
-    save.addEventListener("click", () => {
-      const blob = new Blob([vector(drawn)], { type: "image/svg+xml" });
-      const link = make("a", { href: URL.createObjectURL(blob), download: `${figure.id}.svg` });
-      link.click();
-      URL.revokeObjectURL(link.href);
-    });
+    save.addEventListener("click", () => saved(figure.id, vector(drawn)));
     box.append(make("p", { class: "note" },
       "Drag to zoom, double-click to see all; a click on a name hides its curve. ", save));
     figure.classList.add("live");
@@ -153,10 +157,6 @@
     const at = (v, scale) => (plot.valToPos(v, scale) + (scale === "x" ? left : top)).toFixed(1);
     const ends = plot.bands.flatMap(b => b.series);
     const lines = [], names = new Map();
-    const text = (x, y, words, more = "") => {
-      const one = make("span", {}, String(words)); // escapes
-      return `<text x="${x}" y="${y}" ${more}>${one.innerHTML}</text>`;
-    };
     const points = i => plot.data[0].flatMap((x, k) =>
       plot.data[i][k] == null ? [] : [`${at(x, "x")},${at(plot.data[i][k], "y")}`]);
     const print = one => one === style("--ink") ? "#000000" : one;
@@ -182,13 +182,13 @@
     const [across, upward] = plot.axes.map(a => a._splits.map((v, i) => [v, a._values[i]]).filter(t => t[1] !== ""));
     const frame = `<rect x="${left}" y="${top}" width="${wide}" height="${high}" fill="none" stroke="#000000"/>`;
     const ticks = [
-      ...across.map(([v, words]) => text(at(v, "x"), top + high + 16, words, 'text-anchor="middle"')),
-      ...upward.map(([v, words]) => text(left - 6, Number(at(v, "y")) + 4, words, 'text-anchor="end"')),
-      text(left + wide / 2, top + high + 34, plot.axes[0].label, 'text-anchor="middle"'),
-      text(0, 0, plot.axes[1].label, `text-anchor="middle" transform="translate(14 ${top + high / 2}) rotate(-90)"`),
+      ...across.map(([v, words]) => written(at(v, "x"), top + high + 16, words, 'text-anchor="middle"')),
+      ...upward.map(([v, words]) => written(left - 6, Number(at(v, "y")) + 4, words, 'text-anchor="end"')),
+      written(left + wide / 2, top + high + 34, plot.axes[0].label, 'text-anchor="middle"'),
+      written(0, 0, plot.axes[1].label, `text-anchor="middle" transform="translate(14 ${top + high / 2}) rotate(-90)"`),
     ];
     const legend = [...names].map(([name, colour], i) =>
-      text(left, top + high + 54 + 16 * i, `\u2014 ${name}`, `fill="${colour}"`));
+      written(left, top + high + 54 + 16 * i, `\u2014 ${name}`, `fill="${colour}"`));
     const size = [plot.width, top + high + 60 + 16 * names.size];
     return `<svg xmlns="http://www.w3.org/2000/svg" width="${size[0]}" height="${size[1]}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/><clipPath id="inside"><rect x="${left}" y="${top}" width="${wide}" height="${high}"/></clipPath><g clip-path="url(#inside)">${lines.join("")}</g>${frame}${ticks.join("")}${legend.join("")}</svg>`;
   }
@@ -213,7 +213,7 @@
   // --- the body: three.js -----------------------------------------------------------------------
 
   const VIRIDIS = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
-  const ORANGE = "#d55e00", BLUE = "#0072b2", GREY = "#c9ced3";
+  const ORANGE = "#d55e00", BLUE = "#0072b2", GREY = "#c9ced3", PROBE = "#ffffff";
   const STEPS = 32767;
 
   const numbers = (text, Kind) => {
@@ -240,7 +240,7 @@
 
     // What is shown.
     const state = { method: 0, other: -1, frame: largest(methods[0]), by: "displacement",
-      markers: true, arrows: magnified(), outline: true, edges: false,
+      markers: true, arrows: magnified(), outline: true, probes: true, edges: false,
       through: methods.some(m => m.markers && m.markers.inside), cut: Boolean(view.cut), scale: 1 };
 
     function unpacked(m) {
@@ -252,7 +252,8 @@
         rest: numbers(m.markers.rest, Float32Array), measured: numbers(m.markers.measured, Float32Array), simulated: numbers(m.markers.simulated, Float32Array) };
       const outlines = m.outlines && m.outlines.map(o => ({
         measured: numbers(o.measured, Float32Array), simulated: numbers(o.simulated, Float32Array) }));
-      return { ...m, packed: m.nodes, nodes, triangles, u: shares(m.u), fields, markers, outlines };
+      const probes = m.probes && { rest: numbers(m.probes.rest, Float32Array), moved: numbers(m.probes.moved, Float32Array) };
+      return { ...m, packed: m.nodes, nodes, triangles, u: shares(m.u), fields, markers, outlines, probes };
     }
 
     function largest(m) {
@@ -327,7 +328,7 @@
     function pane(m) {
       const scene = new THREE.Scene();
       const light = new THREE.DirectionalLight("#ffffff", 1.6);
-      scene.background = new THREE.Color("#ffffff");
+      scene.background = new THREE.Color(style("--canvas"));
       scene.add(new THREE.AmbientLight("#ffffff", 1.7), light);
       const place = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
       const tint = new THREE.BufferAttribute(new Float32Array(m.nodes.length), 3);
@@ -363,9 +364,11 @@
         new THREE.MeshLambertMaterial({ color: ORANGE }), Math.max(k, 1));
       const loop = colour => new THREE.LineLoop(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));
       const measured = loop("#000000"), simulated = loop(BLUE);
-      for (const one of [balls, cones, measured, simulated]) one.frustumCulled = false;
-      scene.add(balls, cones, measured, simulated);
-      return { m, scene, light, place, tint, material, lines, parts, tools, balls, cones, measured, simulated };
+      const probes = new THREE.InstancedMesh(new THREE.SphereGeometry(0.0055 * view.size, 4, 2), // a diamond, smaller than a marker
+        new THREE.MeshLambertMaterial({ color: PROBE }), m.probes ? m.probes.rest.length / 3 : 1);
+      for (const one of [balls, cones, measured, simulated, probes]) one.frustumCulled = false;
+      scene.add(balls, cones, measured, simulated, probes);
+      return { m, scene, light, place, tint, material, lines, parts, tools, balls, cones, measured, simulated, probes };
     }
 
     function edgesOf(index) {
@@ -403,6 +406,17 @@
         solid.position.set(...shifts.subarray(3 * f, 3 * f + 3).map(v => state.scale * v));
       }
       points(p, f, low, high);
+      p.probes.visible = Boolean(m.probes) && state.probes;
+      if (m.probes) {
+        const { rest, moved } = m.probes, k = rest.length / 3, mover = new THREE.Object3D();
+        for (let i = 0; i < k; i++) {
+          const [x, y, z] = [0, 1, 2].map(c => rest[3 * i + c] + state.scale * (moved[3 * (f * k + i) + c] - rest[3 * i + c]));
+          mover.position.set(x, y, z);
+          mover.updateMatrix();
+          p.probes.setMatrixAt(i, mover.matrix);
+        }
+        p.probes.instanceMatrix.needsUpdate = true;
+      }
       const outline = state.outline && state.scale === 1 && m.outlines; // it has no points to scale
       for (const name of ["measured", "simulated"]) {
         p[name].visible = Boolean(outline);
@@ -483,21 +497,30 @@
 
     const shownPanes = () => state.other >= 0 ? [state.method, state.other] : [state.method];
 
-    function named() { // the picture with what it shows: methods above, instant and colours below
+    function painted(colour) { // behind the bodies
+      for (const p of panes) p.scene.background.set(colour);
       draw();
+    }
+
+    function named() { // the picture on white with what it shows: methods above, instant and colours below
+      painted("#ffffff");
       const size = Math.round(canvas.width / 45), room = Math.round(1.8 * size);
       const whole = make("canvas", { width: canvas.width, height: canvas.height + 2 * room });
       const pen = whole.getContext("2d"), two = shownPanes(), [low, high] = range(state.by);
       pen.fillStyle = "#ffffff";
       pen.fillRect(0, 0, whole.width, whole.height);
       pen.drawImage(canvas, 0, room);
+      const picture = canvas.toDataURL("image/png");
+      painted(style("--canvas"));
       pen.fillStyle = "#000000";
       pen.font = `${size}px sans-serif`;
       const each = whole.width / two.length;
-      two.forEach((number, i) => pen.fillText(methods[number].label, i * each + size / 2, 1.3 * size, each - size));
+      const titles = two.map((number, i) => [methods[number].label, i * each + size / 2, 1.3 * size, each - size]);
       const words = [view.labels[state.frame], `${names.get(state.by)}: ${shown(low)} to ${shown(high)}`, view.part];
-      pen.fillText(words.filter(Boolean).join("; "), size / 2, whole.height - 0.6 * size, whole.width - size);
-      return whole;
+      const said = [...titles, [words.filter(Boolean).join("; "), size / 2, whole.height - 0.6 * size, whole.width - size]];
+      for (const one of said) pen.fillText(...one);
+      const drawing = `<svg xmlns="http://www.w3.org/2000/svg" width="${whole.width}" height="${whole.height}" font-family="sans-serif" font-size="${size}"><rect width="100%" height="100%" fill="#ffffff"/><image y="${room}" width="${canvas.width}" height="${canvas.height}" href="${picture}"/>${said.map(([text, x, y]) => written(x, y, text)).join("")}</svg>`;
+      return { whole, drawing };
     }
 
     function update() {
@@ -540,8 +563,10 @@
     again.addEventListener("click", () => { aim(); draw(); });
     const save = make("button", { type: "button" }, "Save PNG");
     save.addEventListener("click", () => {
-      make("a", { href: named().toDataURL("image/png"), download: `${document.title}.png` }).click();
+      make("a", { href: named().whole.toDataURL("image/png"), download: `${document.title}.png` }).click();
     });
+    const drawn = make("button", { type: "button" }, "Save SVG");
+    drawn.addEventListener("click", () => saved(document.title, named().drawing));
     const labels = methods.map((m, i) => [i, m.label]);
     const row = make("div", { class: "controls" });
     if (frames > 1) row.append(make("label", {}, "Load or time "), slider, output);
@@ -565,12 +590,14 @@
         [10, "10 times"], [0, "none"]], state.arrows, v => { state.arrows = Number(v); }));
     }
     if (methods.some(m => m.outlines)) more.append(tick("outlines", "outline"));
+    if (methods.some(m => m.probes)) more.append(tick("probes", "probes"));
     if (view.cut) more.append(tick("cut open", "cut"));
     if (!view.flat) more.append(tick("see through", "through"));
-    more.append(tick("mesh edges", "edges"), again, save);
+    more.append(tick("mesh edges", "edges"), again, save, drawn);
     const words = ["Black: measured; orange arrows point to it from the simulated place. Grey: plates and tools."];
     if (!methods.some(m => m.markers || m.outlines)) words[0] = "The body as simulated.";
     if (methods.some(m => m.outlines)) words.push("Black line: measured outline; blue: simulated.");
+    if (methods.some(m => m.probes)) words.push("White: probes of the simulation.");
     if (view.left_out.length) words.push(`Not in this view: ${view.left_out.join(", ")}.`);
     const text = make("figcaption", {}, words.join(" "));
     const viewer = make("div", { class: "viewer" }, titles, canvas, legend, row, choice,
@@ -582,6 +609,7 @@
       addEventListener("beforeprint", () => { stills.open = true; });
     }
     controls.addEventListener("change", draw);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => painted(style("--canvas")));
     new ResizeObserver(draw).observe(canvas);
     aim();
     update();

@@ -12,6 +12,7 @@ from validate.report.charts.axes import levels
 from validate.report.charts.line_styles import styled
 from validate.report.charts.style import HasMethods
 
+_NOTHING = 1e-20  # of the largest value
 _MOST = 800  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
@@ -25,6 +26,10 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     of more than `_MOST` points keeps the lowest and the highest of equal parts, so that no peak is
     lost; a line that turns more than `_WAYS` times is shown by its points.
     """
+    least = 0.0  # what is less on a logarithmic axis counts as nothing: uPlot fails on 60 decades
+    if "y" in chart.log and not chart.linear:
+        tops = [np.nanmax(s.y, initial=0.0) for s in chart.series]
+        least = _NOTHING * max([*tops, *(y for _, y in levels(chart))])
     xs: list[list[float | None]] = []  # each once: most series of a chart have the same
     series = []
     for drawn in styled(run, chart.series):
@@ -34,7 +39,7 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
         if style == "line" and len(found := _ways(drawn.series.x)) > 1:
             style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
         for way in ways:
-            x, columns = _points(drawn.series, way)
+            x, columns = _points(drawn.series, way, least)
             if x not in xs:
                 xs.append(x)
             series.append({**look, "style": style, "x": xs.index(x), **columns})
@@ -60,12 +65,14 @@ def _ways(x: Floats) -> list[Ints]:
 
 
 def _points(
-    series: Series, order: Ints
+    series: Series, order: Ints, least: float
 ) -> tuple[list[float | None], dict[str, list[float | None]]]:
     keep = order[_peaks(series.y[order])]
-    found = {"y": _numbers(series.y[keep], _SHOWN)}
-    if series.upper is not None:
-        found["upper"] = _numbers(series.upper[keep], _SHOWN)
+    columns = {"y": series.y} | ({} if series.upper is None else {"upper": series.upper})
+    found = {
+        name: _numbers(np.where(least and y[keep] < least, np.nan, y[keep]), _SHOWN)
+        for name, y in columns.items()
+    }
     return _numbers(series.x[keep]), found
 
 

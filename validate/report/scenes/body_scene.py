@@ -11,6 +11,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
 from validate.fem.assembly.cell_fields import cell_fields
+from validate.fem.assembly.locate import probe_rows
 from validate.register.clocks import interpolated
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.outlines.plane import from_image
@@ -60,13 +61,15 @@ class SeenMarkers:
 
 @dataclass(frozen=True)
 class ShownMethod:
-    """A method at the instants: its output `frames` (f,) there, markers, and at each instant the
-    measured and simulated outline (p, 3) mm."""
+    """A method at the instants: its output `frames` (f,) there, markers, at each instant the
+    measured and simulated outline (p, 3) mm, and the probes of its scene, at rest (k, 3) mm and
+    there (f, k, 3) mm."""
 
     result: MethodResult
     frames: Ints
     markers: SeenMarkers | None
     outlines: tuple[tuple[Floats, Floats], ...]
+    probes: tuple[Floats, Floats] | None
 
     @property
     def nodes(self) -> Floats:
@@ -204,7 +207,13 @@ def _shown(method: MethodResult, t: Floats, numbers: Ints) -> ShownMethod:
              _MM * from_image(outline.pose, outline.simulated(run.u[i])))
             for at, i in zip(t.tolist(), own.tolist(), strict=True)
         )  # fmt: skip
-    return ShownMethod(method, own, markers, outlines)
+    probes = None
+    if scene.probes and len(scene.mesh.cells):
+        rows = probe_rows(scene.mesh, scene.probes)
+        at_rest = np.array([p.point for p in scene.probes])
+        there = np.array([at_rest + rows.apply(run.u[i]) for i in own])
+        probes = _MM * three(at_rest), _MM * three(there)
+    return ShownMethod(method, own, markers, outlines, probes)
 
 
 def _particles(found: Sequence[DisplacementObservation], u: Floats) -> SeenMarkers | None:

@@ -42,7 +42,6 @@ _LONGEST, _MARKER = 0.1, 0.011  # of the body's size: the longest arrow, the rad
 _POINTS, _LETTER = 7.0, 0.056  # size of the letters, and inches that one takes
 _LINE, _BAR = 0.13, 0.44  # inches of a line of text, of the colour bars below a row
 _PAGE = 9.0  # inches that a sheet may be high
-_ROOMY = 1.0  # inches of a colour bar with a number in its middle
 _LEAST = 1e-9  # what is smaller, of mm, %, Pa or of what differs, is rounding
 _AT_REST = 1e-3  # of the largest displacement: below it nothing has moved
 _DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
@@ -195,6 +194,12 @@ def _add_outlines(stage: _Stage, measured: Floats, simulated: Floats, size: floa
     stage.add(tube, color=_SIMULATED, **_LINE_ART)
 
 
+def _add_probes(stage: _Stage, places: Floats, size: float) -> None:
+    diamond = pv.PlatonicSolid("octahedron", radius=0.009 * size)
+    points = pv.PolyData(places)
+    stage.add(points.glyph(geom=diamond, scale=False, orient=False), color="white", **_LINE_ART)
+
+
 # --- a sheet of them ------------------------------------------------------------------------------
 
 
@@ -313,6 +318,8 @@ def _panels(
         if compared and whole and method.markers:
             top = spans[_ERROR][1]
             _add_markers(stage, method.markers, cell.frame, scene.size, by, top)
+        if compared and method.probes is not None:
+            _add_probes(stage, method.probes[1][cell.frame], scene.size)
         if compared and method.outlines and not (whole and plane):
             _add_outlines(stage, *method.outlines[cell.frame], scene.size)
         found[cell] = stage.shot()
@@ -353,6 +360,8 @@ def _notes(drawn: Sheet) -> list[str]:
         found.append(f"Balls: measured markers; arrows to them from the simulated place{scale}")
     if any(m.outlines for m in scene.methods):
         found.append("Black: points of the measured outline; pink line: simulated outline")
+    if any(m.probes is not None for m in scene.methods):
+        found.append("White: probes of the simulation")
     if scene.tools:
         found.append("Grey: plates and tools")
     return found
@@ -489,7 +498,9 @@ class _Layout:
         span = self.drawn.spans[name]
         bar = figure.colorbar(ScalarMappable(Normalize(*span), ramp), cax=ax,
                               orientation="horizontal")  # fmt: skip
-        ends = np.linspace(*span, 3 if wide > _ROOMY else 2).tolist()
+        ends = np.linspace(*span, 3).tolist()
+        if sum(len(significant(e)) + 1 for e in ends) * _LETTER > wide:
+            ends = [*span]  # the middle one would touch them
         bar.set_ticks(ends, labels=[significant(e) for e in ends], fontsize=_POINTS - 0.5)
         bar.ax.tick_params(length=2, pad=1)
         first, *_, last = bar.ax.get_xticklabels()
