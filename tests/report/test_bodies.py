@@ -251,7 +251,6 @@ def test_a_panel_follows_the_displacement_and_rest_is_shown_where_nothing_moves(
     one, two, still = (dict(np.load(stills / f"{n}.npz")) for n in ("one", "two", "still"))
     assert set(one) == set(two)
     assert "0 0 disp None" not in one
-    assert near(still["0 0 disp None"], still["1 0 disp None"])
     assert body(two["1 0 disp None"]) < 0.95 * body(one["1 0 disp None"])
     assert body(one["1 0 disp None"]) < 0.99 * body(still["0 0 disp None"])
 
