@@ -16,8 +16,13 @@ from validate.library.comparison import scores_of_runs
 from validate.report.stored.folder import try_results
 from validate.report.views.layout import laid, width, wrapped
 from validate.report.views.numbers import shown_unit, significant, text
-from validate.study.stored_runs.compare_page import write_comparison
-from validate.study.stored_runs.score_comparison import Pair, Row, SideBySide, pairs
+from validate.study.stored_runs.score_comparison import (
+    Pair,
+    Row,
+    SideBySide,
+    pairs,
+    write_comparison,
+)
 
 _LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
 _ROUNDING = 1e-9  # relative: the same computation in another order

@@ -5,7 +5,7 @@ from validate.commands.screen import Passage, rows, sentences
 from validate.commands.study import StudyOptions, answer, noted, printed
 from validate.library import studies
 from validate.study.coverage import page as coverage_page
-from validate.study.coverage.exhibits import HEAD, interval, percent
+from validate.study.coverage.page import HEAD, interval, percent
 from validate.study.coverage.study import Coverage
 
 

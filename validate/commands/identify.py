@@ -6,7 +6,7 @@ from validate.commands.screen import Passage, rows, sentences
 from validate.commands.study import StudyOptions, answer, listed, noted, printed
 from validate.library import studies
 from validate.study.identify import page as identify_page
-from validate.study.identify.exhibits import units
+from validate.study.identify.page import units
 from validate.study.identify.study import IdentifyStudy
 
 _HEAD = ("", "value", "95 % from", "to", "identified")

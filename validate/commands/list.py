@@ -14,7 +14,7 @@ from validate.parameters import Parameter, describe
 from validate.pipeline.experiment.declaration import to_json
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
-from validate.pipeline.experiment.law_solver import laws_of
+from validate.pipeline.experiment.options import laws_of
 from validate.report.stored.json_values import members
 
 _DEFAULT = 16  # characters of a default

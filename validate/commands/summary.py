@@ -5,13 +5,14 @@ from pathlib import Path
 
 from validate.catalogue import reports_of
 from validate.commands.display import relative, say, table
-from validate.study.stored_runs.summary import OfKind, summary
-from validate.study.stored_runs.summary_page import (
+from validate.study.stored_runs.summary import (
     COVERED,
     STATED,
+    OfKind,
     document,
     row,
     sentence,
+    summary,
     write_summary,
 )
 

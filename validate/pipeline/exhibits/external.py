@@ -8,7 +8,7 @@ import numpy as np
 from validate.compare.exhibit import Exhibit, NumberTable, TableCell
 from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
-from validate.pipeline.experiment.external import external_methods
+from validate.pipeline.experiment.options import external_methods
 from validate.pipeline.run.method_run import MethodRun
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.solve.external.scheme import ExternalSimulator, changes

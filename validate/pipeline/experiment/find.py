@@ -14,9 +14,8 @@ from validate.catalogue import FILE, card, experiment_files, name_of, searched_f
 from validate.errors import UsageError, ValidateError
 from validate.files import read_text
 from validate.parameters import nearest_names
-from validate.pipeline.experiment.declaration import from_json, require_paths
+from validate.pipeline.experiment.declaration import completed, from_json, require_paths
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.experiment_kinds import completed
 
 _LARGEST = 16_000_000  # bytes of a declaration as JSON
 _KEPT = 8  # experiments of one file

@@ -21,9 +21,14 @@ from validate.engine.worker_cache import fingerprint
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.experiment.experiment import Experiment, ReportAdditions
-from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.experiment.options import Options, configure, folder_of, mesh_files
+from validate.pipeline.experiment.options import (
+    Options,
+    configure,
+    folder_of,
+    mesh_files,
+    with_simulators,
+)
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Meshes
 from validate.pipeline.run.job import Job, job_on

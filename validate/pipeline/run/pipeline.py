@@ -47,7 +47,7 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, all_methods, chosen_cases, configure
 from validate.pipeline.experiment.origins import Opened, marked, opened
-from validate.pipeline.run.memory import coarser, require_room
+from validate.pipeline.run.estimate import coarser, require_room
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.pipeline.run.runs import ExperimentRuns, Solves
 from validate.register.markers.markers import MarkerObservation

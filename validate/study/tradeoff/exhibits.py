@@ -8,7 +8,7 @@ from validate.compare.exhibit import Chart, Exhibit, NumberTable
 from validate.pipeline.ladder.ladder import SHOWN
 from validate.report.views.records import Shown, chart, grouped, table
 from validate.study.filters.ranking import SAME_TIME
-from validate.study.tradeoff.held import DEFINITION
+from validate.study.tradeoff.cell import DEFINITION
 from validate.study.tradeoff.study import ERRORS, ParetoFront, Refinement, Trade, TradeRow
 
 _NAMES = {"error": "error", "total": "error including the law"}
