@@ -12,7 +12,6 @@ from validate.commands.display import relative, say, shown
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.report.stored.run_changes import (
-    Move,
     PastCheck,
     PastRun,
     Since,
@@ -97,18 +96,20 @@ def _since(before: int, found: Since) -> None:
         lines.append(f"code: commit {found.code[0]} -> {found.code[1]}")
     if found.verdict:
         lines.append(f"verdict: {found.verdict[0]} -> {found.verdict[1]}")
-    lines += _first([_moved(m) for m in found.moved], _MOVED, "moved checks")
+    moved = []
+    for m in found.moved:
+        by = (
+            "the uncertainty of the numbers is not known" if m.ratio is None else f"{m.ratio:.3g} u"
+        )
+        one, other = shown(m.one, m.unit), shown(m.other, m.unit)
+        moved.append(f"moved: {m.method}: {m.name} {one} -> {other} ({by})")
+    lines += _first(moved, _MOVED, "moved checks")
     if found.within:
         most = f", by at most {found.most:.2g} u" if found.most else ""
         lines.append(f"not moved beyond 2 u: {found.within} checks{most}")
     say(f"   since {before}:")
     for line in lines or ["nothing changed"]:
         say(f"     {line}", indent="       ")
-
-
-def _moved(m: Move) -> str:
-    by = "the uncertainty of the numbers is not known" if m.ratio is None else f"{m.ratio:.3g} u"
-    return f"moved: {m.method}: {m.name} {shown(m.one, m.unit)} -> {shown(m.other, m.unit)} ({by})"
 
 
 def _first(lines: list[str], most: int, what: str) -> list[str]:

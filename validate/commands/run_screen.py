@@ -169,13 +169,12 @@ def _ranking(result: Result) -> Passage | None:
     ]  # fmt: skip
     quantity, _, load = by.partition("@")
     where = f" {at_load(load)}" if load else ""
-    title = cut(f"Methods by {quantity}{where}, against {_the(scored[0][1].against)}", width())
+    against = scored[0][1].against
+    if not against.startswith(("the ", "what ")):
+        against = f"the {against}"
+    title = cut(f"Methods by {quantity}{where}, against {against}", width())
     lines = rows(["", "error", "rate", "p99 of a step"], cells)
     return Passage(title, lines, 4, _FIRST + 1, "more methods: --verbose")
-
-
-def _the(against: str) -> str:
-    return against if against.startswith(("the ", "what ")) else f"the {against}"
 
 
 def _ranked_by(result: Result) -> str | None:

@@ -321,20 +321,17 @@ def _line(
     explicit = name == "explicit" or name in EXPLICIT_FILTERS
     parts.append(f'element="{element(p, 1 if explicit or name in _OF_NODES else order)}"')
     parts += [f"markers={given!r}"] if isinstance(settings, tuple(FILTERS)) else []
-    parts += [f"split={_parts(recording, p)}"] if explicit else []
+    if explicit:  # steps in one of the recording's
+        system = build(_scene(recording, p, Path(), 1))
+        limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
+        cut = started(recording, p).recording
+        dt = float(steps_of(without_rest(p), cut)[0])
+        parts.append(f"split={max(1, ceil(dt / limit))}")
     if kind not in ("moves", "follows"):
         unsure = f"{_LOAD * _largest(recording, p, kind):.3g}"
         walks = ("load_start", "load_walk", "load_sd")
         parts += [f"{w}={unsure}" for w in walks if hasattr(settings, w)]
     return f'"{name}": moving({", ".join(parts)}),'
-
-
-def _parts(recording: Recording, p: Tree) -> int:
-    """Explicit steps in one of the recording's."""
-    system = build(_scene(recording, p, Path(), 1))
-    limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
-    cut = started(recording, p).recording
-    return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
 
 
 def _measurements(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:

@@ -204,18 +204,14 @@ def _coefficients(found: Answers) -> str:
     """What the law has beyond modulus and Poisson ratio, as an argument; empty for none."""
     if found.get("law", LINEAR) == LINEAR:
         return ""
-    given = with_values(_of_law(found), coefficient_values(found))["material"].coefficients
+    law: Any = found.get("law", LINEAR)
+    of_law = {"material": Material(None, None).of_law(law)}  # type: ignore[arg-type]
+    given = with_values(of_law, coefficient_values(found))["material"].coefficients
     parts = ", ".join(
         f"{f.name}={value!r}"
         for f in fields(given) if (value := getattr(given, f.name)) != f.default
     )  # fmt: skip
     return f", coefficients={type(given).__name__}({parts})" if parts else ""
-
-
-def _of_law(found: Answers) -> dict[str, Any]:
-    """What the coefficients of the chosen law are checked with."""
-    law: Any = found.get("law", LINEAR)
-    return {"material": Material(None, None).of_law(law)}  # type: ignore[arg-type]
 
 
 def _cylinder(recording: Recording, found: Answers) -> str:

@@ -5,6 +5,7 @@ weight, a force, a pressure or a displacement over time. What differs is the loa
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -84,20 +85,16 @@ def motion_exhibit(
     it."""
     main = cases[MAIN]
     scene = next(iter(main.values())).scene
-    modes = _modes(scene) if isinstance(scene, Scene) else ()
+    modes: tuple[float, ...] = ()
+    if isinstance(scene, Scene):
+        with suppress(ValidateError, np.linalg.LinAlgError):
+            modes = first_frequencies(scene)
     facts = _facts(shown, modes, assumed_density(p))
     charts = (*_over_time(shown, main), *_spectrum(shown))
     words = f"'{shown.marker}' moves most; along its direction, in the recording's frame."
     return ReportAdditions(
         (Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),)
     )
-
-
-def _modes(scene: Scene) -> tuple[float, ...]:
-    try:
-        return first_frequencies(scene)
-    except (ValidateError, np.linalg.LinAlgError):
-        return ()
 
 
 def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> NumberTable:

@@ -334,7 +334,10 @@ def _each_by_itself(experiment: Experiment) -> set[str]:
 def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
     """Raise `ComparisonError` where what is judged calibrates, under whatever name."""
     for part in (p for p in problem.parts if p.judged):
-        twice = next((n for n in part.on.quantities for a in accept if _all_of(a, n)), "")
+        # What calibrates is all that a limit judges of a quantity, or a load that it names.
+        names = ((n, *n.partition("@")[::2], a) for n in part.on.quantities for a in accept)
+        twice = next((n for n, quantity, load, a in names
+                      if quantity == a.quantity and (not load or load in a.loads)), "")  # fmt: skip
         if not twice:
             continue
         mark = part.recordings[0].source.sha256[:8]
@@ -344,12 +347,6 @@ def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
             f"value can be used only once; check other loads, quantities or recordings, or set "
             f"{', '.join(problem.space.names)}"
         )
-
-
-def _all_of(accept: Accept, name: str) -> bool:
-    """Whether what calibrates is all that a limit judges of a quantity, or a load that it names."""
-    quantity, _, load = name.partition("@")
-    return quantity == accept.quantity and (not load or load in accept.loads)
 
 
 def require_identified(experiment: Experiment, one: Calibrated) -> None:

@@ -35,17 +35,15 @@ def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tu
     accepted = [n for n in runs.experiment.accepted if n in main][:1]
     terms = {k: t for n in accepted for _, one in terms_of(runs, main[n]) for k, t in one.items()}
     rows = [r for f in main.values() for r in _rows(f, runs.methods[f.method].settings, terms)]
-    said = [(main[n].label, line) for n in simulators for line in _findings(main[n])]
+    said = []
+    for name in simulators:
+        lines = dict.fromkeys(line for run in main[name].runs for line in run.said)
+        said += [(main[name].label, s) for s in lines if not s.startswith("external: ")]
     tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
         head = ("simulator", "deviations and failures")
         tables.append(NumberTable("external_findings", "Findings", head, tuple(said)))
     return (Exhibit(_NAME, "External simulators", (_WORDS,), tables=tuple(tables)),)
-
-
-def _findings(simulator: MethodRun) -> list[str]:
-    lines = [w for run in simulator.runs for w in run.said if not w.startswith("external: ")]
-    return list(dict.fromkeys(lines))
 
 
 def _rows(

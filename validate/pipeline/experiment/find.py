@@ -105,8 +105,10 @@ def _executed(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         _unload(package.__name__)
+        # What is wrong in the words of the library needs no class.
+        kind = "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
         raise UsageError(
-            f"{path}{_place(error, path)}: {_kind(error)}{error}; correct the file "
+            f"{path}{_place(error, path)}: {kind}{error}; correct the file "
             f"(`python {quote(str(path))}` shows the full traceback)"
         ) from error
     return module
@@ -115,11 +117,6 @@ def _executed(path: Path) -> ModuleType:
 def _unload(package: str) -> None:
     for name in [n for n in list(sys.modules) if n == package or n.startswith(f"{package}.")]:
         del sys.modules[name]
-
-
-def _kind(error: BaseException) -> str:
-    """What is wrong in the words of the library, which need no class; else the class."""
-    return "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
 
 
 def _place(error: BaseException, path: Path) -> str:

@@ -10,7 +10,7 @@ compared at one spring and one pad. Their reference is the whole solve in short 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -146,18 +146,14 @@ def touched_ladder(own: ExperimentBody, coarsest: int) -> TouchedLadder | None:
 
 def _rival(label: str, settings: Touching) -> Rival:
     """First order in time, and uneven where regions of several rates are due now and then."""
-    rung, uneven = _rung(settings)
+    rung: Rung = "regions" if getattr(settings, "layers", ()) else "prefactored"
+    if isinstance(settings, TouchedKrylov):
+        rung = "modal"
 
     def make(dt: float) -> Scheme:
         return replace(settings, dt=dt)
 
-    return Rival(label, rung, make, order=1.0, uneven=uneven)
-
-
-def _rung(settings: Any) -> tuple[Rung, bool]:
-    if isinstance(settings, TouchedKrylov):
-        return "modal", False
-    return ("regions", True) if settings.layers else ("prefactored", False)
+    return Rival(label, rung, make, order=1.0, uneven=rung == "regions")
 
 
 _LEVELS = (400, 300, 200, 150, 125, 100, 75, 50, 35, 25, 18, 12)  # of a hundred: own mesh

@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -55,7 +54,11 @@ def stored_effects(experiment: Experiment, out: Path | None) -> ShownEffects | N
     path = reports_of(experiment.path, out) / experiment.name / "results.json"
     try:
         stored = json.loads(path.read_text(encoding="utf-8"))["effects"]
-        effects = [_shown(e) for e in stored]
+        effects = []
+        for e in stored:
+            seen_by = tuple(e["seen_by"])
+            by = [float(c["separation"]) for c in e["changes"] if c["name"] in seen_by]
+            effects.append(ShownEffect(e["name"], e["doc"], seen_by, max(by, default=0.0)))
         shown = tuple(e for e in effects if e.seen_by)
     except FileNotFoundError:
         return ShownEffects(unknown="no stored run")
@@ -64,12 +67,6 @@ def stored_effects(experiment: Experiment, out: Path | None) -> ShownEffects | N
     if not effects:
         return ShownEffects(unknown="the stored run compared no effects")
     return ShownEffects(shown, tuple(e.name for e in effects if not e.seen_by))
-
-
-def _shown(effect: dict[str, Any]) -> ShownEffect:
-    seen_by = tuple(effect["seen_by"])
-    by = [float(c["separation"]) for c in effect["changes"] if c["name"] in seen_by]
-    return ShownEffect(effect["name"], effect["doc"], seen_by, max(by, default=0.0))
 
 
 def with_effects(trial: Trial, experiment: Experiment, effects: ShownEffects | None) -> Trial:

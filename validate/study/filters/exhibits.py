@@ -84,7 +84,7 @@ def _heats(
         (study.by, f"error / {_unit(study)}", None),
     ):
         at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
-        values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
+        values = np.array([[at.get((i, j)) for i in x.values] for j in y.values], dtype=float)
         if np.isfinite(values).any():
             name = "nis" if what == NIS else "error"
             yield Heat(
@@ -92,10 +92,6 @@ def _heats(
                 f"{short(x.path)} and {short(y.path)}", short(x.path), short(y.path),
                 x.values, y.values, values, label, centre,
             )  # fmt: skip
-
-
-def _nan(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _curves(

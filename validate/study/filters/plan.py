@@ -176,15 +176,12 @@ def _cells(
 def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
     """The key holds every parameter and setting of the method as the cell will have it."""
     try:
-        made: Any = _described(*set_up(experiment, job, bare, bare.seeds[0]))
+        parameters, method = set_up(experiment, job, bare, bare.seeds[0])
+        both = (*describe(parameters), *describe(method, METHODS))
+        made: Any = [(p.path, repr(p.default)) for p in both]
     except UsageError as error:  # a combination that settings refuse: a failed row later
         made = str(error)
     return replace(bare, key=key_of(job, bare, made))
-
-
-def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
-    both = (*describe(parameters), *describe(settings, METHODS))
-    return [(p.path, repr(p.default)) for p in both]
 
 
 def _methods(

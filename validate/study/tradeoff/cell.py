@@ -103,11 +103,13 @@ def with_simulators(trial: Trial, commands: Sequence[str]) -> Trial:
 
 def _rivals(trial: Trial, command: str) -> list[Rival]:
     words(command)
+    given = shlex.split(command)
+    called = Path(given[1] if len(given) > 1 else given[0]).stem
     own = tuple(e for e in trial.meshes if e in _CARRIED)
     laws: tuple[LawName, ...] = ("linear", *((trial.pair.law,) if trial.pair else ()))
     return [
         Rival(
-            f"{EXTERNAL}{_called(command)}" + ("" if law == "linear" else ", large strain"),
+            f"{EXTERNAL}{called}" + ("" if law == "linear" else ", large strain"),
             "external simulators", partial(_external, command, trial.dynamic), law=law,
             elements=own or ("-",), shortest=trial.steps[0],
         )
@@ -117,11 +119,6 @@ def _rivals(trial: Trial, command: str) -> list[Rival]:
 
 def _external(command: str, moving: bool, dt: float) -> ExternalSimulator:
     return ExternalSimulator(command, inertia=moving, seconds=_SECONDS)
-
-
-def _called(command: str) -> str:
-    given = shlex.split(command)
-    return Path(given[1] if len(given) > 1 else given[0]).stem
 
 
 # -------------------------------------------------------------------------------------------------
