@@ -6,7 +6,6 @@ from validate.commands.study import StudyOptions, answer, noted, printed
 from validate.library import studies
 from validate.study.coverage import page as coverage_page
 from validate.study.coverage.page import HEAD, interval, percent
-from validate.study.coverage.study import Coverage
 
 
 def covering(
@@ -19,29 +18,29 @@ def covering(
             values=pairs(values, "--set"),
         )  # fmt: skip
     if not printed(done.page, common):
-        answer(_passages(done.found), done.found.done, done.page, common.detail)
+        cells = [
+            [f"{q.method}: {q.stated.name}", percent(q.share), interval(q.share), q.finding.word]
+            for q in done.found.quantities
+        ]
+        cells += [
+            [f"{t.method}: all {t.checks} (Holm)", percent(t.share), interval(t.share),
+             "holds" if t.holds else "too narrow"]
+            for t in done.found.together
+        ]  # fmt: skip
+        quick = "QUICK: fewer draws; " if done.found.quick else ""
+        notes = [
+            f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
+            for q in done.found.quantities if q.finding.words
+        ]  # fmt: skip
+        title = "Verdicts on a perfect model"
+        answer(
+            [
+                sentences([f"{quick}{coverage_page.sentence(done.found)}"], None),
+                Passage(title, rows(["", *HEAD, "finding"], cells), 4),
+                sentences(notes, keep=2, most=6),
+            ],
+            done.found.done,
+            done.page,
+            common.detail,
+        )
     return OK if done.found.passed else FAILED
-
-
-def _passages(found: Coverage) -> list[Passage]:
-    """Whether the verdicts are right as often as they say, then every quantity."""
-    cells = [
-        [f"{q.method}: {q.stated.name}", percent(q.share), interval(q.share), q.finding.word]
-        for q in found.quantities
-    ]
-    cells += [
-        [f"{t.method}: all {t.checks} (Holm)", percent(t.share), interval(t.share),
-         "holds" if t.holds else "too narrow"]
-        for t in found.together
-    ]  # fmt: skip
-    quick = "QUICK: fewer draws; " if found.quick else ""
-    notes = [
-        f"{q.stated.name} ({q.method}): {q.finding.word}: {q.finding.words}"
-        for q in found.quantities if q.finding.words
-    ]  # fmt: skip
-    title = "Verdicts on a perfect model"
-    return [
-        sentences([f"{quick}{coverage_page.sentence(found)}"], None),
-        Passage(title, rows(["", *HEAD, "finding"], cells), 4),
-        sentences(notes, keep=2, most=6),
-    ]

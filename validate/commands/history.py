@@ -5,7 +5,6 @@ import math
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from validate.catalogue import experiment_files, reports_of
 from validate.commands.display import relative, say, shown
@@ -40,7 +39,13 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
         raise UsageError(f"no run of '{name}' below {reports}; {hint}")
     changes = [since(*pair) for pair in pairwise(runs)]
     if as_json:
-        print(json.dumps(_document(name, runs, changes), ensure_ascii=False, indent=1))
+        # One JSON document, SI; a change of code is one of commits.
+        document = {
+            "experiment": name,
+            "runs": [{"folder": run.folder, **run.line} for run in runs],
+            "changes": [{"from": i, "to": i + 1, **asdict(c)} for i, c in enumerate(changes, 1)],
+        }
+        print(json.dumps(document, ensure_ascii=False, indent=1))
         return
     count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     say(f"{name}: {count} below {relative(reports)}")
@@ -119,14 +124,3 @@ def _first(lines: list[str], most: int, what: str) -> list[str]:
 
 def _hash(text: str) -> str:
     return text[:_DIGITS] or "none"
-
-
-def _document(name: str, runs: tuple[PastRun, ...], changes: list[Since]) -> dict[str, Any]:
-    """One JSON document, SI; a change of code is one of commits."""
-    return {
-        "experiment": name,
-        "runs": [{"folder": run.folder, **run.line} for run in runs],
-        "changes": [
-            {"from": i, "to": i + 1, **asdict(found)} for i, found in enumerate(changes, 1)
-        ],
-    }  # fmt: skip

@@ -137,13 +137,19 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     default = "" if own and f"{said:.3g}" != f"{accepted:.3g}" else f"a tenth of {judged}"
     reason = found.get("why.force") or default
     law, mesh = found.get("law", LINEAR), declared_mesh(found, folder)
+    # The fluid, and whose volume change counts in linear cells
+    lines = []
+    if new_outline.filled(found):
+        lines.append(f'cavities=(Cavity("inclusion", {found["outline.surface"]!r}),),')
+    if linear_cells(found):
+        lines.append('dilatation="nodal_mean",')
     return {
         "imports": "\n".join(sorted(_imports(found))),
         "body": mesh or _cylinder(recording, found),
         "test": f"{test}, {'recorded' if stated_test(recording) else 'answered'}",
         "along": "-z" if test == "compression" else "+z",
         "rests": ", rests=True" if mesh or new_outline.whole(found) else "",
-        "parts": _parts(found),
+        "parts": "".join(f"        {line}\n" for line in lines),
         "fit_from": f"{_USUAL.fit_from / _USUAL.limit * limit:.3g}",
         "fit_to": f"{_USUAL.fit_to / _USUAL.limit * limit:.3g}",
         "limit": f"{limit:.3g}",
@@ -188,16 +194,6 @@ def _imports(found: Answers) -> set[str]:
         "from validate.scene.material import Material",
         f"from validate.scene.scene import {cavity}Drive, Scene, Support",
     }  # fmt: skip
-
-
-def _parts(found: Answers) -> str:
-    """The fluid, and whose volume change counts in linear cells."""
-    lines = []
-    if new_outline.filled(found):
-        lines.append(f'cavities=(Cavity("inclusion", {found["outline.surface"]!r}),),')
-    if linear_cells(found):
-        lines.append('dilatation="nodal_mean",')
-    return "".join(f"        {line}\n" for line in lines)
 
 
 def _coefficients(found: Answers) -> str:

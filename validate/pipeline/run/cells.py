@@ -239,30 +239,28 @@ class InStore:
                 wanted.case, wanted.method, wanted.split, wanted.off,
                 encoded(_compared_left_out(wanted.parameters), _AT), truth,
             )  # fmt: skip
+            # What the numbers of a run rest on besides what its cell says. A recording that is no
+            # file is known by its content.
+            recordings, true = runs.of_case(wanted.case)
+            hashes = [r.source.sha256 or fingerprint(r) for r in recordings]
+            method = replace(runs.method(wanted), label="")
+            if truth:  # seen in the scene of a method, whatever solves it
+                method = Method(scene=method.scene)
+            read = mesh_files(wanted.parameters, folder_of(self._experiment))
+            external = isinstance(method.settings, ExternalSimulator)
+            key = key_of(
+                cell, dict(self._job(runs).identity()),
+                encoded(method, f"methods.{wanted.method}"), hashes,
+                encoded(_compared_left_out(true), _AT) if truth else "",
+                [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
+                self._external(method.settings.command) if external else "",
+            )  # fmt: skip
             self._cells[at] = replace(
-                cell, key=key_of(cell, *self._rests_on(runs, wanted, truth)),
-                label="truth of the twin" if truth else what, whole=wanted.whole,
+                cell, key=key, label="truth of the twin" if truth else what, whole=wanted.whole,
                 other_mesh=_body(wanted.parameters) != _body(runs.parameters),
                 timed=wanted.whole and not truth,
             )  # fmt: skip
         return self._cells[at]
-
-    def _rests_on(self, runs: ExperimentRuns, wanted: RunWanted, truth: bool) -> tuple[Any, ...]:
-        """What the numbers of a run rest on besides what its cell says. A recording that is no
-        file is known by its content."""
-        recordings, true = runs.of_case(wanted.case)
-        hashes = [r.source.sha256 or fingerprint(r) for r in recordings]
-        method = replace(runs.method(wanted), label="")
-        if truth:  # seen in the scene of a method, whatever solves it
-            method = Method(scene=method.scene)
-        read = mesh_files(wanted.parameters, folder_of(self._experiment))
-        return (
-            dict(self._job(runs).identity()), encoded(method, f"methods.{wanted.method}"),
-            hashes, encoded(_compared_left_out(true), _AT) if truth else "",
-            [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
-            self._external(method.settings.command)
-            if isinstance(method.settings, ExternalSimulator) else "",
-        )  # fmt: skip
 
     def _external(self, command: str) -> str:
         """An external simulator as it is now; one of which that cannot be said, by this run."""

@@ -22,19 +22,6 @@ _STRAIGHT = 25  # points of a profile as drawn
 
 
 def exhibits(study: IdentifyStudy) -> tuple[Exhibit, ...]:
-    return (_values(study), *map(_of, study.calibrated))
-
-
-def units(one: Calibrated) -> dict[str, str]:
-    """SI units by path."""
-    return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
-
-
-def verdict(e: Profiled) -> str:
-    return "identified" if e.identified else f"not identifiable: {'; '.join(e.findings)}"
-
-
-def _values(study: IdentifyStudy) -> Exhibit:
     pairs = [(c, e) for c in study.calibrated for e in c.found.estimates]
     columns: Mapping[str, Shown] = {
         "parameter": "1.name", "value": sized("1.value", _unit),
@@ -48,7 +35,19 @@ def _values(study: IdentifyStudy) -> Exhibit:
              "parameters fitted again.",
     )  # fmt: skip
     words = tuple(line for c in study.calibrated for line in lines(c))
-    return Exhibit("identified", "Identified parameters", words, (found,))
+    return (
+        Exhibit("identified", "Identified parameters", words, (found,)),
+        *map(_of, study.calibrated),
+    )
+
+
+def units(one: Calibrated) -> dict[str, str]:
+    """SI units by path."""
+    return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}
+
+
+def verdict(e: Profiled) -> str:
+    return "identified" if e.identified else f"not identifiable: {'; '.join(e.findings)}"
 
 
 def _unit(pair: tuple[Calibrated, Profiled]) -> str:
@@ -69,8 +68,21 @@ def _of(one: Calibrated) -> Exhibit:
         "Rise of chi-square when one parameter is changed and the others are fitted again. "
         "Points are computed; the line joins them.",
     )
+    found = one.found
+    named = zip(found.space.names, _si(one), strict=True)
+    head = ("start", "chi-square / 1", *(f"{n} / {shown_unit(u) or '1'}" for n, u in named),
+            "evaluations", "ended")  # fmt: skip
+    rows = tuple(
+        (i + 1, f.chi_square if f.count else None,
+         *(scale(u) * found.space.value(k, float(f.x[k])) for k, u in enumerate(_si(one))),
+         f.evaluations, "converged" if f.converged else f"did not: {f.why}")
+        for i, f in enumerate(found.fits)
+    )  # fmt: skip
+    starts = NumberTable(
+        f"starts_{method}", "Result of every start", head, rows, below="ended", folded=True
+    )
     return Exhibit(
-        f"profiles_{method}", f"Profiles, {method}", words, (_starts(one),), charts,
+        f"profiles_{method}", f"Profiles, {method}", words, (starts,), charts,
         heats=tuple(_correlations(one)),
     )  # fmt: skip
 
@@ -105,21 +117,6 @@ def _correlations(one: Calibrated) -> Iterator[Heat]:
         )  # fmt: skip
 
 
-def _starts(one: Calibrated) -> NumberTable:
-    found = one.found
-    named = zip(found.space.names, _si(one), strict=True)
-    head = ("start", "chi-square / 1", *(f"{n} / {shown_unit(u) or '1'}" for n, u in named),
-            "evaluations", "ended")  # fmt: skip
-    rows = tuple(
-        (i + 1, f.chi_square if f.count else None,
-         *(scale(u) * found.space.value(k, float(f.x[k])) for k, u in enumerate(_si(one))),
-         f.evaluations, "converged" if f.converged else f"did not: {f.why}")
-        for i, f in enumerate(found.fits)
-    )  # fmt: skip
-    name = f"starts_{one.problem.calibration.method}"
-    return NumberTable(name, "Result of every start", head, rows, below="ended", folded=True)
-
-
 def _si(one: Calibrated) -> list[str]:
     return [units(one)[n] for n in one.found.space.names]
 
@@ -130,9 +127,17 @@ def told(study: IdentifyStudy) -> Findings:
         if study.identified
         else ("open", "Some parameters are not identifiable")
     )
+    rows = [
+        (c.problem.calibration.method, e.name, units(c)[e.name], at, rise)
+        for c in study.calibrated
+        for e in c.found.estimates
+        for at, rise in zip(e.at, e.rise, strict=True)
+    ]
+    head = ("method", "parameter", "unit", "value", "rise_of_chi_square")
+    cells = NumberTable("cells", "Every point of every profile, SI.", head, tuple(rows))
     return Findings(
         f"Identification: {study.experiment.title}", sentence(study), exhibits(study),
-        document(study), _cells(study), study.quick,
+        document(study), cells, study.quick,
         parameters=describe(study.calibrated[0].problem.parts[0].parameters), band=band,
     )  # fmt: skip
 
@@ -193,14 +198,3 @@ def _calibration(one: Calibrated) -> dict[str, Any]:
             for f in found.fits
         ],
     }  # fmt: skip
-
-
-def _cells(study: IdentifyStudy) -> NumberTable:
-    rows = [
-        (c.problem.calibration.method, e.name, units(c)[e.name], at, rise)
-        for c in study.calibrated
-        for e in c.found.estimates
-        for at, rise in zip(e.at, e.rise, strict=True)
-    ]
-    head = ("method", "parameter", "unit", "value", "rise_of_chi_square")
-    return NumberTable("cells", "Every point of every profile, SI.", head, tuple(rows))

@@ -255,16 +255,15 @@ def _columns(found: SideBySide) -> Iterator[tuple[int, int]]:
         yield from ((0, j) for j in range(1, len(found.runs)))
         return
     starts = [sum(len(r.methods) for r in found.runs[:i]) for i in range(len(found.runs))]
-    first, *others = (_ranked(r) for r in found.runs)
+    # Places of the methods, accepted ones first
+    first, *others = (
+        sorted(range(len(r.methods)), key=lambda i: r.methods[i] not in r.accepted)
+        for r in found.runs
+    )
     for start, other in zip(starts[1:], others, strict=True):
         ranks = product(range(len(first)), range(len(other)))
         for i, j in sorted(ranks, key=lambda ij: (abs(ij[0] - ij[1]), ij)):
             yield first[i], start + other[j]
-
-
-def _ranked(run: StoredRun) -> list[int]:
-    """Places of the methods, accepted ones first."""
-    return sorted(range(len(run.methods)), key=lambda i: run.methods[i] not in run.accepted)
 
 
 # --- A comparison of stored runs cut down to what is asked for, and put in order.
@@ -345,7 +344,20 @@ def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) 
     )
     shown, _, _ = pairs(found)
     drawn = (_pair(i, p) for i, p in enumerate(shown, 1))
-    exhibits = (*drawn, _parameters_exhibit(found), _all(found))
+    names = tuple(f"{r.name} {r.created}" for r in found.runs)
+    rows = tuple((path, *values) for path, values in found.parameters.items())
+    note = "" if rows else "None differs."
+    differing = NumberTable(
+        "parameters", "Parameters that differ, SI.", ("path", *names), rows, note
+    )
+    # Every score in every column, for the files
+    values = {column: f"values.{i}" for i, column in enumerate(found.columns)}
+    columns = {"method": "method", "score": "score", "unit": "unit", **values}
+    exhibits = (
+        *drawn,
+        Exhibit("parameters", "Parameters", (), (differing,)),
+        Exhibit("scores", "Scores", data=(table("scores", "Scores, SI.", found.rows, columns),)),
+    )
     return write_loose(told, exhibits, document, folder, "Comparison", found.warnings)
 
 
@@ -370,18 +382,3 @@ def _pictures(number: int, pair: Pair) -> tuple[Picture, ...]:
         return ()
     labels, changes = zip(*drawn, strict=True)
     return (picture(f"changes_{number}", f"From {pair.one} to {pair.other}", labels, changes),)
-
-
-def _parameters_exhibit(found: SideBySide) -> Exhibit:
-    names = tuple(f"{r.name} {r.created}" for r in found.runs)
-    rows = tuple((path, *values) for path, values in found.parameters.items())
-    note = "" if rows else "None differs."
-    table = NumberTable("parameters", "Parameters that differ, SI.", ("path", *names), rows, note)
-    return Exhibit("parameters", "Parameters", (), (table,))
-
-
-def _all(found: SideBySide) -> Exhibit:
-    """Every score in every column, for the files."""
-    values = {column: f"values.{i}" for i, column in enumerate(found.columns)}
-    columns = {"method": "method", "score": "score", "unit": "unit", **values}
-    return Exhibit("scores", "Scores", data=(table("scores", "Scores, SI.", found.rows, columns),))

@@ -95,7 +95,16 @@ def _kinds(points: Sequence[Foretold], runs: Sequence[Seen]) -> tuple[OfKind, ..
 
 def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
     turned = [p for p in points if p.simulated <= 0]
-    covered = _covered(points, runs)
+    folders = {f for p in points for f in p.folders}
+    domains = [d for r in runs if r.folder in folders for d in r.domain]
+    sizes = [p.measured for p in points]
+    covered = Covered(
+        (min(sizes), max(sizes)),
+        points[0].unit,
+        _range(domains, lambda d: [d["strain"]]),
+        _range(domains, lambda d: [d["rate"]]),
+        _range(domains, lambda d: d["sides"] or []),
+    )
     if turned:
         first = turned[0]
         why = (
@@ -109,16 +118,6 @@ def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
     )  # fmt: skip
     few = "one specimen: no interval over specimens" if stated.specimens == 1 else ""
     return OfKind(kind, tuple(points), stated, covered, few)
-
-
-def _covered(points: Sequence[Foretold], runs: Sequence[Seen]) -> Covered:
-    folders = {f for p in points for f in p.folders}
-    domains = [d for r in runs if r.folder in folders for d in r.domain]
-    sizes = [p.measured for p in points]
-    return Covered(
-        (min(sizes), max(sizes)), points[0].unit, _range(domains, lambda d: [d["strain"]]),
-        _range(domains, lambda d: [d["rate"]]), _range(domains, lambda d: d["sides"] or []),
-    )  # fmt: skip
 
 
 def _range(domains: Sequence[Json], of: Callable[[Json], list[Any]]) -> Range:
