@@ -53,7 +53,13 @@ def solve(
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # bytes, of this process
     done = tuple(replace(run, memory=run.memory or peak) for run in done)
-    return MethodRun(name, _label(method, scene), case, scene, seen, done, stacked(found))
+    # What the method was run as, where parameters changed that
+    own = scene.mesh.order
+    order = getattr(method.scene, "order", own)
+    label = method.label if order == own else f"{method.label} [order {own}]"
+    if getattr(method.settings, "smooth", False):
+        label = f"{label} [smoothed: uses future samples]"
+    return MethodRun(name, label, case, scene, seen, done, stacked(found))
 
 
 def placed(
@@ -198,12 +204,3 @@ def between(
         for start, y in zip(starts, (t, *inputs.T), strict=True)
     ]
     return finer[0], np.stack(finer[1:], axis=1)
-
-
-def _label(method: Method, scene: AnyScene) -> str:
-    """The method's label, and what it was run as where parameters changed that."""
-    own = scene.mesh.order
-    order = getattr(method.scene, "order", own)
-    label = method.label if order == own else f"{method.label} [order {own}]"
-    smooth = getattr(method.settings, "smooth", False)
-    return f"{label} [smoothed: uses future samples]" if smooth else label

@@ -91,20 +91,17 @@ def _profile(one: Calibrated, e: Profiled) -> Chart:
     unit = units(one)[e.name]
     x, y = scale(unit) * np.array(e.at), np.array(e.rise)
     label = f"{e.name} / {shown_unit(unit) or '1'}"
-    line, points = Series("through them", *_between(x, y)), Series("computed", x, y, "points")
+    # Squares of straight lines through the signed roots, which are nearly straight
+    best = int(np.argmin(y))
+    roots = np.sqrt(np.maximum(y, 0)) * np.where(np.arange(len(y)) < best, -1, 1)
+    fine = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _STRAIGHT)]))
+    line = Series("through them", fine, np.interp(fine, x, roots) ** 2)
+    points = Series("computed", x, y, "points")
     method = one.problem.calibration.method
     return Chart(
         f"profile_{method}_{e.name.replace('.', '_')}", f"{e.name}: profile", label,
         "rise of chi-square / 1", (line, points), (("95 %", RISE),), caption=f"{verdict(e)}.",
     )  # fmt: skip
-
-
-def _between(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Squares of straight lines through the signed roots, which are nearly straight."""
-    best = int(np.argmin(y))
-    roots = np.sqrt(np.maximum(y, 0)) * np.where(np.arange(len(y)) < best, -1, 1)
-    fine = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _STRAIGHT)]))
-    return fine, np.interp(fine, x, roots) ** 2
 
 
 def _correlations(one: Calibrated) -> Iterator[Heat]:

@@ -181,8 +181,21 @@ def told_nothing(experiment: Experiment, quick: bool) -> Findings:
 
 def told_gain(found: GainMap, quick: bool) -> Findings:
     band = ("good", "Predictions hold") if found.passed else ("bad", "Predictions fail")
+    columns: Mapping[str, Shown] = {
+        "share of the largest load / 1": "0.load", "predicted limit / Pa": "1.predicted",
+        "measured limit / Pa": "1.measured", "relative difference / 1": "1.error",
+        "tuned gain / Pa": "1.tuned", "updates at the nearest gain": _nearest,
+    }  # fmt: skip
+    limits = table("gains", "Limits of the gain under load", found.limits, columns)
+    words = (
+        "Paper 000's loop P <- P + Kp (1 - V/V0) settles where |1 - Kp dV/dP / V0| < 1. Predicted "
+        "from the compliance of the cavity at the pressure that keeps its volume; measured by "
+        "running the loop from rest and halving the interval.",
+    )
+    maps = (_map(found),) if found.limits else ()
+    exhibit = Exhibit("gain", "The gain of the pressure loop", words, (limits,), regimes=maps)
     return Findings(
-        f"Stability map: {found.experiment.title}", sentence(found), (_exhibit(found),),
+        f"Stability map: {found.experiment.title}", sentence(found), (exhibit,),
         {
             "kind": "stability",
             "passed": found.passed,
@@ -206,22 +219,6 @@ def sentence(found: GainMap) -> str:
         f"of {min(limits):.4g} to {max(limits):.4g} Pa (tuned: {tuned:.4g} Pa), at most "
         f"{100 * max(errors):.2g} % from the predicted ones, {100 * TOLERANCE:g} % allowed."
     )
-
-
-def _exhibit(found: GainMap) -> Exhibit:
-    columns: Mapping[str, Shown] = {
-        "share of the largest load / 1": "0.load", "predicted limit / Pa": "1.predicted",
-        "measured limit / Pa": "1.measured", "relative difference / 1": "1.error",
-        "tuned gain / Pa": "1.tuned", "updates at the nearest gain": _nearest,
-    }  # fmt: skip
-    limits = table("gains", "Limits of the gain under load", found.limits, columns)
-    words = (
-        "Paper 000's loop P <- P + Kp (1 - V/V0) settles where |1 - Kp dV/dP / V0| < 1. Predicted "
-        "from the compliance of the cavity at the pressure that keeps its volume; measured by "
-        "running the loop from rest and halving the interval.",
-    )
-    maps = (_map(found),) if found.limits else ()
-    return Exhibit("gain", "The gain of the pressure loop", words, (limits,), regimes=maps)
 
 
 def _nearest(limit: tuple[GainCell, GainLimit]) -> int:
