@@ -376,19 +376,17 @@ def with_inputs(experiment: Experiment, fitted: Sequence[Calibrated]) -> Experim
         return experiment
     declared = experiment.uncertainty or Uncertainty(surrogate=fitted[0].problem.calibration.method)
     surrogate = declared.surrogate or fitted[0].problem.calibration.method
-    kept = (i for i in declared.inputs if not _replaced(i, fitted))
-    more = replace(declared, inputs=(*kept, *inputs), surrogate=surrogate)
-    return replace(experiment, uncertainty=more)
-
-
-def _replaced(declared: Input, fitted: Sequence[Calibrated]) -> bool:
-    """Whether a declared range moves nothing but what was identified."""
+    # Declared ranges but those that move nothing but what was identified
     values = {path: value for one in fitted for path, value in one.values.items()}
     here = with_free(fitted[0].problem.parts[0].parameters, values)
-    before = {p.path: p.default for p in describe(here)}
-    after = {p.path: p.default for p in describe(declared.move(here, 1.0))}
-    moved = {path for path, value in after.items() if value != before[path]}
-    return bool(moved) and moved <= set(values)
+    before, kept = {p.path: p.default for p in describe(here)}, []
+    for source in declared.inputs:
+        after = {p.path: p.default for p in describe(source.move(here, 1.0))}
+        moved = {path for path, value in after.items() if value != before[path]}
+        if not moved or not moved <= set(values):
+            kept.append(source)
+    more = replace(declared, inputs=(*kept, *inputs), surrogate=surrogate)
+    return replace(experiment, uncertainty=more)
 
 
 def inputs_of(one: Calibrated) -> tuple[Input, ...]:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Exhibit, NumberTable, TableCell
-from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.options import external_methods
 from validate.pipeline.run.method_run import MethodRun
@@ -63,8 +62,11 @@ def _rows(
     if not judged or not run.finished:
         return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
     return [
-        (f.label, program, c.name, *_figures(c), c.acceptance, c.validation, *cost) for c in judged
-    ]
+        (f.label, program, c.name,
+         *(TableCell(number, c.unit) for number in (c.value, 2 * c.u_val, c.margin)),
+         c.acceptance, c.validation, *cost)
+        for c in judged
+    ]  # fmt: skip
 
 
 def _rate(f: MethodRun, settings: Any) -> float | None:
@@ -79,9 +81,3 @@ def _rate(f: MethodRun, settings: Any) -> float | None:
     new = changes(f.seen.t[: len(run.seconds)], f.seen.inputs[: len(run.seconds)])
     at = np.searchsorted(f.seen.t, new.t)
     return 1 / float(np.median(run.seconds[at]))
-
-
-def _figures(check: Check) -> tuple[TableCell, TableCell, TableCell]:
-    numbers = (check.value, 2 * check.u_val, check.margin)
-    value, doubt, margin = (TableCell(n, check.unit) for n in numbers)
-    return value, doubt, margin

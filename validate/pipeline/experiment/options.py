@@ -106,15 +106,10 @@ def with_law(name: str, method: Method, law: str, declared: Mapping[str, Method]
     handles: Handles | None = getattr(method.settings, "handles", None)
     if handles is None or handles.solves(law):
         return method
-    return replace(method, settings=_solver(law, declared))
-
-
-def _solver(law: str, declared: Mapping[str, Method]) -> Any:
     kinds = _LINEAR if law == "linear" else _LARGE
     own = [m.settings for m in declared.values() if isinstance(m.settings, kinds)]
-    if own:
-        return own[0]
-    return QuasiStatic() if law == "linear" else StaticNewton("none")
+    usual = QuasiStatic() if law == "linear" else StaticNewton("none")
+    return replace(method, settings=own[0] if own else usual)
 
 
 RECORDED = "recorded"  # the case that the experiment's own recording is

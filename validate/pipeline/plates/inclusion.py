@@ -397,18 +397,15 @@ def placed(
     )  # fmt: skip
     swept = tree.scene.body.inclusion.shape == "sweep"
     said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
-    said = (*said, *_misplaced(measured, inclusion(recording, tree)))
-    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
-
-
-def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:
-    """A word where the meshed inclusion is not where the rest outline lies."""
+    # A word where the meshed inclusion is not where the rest outline lies
+    meshed = inclusion(recording, tree)
     off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
     wide = meshed.radius - measured.radius
-    if off < 0.5e-3 and abs(wide) < 0.5e-3:
-        return ()
-    return (
-        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
-        f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
-        "show this.",
-    )
+    if off >= 0.5e-3 or abs(wide) >= 0.5e-3:
+        said = (
+            *said,
+            f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
+            f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
+            "show this.",
+        )
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)

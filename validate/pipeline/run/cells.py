@@ -203,13 +203,11 @@ class InStore:
         found: CellFound = record.value
         return found
 
-    def _there(self, cell: RunCell) -> bool:
-        record = self._records.get(cell.key)
-        return record is not None and (record.value is None or _enough(cell, record.value))
-
     def _finish(self, runs: ExperimentRuns, asked: Sequence[RunCell]) -> None:
         """Of these, what this run has not asked for before."""
-        cells = [cell for cell in asked if not self._there(cell)]
+        records = ((cell, self._records.get(cell.key)) for cell in asked)
+        cells = [cell for cell, r in records
+                 if r is None or not (r.value is None or _enough(cell, r.value))]  # fmt: skip
         if not cells:
             return
         wanted = {cell.key: w for (w, truth, _), cell in self._cells.items() if not truth}

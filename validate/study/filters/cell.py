@@ -176,7 +176,8 @@ def _all_seeds(
         raise ComparisonError("diverged: the estimate is not finite")
     dof = int(batch.dof.sum())
     if not dof:
-        raise ComparisonError(f"invalid: {_unreached(stepper, len(inputs))}")
+        unheard = stepper.unheard([{"nis.dof": 0.0}] * len(inputs))  # type: ignore[attr-defined]
+        raise ComparisonError(f"invalid: {unheard}")
     measured, segments = np.isfinite(np.array(z)), first.segments
     names = [p.name for p in first.scene.probes]
     scored = []
@@ -222,10 +223,6 @@ def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ..
         return probes, ()
     markers = np.kron(tracks.rows.weights.toarray(), np.eye(d))
     return np.vstack([probes, markers]), tracks.names
-
-
-def _unreached(stepper: FilterStepper, steps: int) -> str:
-    return cast(str, stepper.unheard([{"nis.dof": 0.0}] * steps))  # type: ignore[attr-defined]
 
 
 def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:

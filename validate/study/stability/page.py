@@ -140,12 +140,8 @@ def _rows(study: Stability, name: str) -> tuple[Turned, ...]:
     if name not in _BEYOND:
         return along
     where, value, after = _BEYOND[name]
-    beyond = _with(study.base.base, where, value)
+    beyond = replace(study.base.base, **{where: value})  # type: ignore[arg-type]
     return (*along, beyond) if after and name != "quality" else (beyond, *along)
-
-
-def _with(v: Turned, name: str, value: float) -> Turned:
-    return replace(v, **{name: value})  # type: ignore[arg-type]
 
 
 def _panel(

@@ -152,12 +152,14 @@ def write_summary(found: Summary, folder: Path) -> Path:
     )  # fmt: skip
     points, all_points = _points("predictions", found.kinds)
     runs, all_runs = _runs(found)
+    left = tuple(f"{_count(number, 'check')} of these runs not counted: {why}."
+                 for why, number in found.left.items())  # fmt: skip
     exhibits = (
         Exhibit("statement", "Measured recordings", _WORDS, (_table("statement", found.kinds),),
                 tuple(starmap(_against, enumerate(found.kinds, 1)))),
         *_twins(found),
         Exhibit("predictions", "Predictions that count", tables=(points,), data=(all_points,)),
-        Exhibit("runs", "Counted and excluded runs", tuple(_left(found)), (runs,),
+        Exhibit("runs", "Counted and excluded runs", left, (runs,),
                 data=(all_runs,)),
     )  # fmt: skip
     return write_loose(told, exhibits, document(found, predictions=False), folder, "Summary")
@@ -317,12 +319,6 @@ def _runs(found: Summary) -> tuple[NumberTable, NumberTable]:
     runs = table("runs", "Below one folder of reports.", found.runs, columns, below="why")
     note = _more("runs", len(runs.rows), "first")
     return replace(runs, name="", rows=runs.rows[:_ROWS], note=note), runs
-
-
-def _left(found: Summary) -> Iterator[str]:
-    """Checks of runs that count which do not count themselves."""
-    for why, number in found.left.items():
-        yield f"{_count(number, 'check')} of these runs not counted: {why}."
 
 
 def document(found: Summary, *, predictions: bool = True) -> dict[str, Any]:
