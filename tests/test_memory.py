@@ -24,7 +24,7 @@ from validate.memory import MemoryShortError, free_memory, require_memory
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run import runs
-from validate.pipeline.run.memory import coarser
+from validate.pipeline.run.estimate import coarser
 from validate.pipeline.run.pipeline import compare
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.cylinder import quarter_cylinder

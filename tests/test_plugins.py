@@ -18,8 +18,8 @@ from validate.errors import SceneError, UsageError
 from validate.fem.laws.law import NeoHooke, stiffened
 from validate.fem.system import build
 from validate.parameters import quantity, with_values
-from validate.pipeline.experiment.law_solver import laws_of
 from validate.pipeline.experiment.method import Method
+from validate.pipeline.experiment.options import laws_of
 from validate.plugins import KINDS, PlugIn, Registry
 from validate.recording.readers import READERS
 from validate.scene import laws

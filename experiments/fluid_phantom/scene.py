@@ -4,7 +4,7 @@ Frame "phantom": x from the probe plate (0) to the stage plate, y up, z lateral;
 inclusion follows from the recording.
 """
 
-from validate.pipeline.plates.inclusion_body import BlockWithInclusion
+from validate.pipeline.plates.inclusion import BlockWithInclusion
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Foundation, Membrane, Pin, Scene, Support
 

@@ -13,7 +13,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
-from validate.pipeline.plates.inclusion_sweep import POSITION, SWEEP
+from validate.pipeline.plates.inclusion import POSITION, SWEEP
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion

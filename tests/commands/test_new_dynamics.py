@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.moving_bodies import written
+from validate.commands.check import described
 from validate.commands.main import cli
 from validate.commands.questions.motion import damping, held
 from validate.compare.result import Result
@@ -19,7 +20,6 @@ from validate.engine.cell import Where
 from validate.errors import RegistrationError, UsageError
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
-from validate.pipeline.checks.motion_summary import described
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of

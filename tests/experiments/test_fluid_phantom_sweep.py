@@ -15,8 +15,13 @@ from validate.errors import UsageError, ValidateError
 from validate.fem.cavity import cavity_surface, volume_of
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.plates.inclusion_body import MeshedInclusion, inclusion
-from validate.pipeline.plates.inclusion_sweep import POSITION, SWEEP, swept
+from validate.pipeline.plates.inclusion import (
+    POSITION,
+    SWEEP,
+    MeshedInclusion,
+    inclusion,
+    swept,
+)
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Contours, Recording
 from validate.register.outlines.sweep import stacked

@@ -12,8 +12,12 @@ import pytest
 from validate.compare.result import Result
 from validate.errors import UsageError
 from validate.pipeline import load
-from validate.pipeline.experiment.external import external_methods, with_simulators
-from validate.pipeline.experiment.options import Options, configure
+from validate.pipeline.experiment.options import (
+    Options,
+    configure,
+    external_methods,
+    with_simulators,
+)
 from validate.pipeline.run.named_run import run_name
 from validate.pipeline.run.pipeline import compare
 from validate.solve.external.scheme import ExternalLetGo, ExternalSimulator

@@ -11,8 +11,12 @@ from validate.pipeline.experiment.declaration import from_json, holds_code, to_j
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import InclusionTest, Streams, inclusion_test
-from validate.pipeline.plates.inclusion_body import BlockWithInclusion
+from validate.pipeline.plates.inclusion import (
+    BlockWithInclusion,
+    InclusionTest,
+    Streams,
+    inclusion_test,
+)
 from validate.recording.mcap.read import read_recording
 from validate.recording.types import Recording, Signal
 from validate.scene.material import Material

@@ -7,9 +7,8 @@ import pytest
 from validate.errors import UsageError
 from validate.pipeline.bodies.measured import solid
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.law_solver import laws_of, with_law
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.experiment.options import Options, all_methods
+from validate.pipeline.experiment.options import Options, all_methods, laws_of, with_law
 from validate.scene.material import LawName
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop

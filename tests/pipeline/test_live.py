@@ -43,7 +43,7 @@ from validate.pipeline.live.listener import (
     position_of,
 )
 from validate.pipeline.live.live_recording import _from_rest
-from validate.pipeline.live.path import recorded_tip
+from validate.pipeline.live.preparation import recorded_tip
 from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording

@@ -10,7 +10,7 @@ from machine_logs import machine_log, pressed_cylinder
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
-from validate.pipeline.calibration import calibrated, free_parameters
+from validate.pipeline.calibration import calibrated
 from validate.pipeline.checks import numerical_uncertainty
 from validate.pipeline.experiment.experiment import Variant
 from validate.pipeline.experiment.find import _executed, load_file
@@ -35,6 +35,7 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
+from validate.study.identify import study as identify_study
 
 # private: _executed, _instants, _number, _on_all, _size_of, _solved, _touched_levels:
 #   called alone, case by case.
@@ -112,12 +113,12 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
     ("call", "error", "says"),
     [
         (
-            lambda: free_parameters.asked(bare(), Newmark()),
+            lambda: identify_study.asked(bare(), Newmark()),
             UsageError,
             "x declares no calibration; name parameters with their bounds: --parameters PATH=LOW:",
         ),
         (
-            lambda: free_parameters._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
+            lambda: identify_study._on_all(bare(accept=(), accepted=(), methods={"m": None}), ()),
             UsageError,
             "x has no accepted methods: declare a calibration in its file",
         ),
@@ -189,7 +190,7 @@ def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
     with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
         prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="--parameters mass"):
-        free_parameters._number(Newmark(), "mass", "lumped")
+        identify_study._number(Newmark(), "mass", "lumped")
 
 
 def test_parameters_of_a_twin_that_the_recording_does_not_know_are_refused() -> None:

@@ -23,7 +23,6 @@ from validate.study.coverage import bench as coverage_bench
 from validate.study.coverage import study as coverage_module
 from validate.study.coverage import worlds as coverage_worlds
 from validate.study.coverage.bench import ExactReading, opened_here
-from validate.study.coverage.coverage_results import Quantity
 from validate.study.coverage.page import sentence
 from validate.study.coverage.plan import (
     World,
@@ -33,7 +32,7 @@ from validate.study.coverage.plan import (
     true_method,
     wrong_paths,
 )
-from validate.study.coverage.study import Coverage, coverage
+from validate.study.coverage.study import Coverage, Quantity, coverage
 from validate.study.coverage.worlds import Study, _alike
 
 # private: _Truth, _alike, _mistaken, _of_method, _sides, _terms: called alone, case by case.

@@ -8,10 +8,10 @@ import pytest
 from validate.pipeline.ladder.ladder import PaperSetting, Turned
 from validate.report.views.records import table
 from validate.study.filters.exhibits import _pareto_chart, _pareto_exhibit, _ranking_exhibit
-from validate.study.stability import exhibits as stability_exhibits
-from validate.study.stability.exhibits import _COST, _map, _marks
-from validate.study.stability.static_map import _cells
-from validate.study.stability.static_map import _map as gain_map
+from validate.study.stability import page as stability_exhibits
+from validate.study.stability.gain import _cells
+from validate.study.stability.gain import _map as gain_map
+from validate.study.stability.page import _COST, _map, _marks
 from validate.study.stability.study import points
 
 # private: _COST: a limit or list of the code, which the test must meet exactly.

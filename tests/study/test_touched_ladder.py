@@ -12,9 +12,8 @@ from validate.engine.cell import Where
 from validate.errors import UsageError
 from validate.fem.system import build
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.ladder.default import body_of, trial_of
+from validate.pipeline.ladder.default import Divided, body_of, trial_of
 from validate.pipeline.ladder.ladder import RUNGS, Trial
-from validate.pipeline.ladder.probe_ladder import Divided
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import StepTimes
 from validate.study.choose.climb import Climb, require_judged

@@ -43,9 +43,8 @@ from validate.study.stability import cell as stability_cell
 from validate.study.stability import gain, precision
 from validate.study.tradeoff import cell as trade_cell
 from validate.study.tradeoff import study as trade
-from validate.study.tradeoff.cell import Measured, TradeCell, run_cell
+from validate.study.tradeoff.cell import Measured, TradeCell, held_bytes, run_cell
 from validate.study.tradeoff.exhibits import trade_exhibits
-from validate.study.tradeoff.held import held_bytes
 from validate.study.tradeoff.page import cells_table, trade_document
 from validate.study.tradeoff.study import Trade, TradeRow, front, trade_cells, traded
 

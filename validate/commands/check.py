@@ -6,6 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from validate.commands.arguments import Detail, complain
 from validate.commands.display import print_views, relative, say, shown
 from validate.commands.progress import progress
@@ -15,19 +17,23 @@ from validate.commands.screen import Passage, check_passages, rows, sentences, s
 from validate.compare.result import KINDS, Result
 from validate.engine.execution import CELLS
 from validate.engine.pool import Pool
-from validate.errors import UsageError
+from validate.errors import UsageError, ValidateError
 from validate.library.run_report import by_cells
-from validate.pipeline.checks.motion_summary import described
+from validate.pipeline.bodies.first_modes import assumed_density, first_frequencies
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.origins import Opened, opened
+from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cached_runs import stored_run
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder
 from validate.pipeline.run.pipeline import compare
 from validate.report.long_table import long_table
+from validate.report.sections.motion_words import motion_lines
 from validate.report.stored.folder import try_results
 from validate.report.stored.json_values import members
 from validate.report.stored.store import check_members, figure_members, overall_members
+from validate.scene.scene import Scene
 from validate.study.stored_runs.published_page import FOLDER, write_published
 
 Json = dict[str, Any]
@@ -192,3 +198,32 @@ def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
 
 
 _CLAIMS = ("not reproduced", "not reproducible as printed", "reproduced", "not comparable")
+
+
+def described(experiment: Experiment) -> tuple[str, ...]:
+    """Return a line for each stream of the first recording that moves, and one of the first modes.
+
+    Empty where the recording cannot be read, or nothing of it moves in time.
+    """
+    try:
+        found = opened(experiment, experiment.parameters)
+    except ValidateError:
+        return ()
+    lines = motion_lines(found.recordings[0]) if found.recordings else ()
+    return (*lines, *_modes(experiment, found)) if lines else ()
+
+
+def _modes(experiment: Experiment, found: Opened) -> tuple[str, ...]:
+    """Of the first model; empty without one of known modulus that is held."""
+    p = found.parameters
+    if isinstance(p, Tree) and isinstance(p.scene, Scene) and p.scene.material.E is None:
+        return ()
+    model = next(iter(experiment.methods.values())).scene
+    try:
+        scene = experiment.build(found.recordings[0], p, model)
+        modes = first_frequencies(scene) if isinstance(scene, Scene) else ()
+    except (ValidateError, np.linalg.LinAlgError):
+        return ()
+    words = ", ".join(f"{f:.3g}" for f in modes)
+    assumed = assumed_density(p)
+    return (f"first modes of the body: {words} Hz{assumed and f' ({assumed})'}",) if modes else ()

@@ -16,8 +16,13 @@ from validate.library.comparison import scores_of_runs
 from validate.report.stored.folder import try_results
 from validate.report.views.layout import laid, width, wrapped
 from validate.report.views.numbers import shown_unit, significant, text
-from validate.study.stored_runs.compare_page import write_comparison
-from validate.study.stored_runs.score_comparison import Pair, Row, SideBySide, pairs
+from validate.study.stored_runs.score_comparison import (
+    Pair,
+    Row,
+    SideBySide,
+    pairs,
+    write_comparison,
+)
 
 _LEAST = 3  # rows of a pair: fewer pairs are shown rather than shorter ones
 _ROUNDING = 1e-9  # relative: the same computation in another order
@@ -114,21 +119,16 @@ def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[
 
 def _fitting(pair: Pair, columns: int, room: int | None) -> tuple[list[str], int]:
     """The first rows of a pair that have room, at least one; and how many."""
-    head, rows = _table(pair)
+    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
+    if any(r.method for r in pair.rows):
+        head = ["method", *head]
+        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
     count = len(rows) if room is None else min(len(rows), max(1, room - 1))
     lines = laid(head, rows[:count], columns)
     while room is not None and len(lines) > room and count > 1:
         count -= 1
         lines = laid(head, rows[:count], columns)
     return lines, count
-
-
-def _table(pair: Pair) -> tuple[list[str], list[list[str]]]:
-    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
-    if any(r.method for r in pair.rows):
-        head = ["method", *head]
-        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
-    return head, rows
 
 
 def _row(row: Row) -> list[str]:

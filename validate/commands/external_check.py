@@ -17,7 +17,7 @@ from validate.pipeline.bodies.own_body import meshed, own_body
 from validate.pipeline.experiment.find import find
 from validate.solve.external.exchange import write_job
 from validate.solve.external.scheme import ExternalSimulator
-from validate.solve.external.suite import OffBy, check_simulator
+from validate.solve.external.suite import check_simulator
 
 _STATES = {"finished": "yes", "refused": "no"}
 _TOLERANCE = 1e-6  # relative, of the equations
@@ -38,7 +38,13 @@ def check(command: str, seconds: float, memory: float, as_json: bool) -> int:
         )
     else:
         head = ["scene", "solved", "quantity", "error", "exact", "unit"]
-        table("", head, [_row(row) for row in found])
+        cells = []
+        for row in found:
+            milli, unit = (1e3, "mm") if row.unit == "m" else (1.0, row.unit)
+            error = "-" if row.error is None else f"{milli * row.error:.3g}"
+            can = _STATES.get(row.state, row.state)
+            cells.append([row.scene, can, row.quantity, error, f"{milli * row.exact:.4g}", unit])
+        table("", head, cells)
         for row in found:
             if row.why:
                 say(f"{row.scene}: {row.why}", indent="  ")
@@ -76,10 +82,3 @@ def job(
     mesh = made.document["mesh"]
     what = f"{mesh['cells']} {mesh['kind']}, {len(kept)} times"
     say(f"{folder}: job.json and mesh.vtu of {key}: {what}", indent="  ")
-
-
-def _row(row: OffBy) -> list[str]:
-    milli, unit = (1e3, "mm") if row.unit == "m" else (1.0, row.unit)
-    error = "-" if row.error is None else f"{milli * row.error:.3g}"
-    can = _STATES.get(row.state, row.state)
-    return [row.scene, can, row.quantity, error, f"{milli * row.exact:.4g}", unit]

@@ -5,14 +5,12 @@ import math
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from validate.catalogue import experiment_files, reports_of
 from validate.commands.display import relative, say, shown
 from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.report.stored.run_changes import (
-    Move,
     PastCheck,
     PastRun,
     Since,
@@ -41,7 +39,13 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
         raise UsageError(f"no run of '{name}' below {reports}; {hint}")
     changes = [since(*pair) for pair in pairwise(runs)]
     if as_json:
-        print(json.dumps(_document(name, runs, changes), ensure_ascii=False, indent=1))
+        # One JSON document, SI; a change of code is one of commits.
+        document = {
+            "experiment": name,
+            "runs": [{"folder": run.folder, **run.line} for run in runs],
+            "changes": [{"from": i, "to": i + 1, **asdict(c)} for i, c in enumerate(changes, 1)],
+        }
+        print(json.dumps(document, ensure_ascii=False, indent=1))
         return
     count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     say(f"{name}: {count} below {relative(reports)}")
@@ -97,18 +101,20 @@ def _since(before: int, found: Since) -> None:
         lines.append(f"code: commit {found.code[0]} -> {found.code[1]}")
     if found.verdict:
         lines.append(f"verdict: {found.verdict[0]} -> {found.verdict[1]}")
-    lines += _first([_moved(m) for m in found.moved], _MOVED, "moved checks")
+    moved = []
+    for m in found.moved:
+        by = (
+            "the uncertainty of the numbers is not known" if m.ratio is None else f"{m.ratio:.3g} u"
+        )
+        one, other = shown(m.one, m.unit), shown(m.other, m.unit)
+        moved.append(f"moved: {m.method}: {m.name} {one} -> {other} ({by})")
+    lines += _first(moved, _MOVED, "moved checks")
     if found.within:
         most = f", by at most {found.most:.2g} u" if found.most else ""
         lines.append(f"not moved beyond 2 u: {found.within} checks{most}")
     say(f"   since {before}:")
     for line in lines or ["nothing changed"]:
         say(f"     {line}", indent="       ")
-
-
-def _moved(m: Move) -> str:
-    by = "the uncertainty of the numbers is not known" if m.ratio is None else f"{m.ratio:.3g} u"
-    return f"moved: {m.method}: {m.name} {shown(m.one, m.unit)} -> {shown(m.other, m.unit)} ({by})"
 
 
 def _first(lines: list[str], most: int, what: str) -> list[str]:
@@ -118,14 +124,3 @@ def _first(lines: list[str], most: int, what: str) -> list[str]:
 
 def _hash(text: str) -> str:
     return text[:_DIGITS] or "none"
-
-
-def _document(name: str, runs: tuple[PastRun, ...], changes: list[Since]) -> dict[str, Any]:
-    """One JSON document, SI; a change of code is one of commits."""
-    return {
-        "experiment": name,
-        "runs": [{"folder": run.folder, **run.line} for run in runs],
-        "changes": [
-            {"from": i, "to": i + 1, **asdict(found)} for i, found in enumerate(changes, 1)
-        ],
-    }  # fmt: skip

@@ -14,7 +14,7 @@ from validate.parameters import Parameter, describe
 from validate.pipeline.experiment.declaration import to_json
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
-from validate.pipeline.experiment.law_solver import laws_of
+from validate.pipeline.experiment.options import laws_of
 from validate.report.stored.json_values import members
 
 _DEFAULT = 16  # characters of a default
@@ -28,7 +28,26 @@ def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "sc
         document = _summary(experiment) | _details(experiment)
         print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
     elif detail == "screen":
-        show_screen(_passages(experiment))
+        cells = [[p.path, cut(_default(p), _DEFAULT), p.doc] for p in _by_weight(experiment)]
+        methods = [
+            [f"{k}{' (checked)' if k in experiment.accepted else ''}", m.label]
+            for k, m in experiment.methods.items()
+        ]
+        required = [
+            [a.quantity, ", ".join(a.loads) or "all", a.statistic,
+             "none" if a.required is None else f"{a.required:g}", a.why]
+            for a in experiment.accept
+        ]  # fmt: skip
+        known = [[f"{e.method}: {e.check}", e.verdict, e.why] for e in experiment.expected]
+        show_screen(
+            [
+                sentences([f"{experiment.name}: {experiment.title}. {experiment.source}"], None),
+                _block("Parameters (--set PATH=VALUE)", cells, _FIRST),
+                _block("Methods", methods, 3),
+                _block("Requirements, limits in SI", required, 2),
+                _block("Expected verdicts", known, 1),
+            ]
+        )
     else:
         _in_full(experiment)
 
@@ -100,28 +119,6 @@ def _in_full(experiment: Experiment) -> None:
     table("Requirements", ["quantity", "at", "statistic", "limit (SI)", "why"], required)
     known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
     table("Expected verdicts", ["method", "check", "verdict", "why"], known)
-
-
-def _passages(experiment: Experiment) -> list[Passage]:
-    """What it is, the parameters that matter most, methods and requirements."""
-    cells = [[p.path, cut(_default(p), _DEFAULT), p.doc] for p in _by_weight(experiment)]
-    methods = [
-        [f"{k}{' (checked)' if k in experiment.accepted else ''}", m.label]
-        for k, m in experiment.methods.items()
-    ]
-    required = [
-        [a.quantity, ", ".join(a.loads) or "all", a.statistic,
-         "none" if a.required is None else f"{a.required:g}", a.why]
-        for a in experiment.accept
-    ]  # fmt: skip
-    known = [[f"{e.method}: {e.check}", e.verdict, e.why] for e in experiment.expected]
-    return [
-        sentences([f"{experiment.name}: {experiment.title}. {experiment.source}"], None),
-        _block("Parameters (--set PATH=VALUE)", cells, _FIRST),
-        _block("Methods", methods, 3),
-        _block("Requirements, limits in SI", required, 2),
-        _block("Expected verdicts", known, 1),
-    ]
 
 
 def _block(title: str, cells: Sequence[Sequence[str]], keep: int) -> Passage:

@@ -1,11 +1,10 @@
 """`validate list`: names and titles of all experiments, without running their files."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from validate.catalogue import Card, card, experiment_files, name_of, shipped
+from validate.catalogue import card, experiment_files, name_of, shipped
 from validate.commands.display import relative, say
 from validate.commands.screen import rows
 from validate.datasets.home import data_sets, searched, whole
@@ -19,7 +18,8 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
         print(json.dumps([asdict(c) for c in cards], ensure_ascii=False, indent=2))
         return
     here = {c.needs: _is_here(c.needs) for c in cards if c.needs}
-    cells = [[c.name, c.title, _needs(c, here)] for c in cards if not c.note]
+    needs = {c.needs: c.needs if here.get(c.needs) else f"{c.needs} *" for c in cards if c.needs}
+    cells = [[c.name, c.title, needs.get(c.needs, "-")] for c in cards if not c.note]
     for line in rows(["name", "what", "needs"], cells, soft=1):
         print(line)
     if not all(here.values()):
@@ -32,12 +32,6 @@ def show(named: tuple[Path, ...], as_json: bool) -> None:
         hides = "this file replaces the shipped experiment of this name" if other else ""
         for text in filter(None, (c.note, hides)):
             say(f"{relative(file)}: {text}", indent="  ")
-
-
-def _needs(found: Card, here: Mapping[str, bool]) -> str:
-    if not found.needs:
-        return "-"
-    return found.needs if here[found.needs] else f"{found.needs} *"
 
 
 def _is_here(name: str) -> bool:

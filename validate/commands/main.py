@@ -535,7 +535,7 @@ def coverage(name: str, **options: Any) -> int:
     Example:
       validate study coverage kf_cube --quick --draws 10
     """
-    from validate.commands.coverage import covering
+    from validate.commands.study import covering
 
     return covering(name, _common(options), **options)
 

@@ -97,17 +97,15 @@ def _found(
     if found.without:
         i, why = next(iter(found.without.items()))
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
-    return found.contours, _told(found, hint), _marks(found, hint)
-
-
-def _marks(found: FollowedOutline, hint: Hint) -> tuple[PlaceSaid, ...]:
-    """What was said, a radius alone about the outline, and the other regions."""
+    # What was said, a radius alone about the outline, and the other regions
     first = found.contours.outlines[0].mean(axis=0)
-    said = PlaceSaid("as given", first if hint.centre is None else hint.centre, hint.radius, True)
-    others = (
-        PlaceSaid("another region", r.centre, r.radius) for r in (*found.rivals, *found.beside)
-    )
-    return (*([] if hint.centre is None and hint.radius is None else [said]), *others)
+    centre = first if hint.centre is None else hint.centre
+    marks = [PlaceSaid("as given", centre, hint.radius, True)]
+    if hint.centre is None and hint.radius is None:
+        marks = []
+    others = (*found.rivals, *found.beside)
+    marks += [PlaceSaid("another region", r.centre, r.radius) for r in others]
+    return found.contours, _told(found, hint), tuple(marks)
 
 
 def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:

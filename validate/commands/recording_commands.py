@@ -231,16 +231,14 @@ def calibrate(
         )
     if tool is None and (reference or rough):
         raise click.UsageError("--reference and --tip need --pivot TOOL; give it.")
-    if tool is not None:
-        from validate.commands import calibrate_tip as pivoting
+    from validate.commands import calibrate as calibrating
 
-        pivoting.calibrate_tip(file, out, tool, reference, rough)
+    if tool is not None:
+        calibrating.calibrate_tip(file, out, tool, reference, rough)
         return
     for name, value in given.items():
         if value is None and name != "unit":
             raise click.UsageError(f"Missing option '--{name}'.")
-    from validate.commands import calibrate as calibrating
-
     calibrating.calibrate(file, out, **given)
 
 

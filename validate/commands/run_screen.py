@@ -47,10 +47,13 @@ def show_run(
     ranking = _ranking(result)
     causes = "Likely causes: share of the squared error, next check"
     end = f"{seconds:.1f} s wall time{stored}; report: {relative(page)}"
+    # What the recording is and what was chosen on it, where that limits what the verdict says
+    texts = [] if result.kind == "measured" else [f"Recording: {KINDS[result.kind]}."]
+    texts += [f"{m.name}: {m.chosen}." for m in result.methods if m.checks and m.chosen]
     show(
         (
             sentences([headline(result)], None),
-            sentences(_recording(result), None),
+            sentences(texts, None),
             sentences(_warnings(result), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
             sentences(_unfinished(result), keep=2, most=4),
@@ -94,13 +97,6 @@ def headline(result: Result) -> str:
         parts.append("no check is evidence")
     quick = " (quick run)" if result.quick else ""
     return f"{result.name}: {found.word}{doubt}{quick}; {'; '.join(parts) or found.counted}."
-
-
-def _recording(result: Result) -> list[str]:
-    """What the recording is and what was chosen on it, where that limits what the verdict says."""
-    texts = [] if result.kind == "measured" else [f"Recording: {KINDS[result.kind]}."]
-    texts += [f"{m.name}: {m.chosen}." for m in result.methods if m.checks and m.chosen]
-    return texts
 
 
 def _checks(result: Result) -> list[Json]:
@@ -169,13 +165,12 @@ def _ranking(result: Result) -> Passage | None:
     ]  # fmt: skip
     quantity, _, load = by.partition("@")
     where = f" {at_load(load)}" if load else ""
-    title = cut(f"Methods by {quantity}{where}, against {_the(scored[0][1].against)}", width())
+    against = scored[0][1].against
+    if not against.startswith(("the ", "what ")):
+        against = f"the {against}"
+    title = cut(f"Methods by {quantity}{where}, against {against}", width())
     lines = rows(["", "error", "rate", "p99 of a step"], cells)
     return Passage(title, lines, 4, _FIRST + 1, "more methods: --verbose")
-
-
-def _the(against: str) -> str:
-    return against if against.startswith(("the ", "what ")) else f"the {against}"
 
 
 def _ranked_by(result: Result) -> str | None:

@@ -5,13 +5,14 @@ from pathlib import Path
 
 from validate.catalogue import reports_of
 from validate.commands.display import relative, say, table
-from validate.study.stored_runs.summary import OfKind, summary
-from validate.study.stored_runs.summary_page import (
+from validate.study.stored_runs.summary import (
     COVERED,
     STATED,
+    OfKind,
     document,
     row,
     sentence,
+    summary,
     write_summary,
 )
 
@@ -42,14 +43,10 @@ def _print(title: str, kinds: tuple[OfKind, ...]) -> None:
     rows = [row(kind) for kind in kinds]
     table(title, STATED, [texts[: len(STATED)] for texts in rows])
     for kind, texts in zip(kinds, rows, strict=True):
-        within = zip(COVERED, texts[len(STATED) :], strict=True)
-        shown = [_with_unit(name, text) for name, text in within if text != "–"]
+        shown = []  # a text below "name / unit" as people read it
+        for heading, text in zip(COVERED, texts[len(STATED) :], strict=True):
+            name, _, unit = heading.partition(" / ")
+            shown += [f"{name} {text} {unit}".strip()] if text != "–" else []
         say(f"  {kind.kind}: {', '.join(shown)}", indent="    ")
         if kind.why:
             say(f"  {kind.kind}: {kind.why}", indent="    ")
-
-
-def _with_unit(heading: str, text: str) -> str:
-    """A text below "name / unit" as people read it."""
-    name, _, unit = heading.partition(" / ")
-    return f"{name} {text} {unit}".strip()

@@ -43,10 +43,8 @@ def tip_offset(text: str) -> Floats:
     words = text.split(",")
     if len(words) != 3:
         raise UsageError(f"--tip {text}: expected three lengths, as 108mm,8mm,3mm")
-    return np.array([_signed(word) for word in words])
-
-
-def _signed(word: str) -> float:
-    text = word.strip()
-    sign = -1.0 if text.startswith("-") else 1.0
-    return sign * length({"tip": text.lstrip("+-")}, "tip", "108mm", zero=True)
+    tip = []
+    for text in map(str.strip, words):
+        sign = -1.0 if text.startswith("-") else 1.0
+        tip.append(sign * length({"tip": text.lstrip("+-")}, "tip", "108mm", zero=True))
+    return np.array(tip)

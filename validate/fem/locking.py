@@ -12,7 +12,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import quadratic
 from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.scene import Load, Pressure, Scene
 
@@ -51,7 +51,11 @@ def locking_of(scene: AnyScene) -> tuple[Locking, ...]:
     if isinstance(scene, Meshless) or scene.mesh.order != 1:
         return ()
     cells = f"linear {_SHAPES[scene.mesh.kind][0]}"
-    nu, across = float(scene.per_cell(lambda m: m.nu).max()), _across(scene.mesh)
+    # How many boxes of cells lie across the thinnest side
+    extent = np.ptp(scene.mesh.nodes, axis=0)
+    boxes = len(scene.mesh.cells) / _SHAPES[scene.mesh.kind][1]
+    across = float(extent.min() / (np.prod(extent) / boxes) ** (1 / len(extent)))
+    nu = float(scene.per_cell(lambda m: m.nu).max())
     found = []
     if scene.plane != "stress" and scene.dilatation == "pointwise" and nu >= LOCKING_FROM:
         instead = "mixed dilatation" if scene.mesh.bricks else "order 2 or nodal mean dilatation"
@@ -89,13 +93,6 @@ def locking_notes(scenes: Iterable[tuple[str, AnyScene]]) -> tuple[str, ...]:
             words.append(f"{where} ({'; '.join(labels[:_NAMED])}{rest})")
         notes.append(f"{cause}: {', '.join(words)}")
     return tuple(notes)
-
-
-def _across(mesh: Mesh) -> float:
-    """How many boxes of cells lie across the thinnest side."""
-    sides = np.ptp(mesh.nodes, axis=0)
-    boxes = len(mesh.cells) / _SHAPES[mesh.kind][1]
-    return float(sides.min() / (np.prod(sides) / boxes) ** (1 / len(sides)))
 
 
 def _bends(scene: Scene, along: int) -> bool:

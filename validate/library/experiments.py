@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from validate.pipeline.experiment.declaration import completed
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.experiment_kinds import completed
 from validate.pipeline.experiment.find import find
 
 

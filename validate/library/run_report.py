@@ -13,8 +13,7 @@ from validate.engine.execution import CELLS, Report
 from validate.engine.pool import Pool
 from validate.pipeline.calibration.calibrated import Identify, here
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.external import with_simulators
-from validate.pipeline.experiment.options import Options, doubtful
+from validate.pipeline.experiment.options import Options, doubtful, with_simulators
 from validate.pipeline.run.cached_runs import rests_on
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.named_run import reports_of, run_folder

@@ -31,8 +31,7 @@ from validate.study.filters.study import FilterStudy, study
 from validate.study.identify import page as identify_page
 from validate.study.identify.study import STARTS, IdentifyStudy, identification
 from validate.study.stability import page as stability_page
-from validate.study.stability import static_map as still_page
-from validate.study.stability.gain import GainMap, gain_map
+from validate.study.stability.gain import GainMap, gain_map, told_gain, told_nothing
 from validate.study.stability.study import Stability, stability
 from validate.study.study_page import Findings, write_study
 from validate.study.tradeoff import page as trade_page
@@ -110,7 +109,7 @@ def stability_map(experiment: Experiment, settings: StudySettings) -> Studied[St
             gain = gain_map(experiment, out=out, where=where, report=report)
         endings = filter_endings(experiment, quick=quick, out=out, where=where, report=report)
     if found is None:
-        told = still_page.told_gain(gain, quick) if gain else still_page.told_nothing(
+        told = told_gain(gain, quick) if gain else told_nothing(
             experiment, quick
         )  # fmt: skip
         passed = told.passed is not False

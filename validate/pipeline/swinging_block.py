@@ -11,7 +11,7 @@ from validate.pipeline.ladder.ladder import Trial
 from validate.pipeline.ladder.references import ORDERS, exact_in_time, swinging_pair
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.solve.schemes import candidates
 from validate.solve.study_entries import SwingingBody
@@ -35,7 +35,11 @@ def swinging_trial(
     size = tuple(float(x) for x in base.mesh.nodes.max(axis=0))
 
     def build(element: str, level: int, law: LawName) -> Scene:
-        return with_law(replace(base, body=_block_mesh(size, per, element, level)), law)
+        cells = tuple(n * level for n in per)
+        mesh = grid(size, cells) if element == "H8" else box(size, cells)
+        # P2's midside nodes are as many nodes as P1 has at twice the level.
+        mesh = quadratic(mesh) if element == "P2" else mesh
+        return with_law(replace(base, body=mesh), law)
 
     fine = (2, 4) if quick else (2, 4, 8)
     along = int(np.argmax(per))
@@ -59,11 +63,3 @@ def swinging_trial(
         rise_s=0.0,
         noise=noise,
     )
-
-
-def _block_mesh(size: tuple[float, ...], per: tuple[int, ...], element: str, level: int) -> Mesh:
-    """`per` x level cells per axis; P2's have midside nodes: as many nodes as P1 at twice these."""
-    cells = tuple(n * level for n in per)
-    if element == "H8":
-        return grid(size, cells)
-    return quadratic(box(size, cells)) if element == "P2" else box(size, cells)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validate.arrays import Floats
-from validate.recording.types import Contours, Frames, Markers, Recording
+from validate.recording.types import Contours, Frames, Recording
 
 Json = dict[str, Any]
 
@@ -28,7 +28,16 @@ def digest(recording: Recording) -> Json:
             k: {"unit": s.unit, "sd": s.sd, "frame": s.frame, "t": _array(s.t), "y": _array(s.y)}
             for k, s in recording.signals.items()
         },
-        "markers": {k: _markers(m) for k, m in recording.markers.items()},
+        "markers": {
+            k: {
+                "frame": m.frame,
+                "names": list(m.names),
+                "sd": m.sd,
+                "t": _array(m.t),
+                "x": _array(m.x),
+            }
+            for k, m in recording.markers.items()
+        },
         "contours": {k: _contours(c) for k, c in recording.contours.items()},
         "frames": {k: _frames(f) for k, f in recording.frames.items()},
         "metadata": {k: dict(v) for k, v in recording.metadata.items()},
@@ -49,11 +58,6 @@ def _lines(value: Mapping[str, Any], depth: int) -> list[str]:
         text[-1] += "," if i + 1 < len(value) else ""
         lines += text
     return [*lines, " " * depth + "}"]
-
-
-def _markers(m: Markers) -> Json:
-    own = {"frame": m.frame, "names": list(m.names), "sd": m.sd}
-    return {**own, "t": _array(m.t), "x": _array(m.x)}
 
 
 def _contours(c: Contours) -> Json:

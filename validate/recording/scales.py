@@ -4,7 +4,6 @@ A recording whose metres are millimetres agrees with itself as well as any other
 back where images enter.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -30,13 +29,20 @@ def odd_pixel(m_per_px: tuple[float, float], shape: tuple[int, int] | None = Non
     found = f"{sides} m per pixel is outside {low:g} to {high:g} m"
     if all(low <= side <= high for side in m_per_px):
         found = f"{sides} m per pixel"
-    return f"{found}{_image(m_per_px, shape)}{_meant(m_per_px, shape)}"
+    if extents := _extents(m_per_px, shape):
+        found += f": an image of {' x '.join(f'{e:.3g}' for e in extents)} m"
+    # The units whose name would make it reasonable, each with its factor
+    x, y = m_per_px
+    fit = [(unit, f) for unit, f in _UNITS if _within((x * f, y * f), shape)]
+    said = " or ".join(f"{round(1 / f)} ({x:g}{unit})" for unit, f in fit)
+    return f"{found}; a factor {said}?" if fit else found
 
 
 def odd_scales(recording: Recording) -> tuple[str, ...]:
     """Return a line for every stream of images, outlines or markers whose metres may be something
     else."""
-    return tuple(f"'{topic}': {text}" for topic, text in _odd(recording) if text)
+    odd = {topic: odd_stream(stream) for topic, stream in recording.streams.items()}
+    return tuple(f"'{topic}': {text}" for topic, text in odd.items() if text)
 
 
 def odd_stream(stream: object) -> str:
@@ -106,11 +112,6 @@ def _scaled(c: Contours, factor: float) -> Contours:
     )  # fmt: skip
 
 
-def _odd(recording: Recording) -> Iterator[tuple[str, str]]:
-    for topic, stream in recording.streams.items():
-        yield topic, odd_stream(stream)
-
-
 def _spread(x: Floats) -> float:
     """m between markers x (nt, k, d) m at the first instant at which two are seen; 0: never."""
     seen = np.asarray(np.isfinite(x).all(axis=2))
@@ -138,19 +139,6 @@ def _extents(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> tu
     if shape is None or min(shape) < 64:
         return ()
     return m_per_px[0] * shape[1], m_per_px[1] * shape[0]
-
-
-def _image(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> str:
-    found = _extents(m_per_px, shape)
-    return f": an image of {' x '.join(f'{e:.3g}' for e in found)} m" if found else ""
-
-
-def _meant(m_per_px: tuple[float, float], shape: tuple[int, int] | None) -> str:
-    """The units whose name would make it reasonable, each with its factor."""
-    x, y = m_per_px
-    fit = [(unit, f) for unit, f in _UNITS if _within((x * f, y * f), shape)]
-    said = " or ".join(f"{round(1 / f)} ({x:g}{unit})" for unit, f in fit)
-    return f"; a factor {said}?" if fit else ""
 
 
 def _factor(size: float, within: tuple[float, float]) -> str:

@@ -280,7 +280,9 @@ def place_of(text: str, mesh: Mesh) -> Place:
     """Return the facets that the words choose of a mesh; raises `SceneError` for words that say
     nothing, or choose nothing."""
     if "&" in text:
-        sides = [_plane_of(_site(part.strip(), mesh)) for part in text.split("&")]
+        # Sides without the way their faces look, which edges do not have.
+        named = [_site(part.strip(), mesh) for part in text.split("&")]
+        sides = [site.first if isinstance(site, Both) else site for site in named]
         edges = reduce(and_, sides).edges
         edges.entities(mesh)
         return edges
@@ -382,11 +384,6 @@ def _require_at(text: str, low: tuple[float, ...], high: tuple[float, ...], mesh
             f"place '{text[:60]}': {1e3 * away:.3g} mm away from a body of {1e3 * size:.3g} "
             "mm; a number without a unit is in metres, write 10mm"
         )
-
-
-def _plane_of(site: Site) -> Site:
-    """A side without the way its faces look, which edges do not have."""
-    return site.first if isinstance(site, Both) else site
 
 
 def _metres(text: str) -> float:

@@ -337,7 +337,10 @@ class Scene:
         """Return the scene on this mesh of its body: words become places, symmetry holds its
         planes."""
         held, places = tuple(getattr(self.body, "held", ())), getattr(self.body, "places", {})
-        sides = tuple(side for f in self.foundations for side in _sides(f))
+        sides = []  # one foundation for every place that is joined by "+"
+        for f in self.foundations:
+            joined = f.facets.split("+") if isinstance(f.facets, str) else [f.facets]
+            sides += [replace(f, facets=p.strip() if isinstance(p, str) else p) for p in joined]
         bonded = tuple(Support(f.facets, f.components) for f in sides if f.contact == "bonded")
 
         def placed(parts: tuple[P, ...]) -> tuple[P, ...]:
@@ -507,14 +510,6 @@ class Scene:
 
 
 P = TypeVar("P")
-
-
-def _sides(foundation: Foundation) -> tuple[Foundation, ...]:
-    """One for every place that is joined by "+"."""
-    if not isinstance(foundation.facets, str):
-        return (foundation,)
-    places = foundation.facets.split("+")
-    return tuple(replace(foundation, facets=place.strip()) for place in places)
 
 
 def _placed(part: P, mesh: Mesh, places: Mapping[str, Place]) -> P:

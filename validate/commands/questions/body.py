@@ -81,14 +81,39 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     asked = _of_the_body(recording, found)
     mesh = answered_mesh(found)
     asked += known_size("body.size", mesh, found.get("body.unit", "m"))
-    asked += _of_the_supports(mesh) + _of_the_load(recording, mesh, found)
+    asked += [
+        named_place("held.all", "places held in every direction", mesh),
+        *(named_place(f"held.{c}", f"places held along {c} only", mesh) for c in "xyz"),
+        named_place(
+            "held.slides",
+            "flat place that slides on its plate without lifting off "
+            "(a body held along one axis only can drift)",
+            mesh,
+        ),
+    ] + _of_the_load(recording, mesh, found)
     asked += _of_the_markers(recording, found) + _of_the_outlines(recording, mesh, found)
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and unit_of(recording, found.get("moved.by", "")) == "m":
         asked.append(by_topic("seen.force", "force on the moved place to compare", forces))
     asked += _of_the_material(recording, found)
     asked += motion_questions(recording, found, mesh)
-    return [*asked, *_of_the_limits(found), *_of_the_ranges(found)]
+    words = {"E": "modulus (relative)", "nu": "Poisson ratio",
+             "load": "load (relative)"}  # fmt: skip
+    if found.get("material.E") == UNKNOWN:
+        del words["E"]
+    return [
+        *asked,
+        *(
+            question
+            for name, (unit, what) in _ACCEPTED.items()
+            if name in _judged(found)
+            for question in (limit_question(name, what, unit), reason_question(name))
+        ),
+        *(
+            by_path(f"ranges.{k}", f"standard uncertainty of the {text}")
+            for k, text in words.items()
+        ),
+    ]
 
 
 def _of_the_body(recording: Recording, found: Answers) -> list[Question]:
@@ -161,19 +186,6 @@ def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> lis
     return asked
 
 
-def _of_the_supports(mesh: Mesh | None) -> list[Question]:
-    return [
-        named_place("held.all", "places held in every direction", mesh),
-        *(named_place(f"held.{c}", f"places held along {c} only", mesh) for c in "xyz"),
-        named_place(
-            "held.slides",
-            "flat place that slides on its plate without lifting off "
-            "(a body held along one axis only can drift)",
-            mesh,
-        ),
-    ]
-
-
 def _of_the_markers(recording: Recording, found: Answers) -> list[Question]:
     if not recording.markers:
         return []
@@ -222,24 +234,6 @@ def _of_the_outlines(
             for c, what in (("x", "columns"), ("y", "rows"))
         ]  # fmt: skip
     return asked
-
-
-def _of_the_limits(found: Answers) -> list[Question]:
-    return [
-        question
-        for name, (unit, what) in _ACCEPTED.items() if name in _judged(found)
-        for question in (limit_question(name, what, unit), reason_question(name))
-    ]  # fmt: skip
-
-
-def _of_the_ranges(found: Answers) -> list[Question]:
-    words = {"E": "modulus (relative)", "nu": "Poisson ratio",
-             "load": "load (relative)"}  # fmt: skip
-    if found.get("material.E") == UNKNOWN:
-        del words["E"]
-    return [
-        by_path(f"ranges.{k}", f"standard uncertainty of the {text}") for k, text in words.items()
-    ]
 
 
 def _judged(found: Answers) -> set[str]:

@@ -1,6 +1,5 @@
 """Questions about dynamics of a body and the methods of its experiment."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -148,21 +147,7 @@ def motion_questions(
         return asked
     if found["moved.by"] != "gravity":
         asked.append(by_path("material.rho", "density, kg/m3"))
-    asked += _of_the_start(found) + _of_the_damping(found)
-    asked += _of_the_filters(recording, tree_of(recording, found))
-    if not [q for q in asked if q.key not in found]:
-        p = tree_of(recording, found, cells_for(found))
-        asked += _of_the_methods(recording, p, found)
-    return [
-        *asked,
-        by_path("ranges.rho", "standard uncertainty of the density (relative)"),
-        *([] if found.get("motion.damping") == IDENTIFIED else
-          [by_path("ranges.damping", "standard uncertainty of the damping (relative)")]),
-    ]  # fmt: skip
-
-
-def _of_the_start(found: Answers) -> list[Question]:
-    asked = [
+    asked += [
         Question("motion.start", "start of the motion, s on the recording's clock; empty: detected "
                  "in the recording", check=parsed("motion.start")),
         Question("motion.length", "seconds to solve from the start; empty: to the end",
@@ -176,19 +161,23 @@ def _of_the_start(found: Answers) -> list[Question]:
         asked.append(Question("motion.gravity", "direction of gravity, as -z (it changes the "
                               "motion at large strain only); empty: none",
                               check=axis_of))  # fmt: skip
-    return asked
-
-
-def _of_the_damping(found: Answers) -> list[Question]:
-    asked = [Question("motion.damping", "damping: stiffness-proportional (beta, 3ms), a ratio to "
-                                        "the "
-                      f"critical damping of the first mode (0.03), or {IDENTIFIED} on the first "
-                      f"part "
-                      "of a ring-down", open=True, check=damping)]  # fmt: skip
+    asked.append(Question("motion.damping", "damping: stiffness-proportional (beta, 3ms), a ratio "
+                          "to the critical damping of the first mode (0.03), or "
+                          f"{IDENTIFIED} on the first part of a ring-down", open=True,
+                          check=damping))  # fmt: skip
     if found.get("motion.damping") == IDENTIFIED:
         asked.append(by_path("motion.fit_window", "seconds from the start used for "
                              "identification; only later samples are evidence"))  # fmt: skip
-    return asked
+    asked += _of_the_filters(recording, tree_of(recording, found))
+    if not [q for q in asked if q.key not in found]:
+        p = tree_of(recording, found, cells_for(found))
+        asked += _of_the_methods(recording, p, found)
+    return [
+        *asked,
+        by_path("ranges.rho", "standard uncertainty of the density (relative)"),
+        *([] if found.get("motion.damping") == IDENTIFIED else
+          [by_path("ranges.damping", "standard uncertainty of the damping (relative)")]),
+    ]  # fmt: skip
 
 
 def _of_the_filters(recording: Recording, p: Tree) -> list[Question]:
@@ -196,13 +185,7 @@ def _of_the_filters(recording: Recording, p: Tree) -> list[Question]:
     names = judged_markers(recording, p)
     if len(names) < 2:
         return []
-    return [Question(GIVEN, f"markers that filters use, of {', '.join(names)}; the others "
-                     "test their prediction", ",".join(_given(recording, p, names)),
-                     "every second marker by size of motion, at least two if three move; the "
-                     "marker that moves most is predicted", check=_among(names))]  # fmt: skip
 
-
-def _among(names: Sequence[str]) -> Callable[[str], None]:
     def check(text: str) -> None:
         chosen = _listed(text)
         if absent := [n for n in chosen if n not in names]:
@@ -210,7 +193,10 @@ def _among(names: Sequence[str]) -> Callable[[str], None]:
         if not chosen or len(set(chosen)) < len(chosen):
             raise UsageError(f"expected at least one of {', '.join(names)}, each once")
 
-    return check
+    return [Question(GIVEN, f"markers that filters use, of {', '.join(names)}; the others "
+                     "test their prediction", ",".join(_given(recording, p, names)),
+                     "every second marker by size of motion, at least two if three move; the "
+                     "marker that moves most is predicted", check=check)]  # fmt: skip
 
 
 def _listed(text: str) -> tuple[str, ...]:
@@ -321,20 +307,17 @@ def _line(
     explicit = name == "explicit" or name in EXPLICIT_FILTERS
     parts.append(f'element="{element(p, 1 if explicit or name in _OF_NODES else order)}"')
     parts += [f"markers={given!r}"] if isinstance(settings, tuple(FILTERS)) else []
-    parts += [f"split={_parts(recording, p)}"] if explicit else []
+    if explicit:  # steps in one of the recording's
+        system = build(_scene(recording, p, Path(), 1))
+        limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
+        cut = started(recording, p).recording
+        dt = float(steps_of(without_rest(p), cut)[0])
+        parts.append(f"split={max(1, ceil(dt / limit))}")
     if kind not in ("moves", "follows"):
         unsure = f"{_LOAD * _largest(recording, p, kind):.3g}"
         walks = ("load_start", "load_walk", "load_sd")
         parts += [f"{w}={unsure}" for w in walks if hasattr(settings, w)]
     return f'"{name}": moving({", ".join(parts)}),'
-
-
-def _parts(recording: Recording, p: Tree) -> int:
-    """Explicit steps in one of the recording's."""
-    system = build(_scene(recording, p, Path(), 1))
-    limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
-    cut = started(recording, p).recording
-    return max(1, ceil(float(steps_of(without_rest(p), cut)[0]) / limit))
 
 
 def _measurements(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:

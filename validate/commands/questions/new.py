@@ -104,21 +104,17 @@ def new(
         complain(f"'{topic}' is not used by this experiment")
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
     if expected:
-        say(f"first answer: {_about(expected)}", indent="  ")
+        say(
+            f"first answer: about {float(f'{expected.seconds:.1g}'):.0f} s, "
+            f"{expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} unknowns at most (estimated)",
+            indent="  ",
+        )
     if found.get(_HALVINGS):
         say(
             f"its mesh is coarser: {found['body.file']} filled anew with larger cells; "
             f"validate run {_called(name, path)} --refine takes the file's own",
             indent="  ",
         )
-
-
-def _about(expected: RunEstimate) -> str:
-    """Time, memory and size of a run, as the order of magnitude that an estimate is."""
-    return (
-        f"about {float(f'{expected.seconds:.1g}'):.0f} s, "
-        f"{expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} unknowns at most (estimated)"
-    )
 
 
 def fitting(recording: Recording) -> tuple[NewKind, ...]:

@@ -53,23 +53,15 @@ def place_questions(recording: Recording, found: Answers) -> Sequence[Question]:
     """Return the questions about the inclusion and the images' place; none if not compared."""
     if not recording.contours or not whole(found):
         return []
-    asked = _of_the_inclusion(found) if inside(found) else []
-    return [*asked, *_of_the_place(recording, found)]
-
-
-def _of_the_inclusion(found: Answers) -> list[Question]:
-    return [
+    asked = [
         Question("outline.surface", "facet set of the inclusion's wall", open=True,
                  check=facets_of(specimen_mesh(found))),
-        Question("outline.fluid", "whether a fluid of constant volume fills the "
-                                  "inclusion", open=True,
-                 choices=("true", "false")),
+        Question("outline.fluid", "whether a fluid of constant volume fills the inclusion",
+                 open=True, choices=("true", "false")),
         Question("material.E", "Young's modulus, as 15kPa (the log's slope holds for a specimen "
                  "without inclusion)", open=True, check=quantity_in("Pa")),
-    ]  # fmt: skip
-
-
-def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
+    ] if inside(found) else []  # fmt: skip
+    # The images' place
     pose = recording.contour(found.get("outline.topic", next(iter(recording.contours)))).pose
     posed = not np.array_equal(pose, np.eye(4))
 
@@ -77,7 +69,7 @@ def _of_the_place(recording: Recording, found: Answers) -> list[Question]:
         if text != _RECORDED:
             with_values(Compression(), {"outline.origin": text})
 
-    asked = [
+    asked += [
         Question("outline.origin", f"position of the images' first pixel {_FRAME}, as "
                  f"-12mm,0mm,30mm; {_RECORDED}: take the recorded pose", _RECORDED if posed else "",
                  "the recording has a pose", open=not posed, check=check),

@@ -137,13 +137,19 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     default = "" if own and f"{said:.3g}" != f"{accepted:.3g}" else f"a tenth of {judged}"
     reason = found.get("why.force") or default
     law, mesh = found.get("law", LINEAR), declared_mesh(found, folder)
+    # The fluid, and whose volume change counts in linear cells
+    lines = []
+    if new_outline.filled(found):
+        lines.append(f'cavities=(Cavity("inclusion", {found["outline.surface"]!r}),),')
+    if linear_cells(found):
+        lines.append('dilatation="nodal_mean",')
     return {
         "imports": "\n".join(sorted(_imports(found))),
         "body": mesh or _cylinder(recording, found),
         "test": f"{test}, {'recorded' if stated_test(recording) else 'answered'}",
         "along": "-z" if test == "compression" else "+z",
         "rests": ", rests=True" if mesh or new_outline.whole(found) else "",
-        "parts": _parts(found),
+        "parts": "".join(f"        {line}\n" for line in lines),
         "fit_from": f"{_USUAL.fit_from / _USUAL.limit * limit:.3g}",
         "fit_to": f"{_USUAL.fit_to / _USUAL.limit * limit:.3g}",
         "limit": f"{limit:.3g}",
@@ -190,32 +196,18 @@ def _imports(found: Answers) -> set[str]:
     }  # fmt: skip
 
 
-def _parts(found: Answers) -> str:
-    """The fluid, and whose volume change counts in linear cells."""
-    lines = []
-    if new_outline.filled(found):
-        lines.append(f'cavities=(Cavity("inclusion", {found["outline.surface"]!r}),),')
-    if linear_cells(found):
-        lines.append('dilatation="nodal_mean",')
-    return "".join(f"        {line}\n" for line in lines)
-
-
 def _coefficients(found: Answers) -> str:
     """What the law has beyond modulus and Poisson ratio, as an argument; empty for none."""
     if found.get("law", LINEAR) == LINEAR:
         return ""
-    given = with_values(_of_law(found), coefficient_values(found))["material"].coefficients
+    law: Any = found.get("law", LINEAR)
+    of_law = {"material": Material(None, None).of_law(law)}  # type: ignore[arg-type]
+    given = with_values(of_law, coefficient_values(found))["material"].coefficients
     parts = ", ".join(
         f"{f.name}={value!r}"
         for f in fields(given) if (value := getattr(given, f.name)) != f.default
     )  # fmt: skip
     return f", coefficients={type(given).__name__}({parts})" if parts else ""
-
-
-def _of_law(found: Answers) -> dict[str, Any]:
-    """What the coefficients of the chosen law are checked with."""
-    law: Any = found.get("law", LINEAR)
-    return {"material": Material(None, None).of_law(law)}  # type: ignore[arg-type]
 
 
 def _cylinder(recording: Recording, found: Answers) -> str:

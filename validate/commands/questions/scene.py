@@ -150,7 +150,26 @@ def tree_of(
     """Return the parameters that the answers so far make, in cells of that `order`; mesh files are
     found from the current folder. Raises what the parts of the scene do."""
     body = geometry_of(found, cells, order, reach_of(recording, found))
-    return Tree("", _scene(recording, found, body), _settings(found))
+    supports = [Support(found[f"held.{c}"], axes) for c, axes in _HELD.items()
+                if found.get(f"held.{c}")]  # fmt: skip
+    if rest := found.get("held.slides"):
+        mesh = answered_mesh(found)
+        assert mesh is not None
+        supports.append(Support(rest, (_across(rest, mesh),), rests=True))
+    parts = _mover(recording, found)
+    if "drives" in parts and found.get("moved.sideways", "true") == "true":
+        across = tuple(c for c in range(3) if not parts["drives"][0].direction[c])
+        supports.append(Support(found["moved.place"], across))
+    scene = Scene(
+        body, material_of(found), tuple(supports), dilatation="by_element", **parts
+    )  # fmt: skip
+    values = {k: v for k, v in found.items() if k in _SETTINGS and v not in ("", UNKNOWN)}
+    values = {k: v for k, v in values.items() if k not in _TOPICS or v != NONE}
+    values |= {"noted": found["moved.noted"]} if found.get("moved.noted") else {}
+    for path, text in (damping_of(found), held_of(found)):
+        values |= {path: text} if path.startswith("motion.") else {}
+    settings: MeasuredBody = with_values(MeasuredBody(), {**contact_settings(found), **values})
+    return Tree("", scene, settings)
 
 
 # --- the body -------------------------------------------------------------------------------------
@@ -246,22 +265,6 @@ def _read(said: tuple[tuple[str, str], ...], changed: tuple[Path, int]) -> Mesh:
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def _scene(recording: Recording, found: Answers, body: Geometry) -> Scene:
-    supports = [Support(found[f"held.{c}"], axes) for c, axes in _HELD.items()
-                if found.get(f"held.{c}")]  # fmt: skip
-    if rest := found.get("held.slides"):
-        mesh = answered_mesh(found)
-        assert mesh is not None
-        supports.append(Support(rest, (_across(rest, mesh),), rests=True))
-    parts = _mover(recording, found)
-    if "drives" in parts and found.get("moved.sideways", "true") == "true":
-        across = tuple(c for c in range(3) if not parts["drives"][0].direction[c])
-        supports.append(Support(found["moved.place"], across))
-    return Scene(
-        body, material_of(found), tuple(supports), dilatation="by_element", **parts
-    )  # fmt: skip
-
-
 def material_of(found: Answers) -> Material:
     """Raise `UsageError` and `SceneError` as its values do."""
     law: Any = found.get("law", "linear")
@@ -292,25 +295,23 @@ def _mover(recording: Recording, found: Answers) -> dict[str, Any]:
     if unit == "m":
         name = "moved" if by == NOTED else by
         if found.get("indenter.shape", "none") != "none":
-            part = {"contacts": (_contact(name, found),)}
+            # The indenter's contact
+            given = {k: v for k, v in found.items() if k.startswith("indenter.")}
+            shape = {k.removeprefix("indenter."): v for k, v in given.items()}
+            answer = shape.pop("friction", "0")
+            key, value = CONTACT_WORDS.get(answer, ("friction", answer))
+            bonded = {"bonded": value} if key == "bonded" else {}
+            values = {k: v for k, v in {**shape, **bonded}.items() if v}
+            declared: Any = with_values(Indenter("plate"), values)
+            way = axis_of(found["moved.along"])
+            contact = RigidContact(name, found["moved.place"], declared, way)
+            rubs = {"friction": value} if key == "friction" else {}
+            part = {"contacts": (with_values(contact, rubs),)}
         else:
             part = {"drives": (Drive(name, place, axis_of(along)),)}
         return part | _weight(found)
     load: Any = Pressure(by, place) if unit == "Pa" else Load(by, place, axis_of(along))
     return {"loads": (load, *_weight(found).get("loads", ()))}
-
-
-def _contact(name: str, found: Answers) -> RigidContact:
-    shape = {k.removeprefix("indenter."): v for k, v in found.items() if k.startswith("indenter.")}
-    answer = shape.pop("friction", "0")
-    key, value = CONTACT_WORDS.get(answer, ("friction", answer))
-    bonded = {"bonded": value} if key == "bonded" else {}
-    values = {k: v for k, v in {**shape, **bonded}.items() if v}
-    declared: Any = with_values(Indenter("plate"), values)
-    along = axis_of(found["moved.along"])
-    contact = RigidContact(name, found["moved.place"], declared, along)
-    rubs: RigidContact = with_values(contact, {"friction": value} if key == "friction" else {})
-    return rubs
 
 
 def _weight(found: Answers) -> dict[str, Any]:
@@ -320,16 +321,6 @@ def _weight(found: Answers) -> dict[str, Any]:
 
 
 # --- what is measured -----------------------------------------------------------------------------
-
-
-def _settings(found: Answers) -> MeasuredBody:
-    values = {k: v for k, v in found.items() if k in _SETTINGS and v not in ("", UNKNOWN)}
-    values = {k: v for k, v in values.items() if k not in _TOPICS or v != NONE}
-    values |= {"noted": found["moved.noted"]} if found.get("moved.noted") else {}
-    for path, text in (damping_of(found), held_of(found)):
-        values |= {path: text} if path.startswith("motion.") else {}
-    settings: MeasuredBody = with_values(MeasuredBody(), {**contact_settings(found), **values})
-    return settings
 
 
 def held_of(found: Answers) -> tuple[str, str]:

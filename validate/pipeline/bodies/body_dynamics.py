@@ -5,6 +5,7 @@ weight, a force, a pressure or a displacement over time. What differs is the loa
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -84,23 +85,11 @@ def motion_exhibit(
     it."""
     main = cases[MAIN]
     scene = next(iter(main.values())).scene
-    modes = _modes(scene) if isinstance(scene, Scene) else ()
-    facts = _facts(shown, modes, assumed_density(p))
-    charts = (*_over_time(shown, main), *_spectrum(shown))
-    words = f"'{shown.marker}' moves most; along its direction, in the recording's frame."
-    return ReportAdditions(
-        (Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),)
-    )
-
-
-def _modes(scene: Scene) -> tuple[float, ...]:
-    try:
-        return first_frequencies(scene)
-    except (ValidateError, np.linalg.LinAlgError):
-        return ()
-
-
-def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> NumberTable:
+    modes: tuple[float, ...] = ()
+    if isinstance(scene, Scene):
+        with suppress(ValidateError, np.linalg.LinAlgError):
+            modes = first_frequencies(scene)
+    assumed = assumed_density(p)
     along = ", ".join(f"{x:+.3f}" for x in shown.direction)
     way = f" along ({along})" if len(shown.direction) > 1 else ""
     rings, size, unit = shown.ringing, scale(shown.unit), shown_unit(shown.unit)
@@ -123,8 +112,17 @@ def _facts(shown: RecordedMotion, modes: tuple[float, ...], assumed: str) -> Num
         word = "matters" if shown.inertia_matters(modes[0]) else "is small"
         rows.append(("motion above a third of the first", 100 * share, "%",
                      f"rms, of peak to peak: inertia {word}"))  # fmt: skip
-    return NumberTable("recorded_motion", "The recorded motion, and the body's first modes.",
-                       ("what", "value", "unit", "note"), tuple(rows))  # fmt: skip
+    facts = NumberTable(
+        "recorded_motion",
+        "The recorded motion, and the body's first modes.",
+        ("what", "value", "unit", "note"),
+        tuple(rows),
+    )
+    charts = (*_over_time(shown, main), *_spectrum(shown))
+    words = f"'{shown.marker}' moves most; along its direction, in the recording's frame."
+    return ReportAdditions(
+        (Exhibit("recorded-motion", "The recorded motion", (words,), (facts,), charts),)
+    )
 
 
 def _over_time(shown: RecordedMotion, main: Mapping[str, MethodRun]) -> tuple[Chart, ...]:

@@ -188,7 +188,13 @@ def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -
     begun, p = started(recording, p), without_rest(p)
     t, kind = steps_of(p, begun.recording), drive_kind(recording, p)
     at = (scene.mesh, folder)
-    main = _load(begun.recording, p, kind, t, scene, at)
+    # What loads the body at t s, as it changed since the start
+    if kind == "releases":
+        force, name = p.settings.scale * released_force(p, scene), mover(p.scene).name
+        main = SignalObservation(name, "drives", t, np.full((len(t), 1), -force), "N", 0.0)
+    else:
+        main = driven(begun.recording, p, kind, np.append(0.0, t), 0.0, at)
+        main = replace(main, t=t, y=main.y[1:])
     drives, weight = [main], weight_beside(p.scene)
     if weight and kind != "weighs":
         drives.append(
@@ -196,8 +202,8 @@ def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -
         )
     compared: list[Observation] = []
     if p.settings.seen.force:
-        force = zeroed_force(begun.recording, p, kind, 0.0)
-        compared.append(observed_force(begun.recording, p, force, force.t, force.y))
+        cell = zeroed_force(begun.recording, p, kind, 0.0)
+        compared.append(observed_force(begun.recording, p, cell, cell.t, cell.y))
     if p.settings.seen.markers:
         compared.append(moving_markers(begun, p, at))
     said, film = tuple[str, ...](), tuple[Selection, ...]()
@@ -215,17 +221,6 @@ def place_moving(recording: Recording, p: Tree, scene: Scene, *, folder: Path) -
         (*drives, *compared), (*_windows(p, t, compared[0], others), *film), findings=said,
         sudden=kind in SUDDEN, moves=True,
     )  # fmt: skip
-
-
-def _load(
-    cut: Recording, p: Tree, kind: Kind, t: Floats, scene: Scene, at: BodyAt
-) -> SignalObservation:
-    """What loads the body at t (nt,) s, as it changed since the start."""
-    if kind == "releases":
-        force, name = p.settings.scale * released_force(p, scene), mover(p.scene).name
-        return SignalObservation(name, "drives", t, np.full((len(t), 1), -force), "N", 0.0)
-    whole = driven(cut, p, kind, np.append(0.0, t), 0.0, at)
-    return replace(whole, t=t, y=whole.y[1:])
 
 
 def moving_markers(begun: Started, p: Tree, at: BodyAt) -> MarkerObservation:

@@ -91,13 +91,17 @@ def measured_body(
     """
     settings = parameters.settings
     levels = _HALVINGS if isinstance(parameters.scene.body, MeshFile) else _SHARES
+    # The formal order: of a static force or displacement that of the corners of a held place; of a
+    # motion in time that of its cells: frequencies rule it, of which corners are a small part.
+    order = CORNER_ORDER
+    if settings.motion.how != "static":
+        order = max(1.0 + _order_of(methods[n], parameters) for n in accepted if n in methods)
     bare = Experiment(
         name, title, source, parameters, methods, accepted, accept, beside,
         partial(static_scene, folder=folder), partial(place, folder=folder),
         frames=settings.seen.states + 1, kind=kind,
         uncertainty=Uncertainty(
-            mesh=MeshLadder(levels, CellSize(folder),
-                            _order(parameters, methods, accepted)),
+            mesh=MeshLadder(levels, CellSize(folder), order),
             inputs=_inputs_of(parameters),
             surrogate=list(methods)[-1],
         ),
@@ -292,15 +296,6 @@ def _finer_settings(
 
 def _order_of(method: Method, p: Tree) -> int:
     return 2 if is_quadratic(element_of(method, p)) else 1
-
-
-def _order(p: Tree, methods: Mapping[str, Method], accepted: tuple[str, ...]) -> float:
-    """The formal order: of a static force or displacement that of the corners of a held place; of
-    a motion in time that of its cells, since frequencies rule it, of which corners are a small
-    part."""
-    if p.settings.motion.how == "static":
-        return CORNER_ORDER
-    return max(1.0 + _order_of(methods[n], p) for n in accepted if n in methods)
 
 
 _INPUTS = (

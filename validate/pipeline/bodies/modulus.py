@@ -257,18 +257,14 @@ class _Bench:
         observations = tuple(new if o is drive else o for o in self.seen.observations)
         return replace(self.seen, observations=observations)
 
-    def _rest_sd(self, topic: str) -> float:
-        """How uncertain the zero of a signal is: its noise over the samples at rest."""
-        signal = self.recording.signals.get(topic)
-        if signal is None:
-            return 0.0
-        until = max(float(self.seen.t[0]) + self.p.settings.seen.still, float(signal.t[0]))
-        sd = self.cell.sd if topic == self.p.settings.seen.force else signal.sd
-        return sd / sqrt(max(int((signal.t <= until).sum()), 1))
-
     def zero_of_force(self, fit: ScaledFit, f: Floats) -> float:
         """Standard uncertainty of the modulus from the zero of the force, Pa."""
-        sd = self._rest_sd(str(self.p.settings.seen.force))
+        topic, sd = str(self.p.settings.seen.force), 0.0
+        signal = self.recording.signals.get(topic)
+        if signal is not None:  # its noise over the samples at rest
+            until = max(float(self.seen.t[0]) + self.p.settings.seen.still, float(signal.t[0]))
+            noise = self.cell.sd if topic == self.p.settings.seen.force else signal.sd
+            sd = noise / sqrt(max(int((signal.t <= until).sum()), 1))
         return abs(self.fit(f, sd).scale - fit.scale)
 
 

@@ -334,7 +334,10 @@ def _each_by_itself(experiment: Experiment) -> set[str]:
 def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
     """Raise `ComparisonError` where what is judged calibrates, under whatever name."""
     for part in (p for p in problem.parts if p.judged):
-        twice = next((n for n in part.on.quantities for a in accept if _all_of(a, n)), "")
+        # What calibrates is all that a limit judges of a quantity, or a load that it names.
+        names = ((n, *n.partition("@")[::2], a) for n in part.on.quantities for a in accept)
+        twice = next((n for n, quantity, load, a in names
+                      if quantity == a.quantity and (not load or load in a.loads)), "")  # fmt: skip
         if not twice:
             continue
         mark = part.recordings[0].source.sha256[:8]
@@ -344,12 +347,6 @@ def require_apart(accept: Sequence[Accept], problem: Problem) -> None:
             f"value can be used only once; check other loads, quantities or recordings, or set "
             f"{', '.join(problem.space.names)}"
         )
-
-
-def _all_of(accept: Accept, name: str) -> bool:
-    """Whether what calibrates is all that a limit judges of a quantity, or a load that it names."""
-    quantity, _, load = name.partition("@")
-    return quantity == accept.quantity and (not load or load in accept.loads)
 
 
 def require_identified(experiment: Experiment, one: Calibrated) -> None:
@@ -379,19 +376,17 @@ def with_inputs(experiment: Experiment, fitted: Sequence[Calibrated]) -> Experim
         return experiment
     declared = experiment.uncertainty or Uncertainty(surrogate=fitted[0].problem.calibration.method)
     surrogate = declared.surrogate or fitted[0].problem.calibration.method
-    kept = (i for i in declared.inputs if not _replaced(i, fitted))
-    more = replace(declared, inputs=(*kept, *inputs), surrogate=surrogate)
-    return replace(experiment, uncertainty=more)
-
-
-def _replaced(declared: Input, fitted: Sequence[Calibrated]) -> bool:
-    """Whether a declared range moves nothing but what was identified."""
+    # Declared ranges but those that move nothing but what was identified
     values = {path: value for one in fitted for path, value in one.values.items()}
     here = with_free(fitted[0].problem.parts[0].parameters, values)
-    before = {p.path: p.default for p in describe(here)}
-    after = {p.path: p.default for p in describe(declared.move(here, 1.0))}
-    moved = {path for path, value in after.items() if value != before[path]}
-    return bool(moved) and moved <= set(values)
+    before, kept = {p.path: p.default for p in describe(here)}, []
+    for source in declared.inputs:
+        after = {p.path: p.default for p in describe(source.move(here, 1.0))}
+        moved = {path for path, value in after.items() if value != before[path]}
+        if not moved or not moved <= set(values):
+            kept.append(source)
+    more = replace(declared, inputs=(*kept, *inputs), surrogate=surrogate)
+    return replace(experiment, uncertainty=more)
 
 
 def inputs_of(one: Calibrated) -> tuple[Input, ...]:

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 
 from validate.compare.result import MethodResult
 from validate.compare.score import Score
-from validate.compare.verdict import Check
 from validate.identify.identification import Profiled
 from validate.parameters import describe
 from validate.pipeline.calibration.calibration import Free
@@ -30,18 +29,17 @@ def headlines(fitted: Sequence[Calibrated]) -> str:
 
 def headline(one: Calibrated) -> str:
     """Fitted on what."""
-    each = ", ".join(_interval(e, unit_of(one, e.name)) for e in one.found.estimates)
-    return f"Fitted: {each} with '{one.problem.calibration.method}' on {one.on}"
+    each = []
+    for e in one.found.estimates:
+        unit = unit_of(one, e.name)
+        value, low, high = (with_unit(v, unit, _DIGITS) for v in (e.value, e.low, e.high))
+        each.append(f"{e.name} = {value} (95 %: {low} to {high})")
+    return f"Fitted: {', '.join(each)} with '{one.problem.calibration.method}' on {one.on}"
 
 
 def unit_of(one: Calibrated, path: str) -> str:
     """Return the unit of what was identified."""
     return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}[path]
-
-
-def _interval(e: Profiled, unit: str) -> str:
-    value, low, high = (with_unit(v, unit, _DIGITS) for v in (e.value, e.low, e.high))
-    return f"{e.name} = {value} (95 %: {low} to {high})"
 
 
 def predicted(results: Sequence[MethodResult]) -> str:
@@ -54,7 +52,10 @@ def predicted(results: Sequence[MethodResult]) -> str:
     ]  # fmt: skip
     if not found:
         return f"predicted: nothing, because {_no_evidence(results)}"
-    each = (_within(*one) for one in found[:_SHOWN])
+    each = []
+    for c, by in found[:_SHOWN]:
+        off, doubt = with_unit(abs(c.value), c.unit), with_unit(2 * c.u_val, c.unit)
+        each.append(f"{c.name}{by} has an error of {off} (2 u_val {doubt})")
     more = f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else ""
     return f"predicted: {', '.join(each)}{more}"
 
@@ -66,11 +67,6 @@ def _no_evidence(results: Sequence[MethodResult]) -> str:
     each = (f"{n} of {kinds.total()} checks {words.get(kind, 'compared nothing')}"
             for kind, n in kinds.most_common())  # fmt: skip
     return ", ".join(each) or "nothing is checked"
-
-
-def _within(c: Check, by: str) -> str:
-    off, doubt = with_unit(abs(c.value), c.unit), with_unit(2 * c.u_val, c.unit)
-    return f"{c.name}{by} has an error of {off} (2 u_val {doubt})"
 
 
 def lines(one: Calibrated) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.score import Score
 from validate.estimate.consistency import (
@@ -130,12 +129,11 @@ def _rows(followed: MethodRun) -> list[tuple[Entry, ...]]:
     if nis is None:
         return []
     parts = [("NIS", nis)] + [(f"NEES at {p}", c) for p, c in nees_of(followed).items()]
-    return [(followed.case or "recorded", followed.label, *_row(what, c)) for what, c in parts]
-
-
-def _row(what: str, c: Consistency) -> tuple[Entry, ...]:
-    band = c.band_95
-    return (what, c.mean, band.low, band.high, c.samples, c.dof, c.verdict, c.alarm or "none")
+    return [
+        (followed.case or "recorded", followed.label, what, c.mean, c.band_95.low, c.band_95.high,
+         c.samples, c.dof, c.verdict, c.alarm or "none")
+        for what, c in parts
+    ]  # fmt: skip
 
 
 def _white_rows(followed: MethodRun) -> list[tuple[Entry, ...]]:
@@ -159,7 +157,7 @@ def _chart(followed: MethodRun) -> Chart:
     dof = traces["nis.dof"].y
     seen = dof > 0
     per = traces["nis"].y[seen] / dof[seen]
-    low, high = (_band(dof[seen], p) for p in (0.025, 0.975))
+    low, high = (np.asarray(chi_square_quantile(p, dof[seen]) / dof[seen]) for p in (0.025, 0.975))
     return Chart(
         f"nis_{followed.method}", f"NIS of {followed.label}", "recorded time / s",
         "NIS per dof / 1",
@@ -169,7 +167,3 @@ def _chart(followed: MethodRun) -> Chart:
         ),
         levels=(("expected", 1.0),), log="y", scale=1.0,
     )  # fmt: skip
-
-
-def _band(dof: Floats, probability: float) -> Floats:
-    return np.asarray(chi_square_quantile(probability, dof) / dof)

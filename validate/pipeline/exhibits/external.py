@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from validate.compare.exhibit import Exhibit, NumberTable, TableCell
-from validate.compare.verdict import Check
 from validate.pipeline.checks.checks import Terms, terms_of
-from validate.pipeline.experiment.external import external_methods
+from validate.pipeline.experiment.options import external_methods
 from validate.pipeline.run.method_run import MethodRun
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.solve.external.scheme import ExternalSimulator, changes
@@ -35,17 +34,15 @@ def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tu
     accepted = [n for n in runs.experiment.accepted if n in main][:1]
     terms = {k: t for n in accepted for _, one in terms_of(runs, main[n]) for k, t in one.items()}
     rows = [r for f in main.values() for r in _rows(f, runs.methods[f.method].settings, terms)]
-    said = [(main[n].label, line) for n in simulators for line in _findings(main[n])]
+    said = []
+    for name in simulators:
+        lines = dict.fromkeys(line for run in main[name].runs for line in run.said)
+        said += [(main[name].label, s) for s in lines if not s.startswith("external: ")]
     tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
         head = ("simulator", "deviations and failures")
         tables.append(NumberTable("external_findings", "Findings", head, tuple(said)))
     return (Exhibit(_NAME, "External simulators", (_WORDS,), tables=tuple(tables)),)
-
-
-def _findings(simulator: MethodRun) -> list[str]:
-    lines = [w for run in simulator.runs for w in run.said if not w.startswith("external: ")]
-    return list(dict.fromkeys(lines))
 
 
 def _rows(
@@ -65,8 +62,11 @@ def _rows(
     if not judged or not run.finished:
         return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
     return [
-        (f.label, program, c.name, *_figures(c), c.acceptance, c.validation, *cost) for c in judged
-    ]
+        (f.label, program, c.name,
+         *(TableCell(number, c.unit) for number in (c.value, 2 * c.u_val, c.margin)),
+         c.acceptance, c.validation, *cost)
+        for c in judged
+    ]  # fmt: skip
 
 
 def _rate(f: MethodRun, settings: Any) -> float | None:
@@ -81,9 +81,3 @@ def _rate(f: MethodRun, settings: Any) -> float | None:
     new = changes(f.seen.t[: len(run.seconds)], f.seen.inputs[: len(run.seconds)])
     at = np.searchsorted(f.seen.t, new.t)
     return 1 / float(np.median(run.seconds[at]))
-
-
-def _figures(check: Check) -> tuple[TableCell, TableCell, TableCell]:
-    numbers = (check.value, 2 * check.u_val, check.margin)
-    value, doubt, margin = (TableCell(n, check.unit) for n in numbers)
-    return value, doubt, margin

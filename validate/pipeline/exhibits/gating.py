@@ -84,16 +84,13 @@ def _last(f: MethodRun, trace: str) -> float:
 def _row(f: MethodRun, name: str) -> tuple[TableCell | str | float, ...]:
     unit = f.run.traces[_OF + name].unit
     numbers = (_last(f, f"{_OF}{name}{end}") for end in ("", ".low", ".high"))
-    shown = (TableCell(v, unit, text=_words(v, unit)) for v in numbers)
+    axis, factor = _AXIS.get(unit, (unit, 1.0))
+    end = "" if axis == "1" else f" {axis}"
+    # Five digits: an interval may be narrow.
+    shown = (TableCell(v, unit, text=f"{factor * v:.5g}{end}") for v in numbers)
     said = doubt(f, name) or "identified"
     left = _last(f, f"{_OF}{name}.left")
     return (f.case or "recorded", f.label, name, *shown, left, said)
-
-
-def _words(value: float, unit: str) -> str:
-    """Five digits: an interval may be narrow."""
-    axis, factor = _AXIS.get(unit, (unit, 1.0))
-    return f"{factor * value:.5g}{'' if axis == '1' else ' ' + axis}"
 
 
 def _chart(f: MethodRun, name: str) -> Chart:

@@ -4,14 +4,15 @@ An object is {"type": name of its class, ...} with the fields that are not their
 are in SI. What is code stays in the experiment's file: {"code": "twin.record"} says where in its
 `EXPERIMENT` a function is, {"like": "parameters.settings", ...} which class an object of its own
 has. A declaration without code is run from its JSON alone, and nothing of it is executed: its
-classes are the library's and those of plug-ins that the user has installed (`classes`).
+classes are the library's and those of plug-ins that the user has installed (`classes`). The
+settings of a kind of experiment complete its declaration (`completed`).
 """
 
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -24,12 +25,56 @@ from validate.estimate.filters import FILTERS
 from validate.former_names import new_name
 from validate.parameters import describe, has_path, nearest_names
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.experiment_kinds import DECLARED, completed, of_a_kind
-from validate.pipeline.experiment.tree import follows
+from validate.pipeline.experiment.tree import Tree, follows
 from validate.pipeline.experiment.variation import ByPath, Shift, Values
 from validate.register.sensing import SENSORS
 from validate.scene.laws import LAWS
 from validate.solve.schemes import SCHEMES, SOLVERS
+
+#: What a declaration of such a kind holds.
+DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "accept", "kind")
+
+
+@cache
+def kinds() -> Mapping[type, Callable[..., Experiment]]:
+    """What makes an experiment, by the class of its settings; they read all formats, so that they
+    are imported where one is asked for."""
+    from validate.pipeline.bodies.choices import MeasuredBody
+    from validate.pipeline.bodies.measured import measured_body
+    from validate.pipeline.plates.choices import Compression
+    from validate.pipeline.plates.compression import compression
+    from validate.pipeline.plates.inclusion import InclusionTest, inclusion_test
+
+    return MappingProxyType({
+        MeasuredBody: measured_body,
+        Compression: compression,
+        InclusionTest: lambda *, folder, **given: inclusion_test(**given),
+    })  # fmt: skip
+
+
+def of_a_kind(experiment: Experiment) -> bool:
+    """Return whether its scene and settings say all that is declared of it."""
+    return _kind(experiment) in kinds()
+
+
+def _kind(experiment: Experiment) -> type:
+    """The class that says what the experiment measures."""
+    return type(experiment.parameters.settings)
+
+
+def completed(experiment: Experiment, path: Path) -> Experiment:
+    """Return the experiment declared in that file, with what its kind adds."""
+    if not isinstance(experiment.parameters, Tree):
+        raise UsageError(
+            f"{path}: parameters of type {type(experiment.parameters).__name__}; declare a scene: "
+            "Experiment(scene=Scene(...), settings=...)"
+        )
+    if of_a_kind(experiment) and not experiment.complete:
+        given: dict[str, Any] = {name: getattr(experiment, name) for name in DECLARED}
+        make = kinds()[_kind(experiment)]
+        experiment = make(**given, folder=path.resolve().parent)
+    return experiment.at(path)
+
 
 # --- The paths of a declaration, checked when it is read: an error names the path and the line.
 
@@ -89,7 +134,7 @@ _MODULES = (
     "compare.effects", "compare.overall_verdict", "compare.published", "compare.verdict",
     "estimate.filters", "register.markers.quality", "register.sensing",
     "pipeline.calibration.calibration", "pipeline.experiment.tree", "pipeline.plates.choices",
-    "pipeline.experiment.experiment", "pipeline.plates.inclusion", "pipeline.plates.inclusion_body",
+    "pipeline.experiment.experiment", "pipeline.plates.inclusion",
     "pipeline.bodies.choices", "pipeline.experiment.method", "pipeline.experiment.tree",
     "pipeline.experiment.variation", "scene.contact", "scene.geometries.specification",
     "scene.geometries.hollow_block", "scene.geometries.indented_bodies", "scene.laws",

@@ -14,9 +14,8 @@ from validate.catalogue import FILE, card, experiment_files, name_of, searched_f
 from validate.errors import UsageError, ValidateError
 from validate.files import read_text
 from validate.parameters import nearest_names
-from validate.pipeline.experiment.declaration import from_json, require_paths
+from validate.pipeline.experiment.declaration import completed, from_json, require_paths
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.experiment_kinds import completed
 
 _LARGEST = 16_000_000  # bytes of a declaration as JSON
 _KEPT = 8  # experiments of one file
@@ -106,8 +105,10 @@ def _executed(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         _unload(package.__name__)
+        # What is wrong in the words of the library needs no class.
+        kind = "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
         raise UsageError(
-            f"{path}{_place(error, path)}: {_kind(error)}{error}; correct the file "
+            f"{path}{_place(error, path)}: {kind}{error}; correct the file "
             f"(`python {quote(str(path))}` shows the full traceback)"
         ) from error
     return module
@@ -116,11 +117,6 @@ def _executed(path: Path) -> ModuleType:
 def _unload(package: str) -> None:
     for name in [n for n in list(sys.modules) if n == package or n.startswith(f"{package}.")]:
         del sys.modules[name]
-
-
-def _kind(error: BaseException) -> str:
-    """What is wrong in the words of the library, which need no class; else the class."""
-    return "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
 
 
 def _place(error: BaseException, path: Path) -> str:

@@ -1,20 +1,116 @@
-"""User options of a run (values, methods, cases), and the folder of the experiment."""
+"""User options of a run: values, methods, cases, laws, external simulators; the run's folder.
+
+What a method changes of the scene's material has a law, its settings solve it. Where a user sets
+another law, a static method takes a solver of that law: that of the experiment's own static method
+which solves it, else linear statics or Newton's method. Others take those of their scheme.
+"""
 
 import os
-from collections.abc import Mapping
+import re
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import describe, doubts, has_path, nearest_names, with_values
 from validate.pipeline.experiment.experiment import Case, Experiment
-from validate.pipeline.experiment.external import added_simulators
-from validate.pipeline.experiment.law_solver import with_law
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import valued
+from validate.scene.laws import further_laws
+from validate.scene.material import LawName
 from validate.scene.mesh_files.abaqus_text import files_named
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
+from validate.solve.external.program import words
+from validate.solve.external.scheme import ExternalSimulator
+from validate.solve.fluid.cavities import ExactPressure, NoFluid
+from validate.solve.handles import LARGE, Handles
+from validate.solve.static.load_table import Tabulated
+from validate.solve.static.newton import StaticNewton
+from validate.solve.static.quasi_static import QuasiStatic
+
+_SUFFIX = re.compile("_(simulator|guest)$")  # of a script; the second is a former one
+_LEVELS = 20  # of statics with one input, where the experiment does not say
+
+
+def external_methods(methods: dict[str, Method]) -> dict[str, Method]:
+    """Return the methods that are external simulators."""
+    return {name: m for name, m in methods.items() if isinstance(m.settings, ExternalSimulator)}
+
+
+def added_simulators(methods: Mapping[str, Method], commands: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the methods that `with_simulators` adds for these commands."""
+    labels = [_label(command) for command in commands]
+    return tuple(name for name, m in methods.items() if m.label in labels)
+
+
+def _label(command: str) -> str:
+    return f"external: {command}"
+
+
+def with_simulators(experiment: Experiment, commands: Sequence[str]) -> Experiment:
+    """Return the experiment with one more method for each command.
+
+    A method has the settings of the first external simulator that the experiment declares, else
+    those of its accepted method. Raises `UsageError` for a command whose program is missing.
+    """
+    methods = dict(experiment.methods)
+    accepted = next(iter(experiment.accepted), next(iter(methods), ""))
+    for command in commands:
+        words(command)
+        # A free name after the script: `felupe` for `python felupe_simulator.py`
+        stems = [Path(word).stem for word in shlex.split(command) if not word.startswith("-")]
+        last = next((s for s in stems[1:] if s), stems[0])
+        name = re.sub(r"\W+", "_", _SUFFIX.sub("", last)) or "external"
+        while name in methods:
+            name += "_2"
+        methods[name] = _as(methods, accepted, command)
+    return replace(experiment, methods=methods) if commands else experiment
+
+
+def _as(methods: dict[str, Method], accepted: str, command: str) -> Method:
+    declared = next(iter(external_methods(methods).values()), None)
+    label = _label(command)
+    if declared is not None:
+        return replace(declared, label=label, settings=replace(declared.settings, command=command))
+    like = methods[accepted]
+    handles = getattr(like.settings, "handles", None)
+    moving = handles is not None and handles.inertia
+    settings = ExternalSimulator(command, inertia=moving, levels=0 if moving else _LEVELS)
+    return replace(like, label=label, settings=settings, markers=(), steps=None, chosen="")
+
+
+_LINEAR, _LARGE = (ExactPressure, NoFluid, QuasiStatic), (StaticNewton, Tabulated)
+
+
+def laws_of(method: Method) -> tuple[str, ...]:
+    """Return the laws that a method may have."""
+    static = isinstance(method.settings, (*_LINEAR, *_LARGE))
+    handles: Handles | None = getattr(method.settings, "handles", None)
+    own: tuple[LawName, ...] = get_args(LawName) if static or handles is None else handles.law
+    return (*own, *further_laws()) if set(LARGE) <= set(own) else own
+
+
+def with_law(name: str, method: Method, law: str, declared: Mapping[str, Method]) -> Method:
+    """Return a method of which a user sets the law, with a solver of that law.
+
+    Raises `UsageError` for a law that the method's scheme does not solve.
+    """
+    possible = laws_of(method)
+    if law not in possible:
+        raise UsageError(
+            f"methods.{name}.material.law={law}: {type(method.settings).__name__} solves "
+            f"{', '.join(possible)}; set the law of another method"
+        )
+    handles: Handles | None = getattr(method.settings, "handles", None)
+    if handles is None or handles.solves(law):
+        return method
+    kinds = _LINEAR if law == "linear" else _LARGE
+    own = [m.settings for m in declared.values() if isinstance(m.settings, kinds)]
+    usual = QuasiStatic() if law == "linear" else StaticNewton("none")
+    return replace(method, settings=own[0] if own else usual)
+
 
 RECORDED = "recorded"  # the case that the experiment's own recording is
 _MESHES = (".npz", *FOREIGN)

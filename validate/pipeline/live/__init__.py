@@ -3,8 +3,7 @@
 from validate.pipeline.live.clock import LiveRun, live, realtime
 from validate.pipeline.live.listener import Listener
 from validate.pipeline.live.live_recording import LIVE, as_given, written
-from validate.pipeline.live.path import RecordedPath, recorded_tip
-from validate.pipeline.live.preparation import Prepared, prepared
+from validate.pipeline.live.preparation import Prepared, RecordedPath, prepared, recorded_tip
 
 __all__ = [
     "LIVE",

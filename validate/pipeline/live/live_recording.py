@@ -1,6 +1,5 @@
 """Recording of a real-time loop, which `validate run` replays to the same numbers."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -36,11 +35,15 @@ def written(done: LiveRun, made: Prepared, start_ns: int) -> Recording:
             signals[name] = Signal(np.round(done.due, 9), y[:, None], "s", 0.0, _FRAME)
     signals = {k: Signal(s.t + offset, s.y, s.unit, s.sd, s.frame) for k, s in signals.items()}
     name = f"{made.experiment.name} live"
+    counts = {k: str(v) for k, v in sorted(done.findings.items())}
+    loop = {
+        "experiment": made.experiment.name, "method": made.method, "source": done.kind,
+        "rate_hz": repr(done.rate), "ticks": str(done.ticks), "missed": str(done.missed), **counts,
+    }  # fmt: skip
     return Recording(
         name, Source(name, "", 0, "made in memory"), start_ns, signals=signals,
         metadata={
-            "provenance": {"kind": "twin", "law": "the model that ran live"},
-            LIVE: _said(done, made),
+            "provenance": {"kind": "twin", "law": "the model that ran live"}, LIVE: loop,
             "live_parameters": {p.path: str(p.default) for p in describe(made.parameters)},
         },
     )  # fmt: skip
@@ -53,14 +56,6 @@ def _from_rest(done: LiveRun, rest: Floats) -> tuple[Floats, Floats, Floats]:
     none = np.zeros((1, len(rest)))
     t = np.concatenate([[before], done.t])
     return np.round(t, 9), np.vstack([rest[None], done.x]), np.vstack([none, done.F])
-
-
-def _said(done: LiveRun, made: Prepared) -> Mapping[str, str]:
-    counts = {k: str(v) for k, v in sorted(done.findings.items())}
-    return {
-        "experiment": made.experiment.name, "method": made.method, "source": done.kind,
-        "rate_hz": repr(done.rate), "ticks": str(done.ticks), "missed": str(done.missed), **counts,
-    }  # fmt: skip
 
 
 # --- An experiment whose recording is a live loop's: the same method must give the same force.

@@ -1,20 +1,100 @@
-"""Preparation of a method for a real-time loop, with the same system as `validate run`."""
+"""Method and recorded path of a real-time loop, with the same system as `validate run`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.errors import UsageError
+from validate.errors import RecordingError, UsageError
 from validate.fem.system import build as build_system
 from validate.parameters import nearest_names
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.live.path import RecordedPath
 from validate.pipeline.run.pipeline import set_out
+from validate.recording.types import Recording
 from validate.scene.meshless import Meshless
 from validate.solve.types import HandStepper
+
+# --- The path of a tool's tip in a recording: signals `tip.x`, `tip.y`(, `tip.z`) in m, or the
+# only point of a stream of markers `tip` (positions that a tracker did not see are null there).
+
+_AXES = "xyz"
+
+
+def recorded_tip(
+    recording: Recording, dimension: int, hint: str = ""
+) -> tuple[Floats, Floats, float]:
+    """Times t (nt,) s, places x (nt, d) m, NaN where not seen, and their sd m.
+
+    Raises `RecordingError` without such a path, or for one of another dimension, with the `hint`.
+    """
+    if "tip" in recording.markers:
+        marker = recording.marker("tip")
+        x = marker.x[:, 0]
+        _require_dimension(recording, x.shape[1], dimension, hint)
+        return marker.t, np.array(x), marker.sd
+    names = [f"tip.{a}" for a in _AXES]
+    there = sum(name in recording.signals for name in names)
+    parts = [recording.signal(name, "m") for name in names[: max(there, dimension)] if there]
+    if not parts:
+        raise RecordingError(
+            f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
+            f"{sorted(recording.streams)}"
+        )
+    _require_dimension(recording, len(parts), dimension, hint)
+    if any(not np.array_equal(s.t, parts[0].t) for s in parts):
+        raise RecordingError(
+            f"{recording.name}: tip.x .. tip.{_AXES[dimension - 1]} have "
+            f"{[len(s.t) for s in parts]} samples at different times; record them together"
+        )
+    return parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts)
+
+
+def _require_dimension(recording: Recording, found: int, wanted: int, hint: str) -> None:
+    if found != wanted:
+        words = f"{recording.name}: the tip has {found} coordinates, the body has {wanted}"
+        raise RecordingError(f"{words}; {hint}" if hint else words)
+
+
+# -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RecordedPath:
+    """t (nt,) s, places x (nt, d) m."""
+
+    kind: ClassVar[str] = "path"
+
+    t: Floats
+    x: Floats
+
+    @property
+    def rate(self) -> float:
+        """Samples a second, by the median step."""
+        return float(1 / np.median(np.diff(self.t)))
+
+    @property
+    def findings(self) -> Mapping[str, int]:
+        return {}
+
+    def due(self, k: int) -> float | None:
+        """When tick k is due, s after the start; None after the last."""
+        return float(self.t[k] - self.t[0]) if k < len(self.t) else None
+
+    def after(self, k: int, now: float) -> int:
+        """Return the next one: no sample of a recorded path is left out."""
+        return k + 1
+
+    def place(self, k: int, now: float) -> Floats | None:
+        return np.asarray(self.x[k])
+
+    def give(self, force: Floats, flags: int) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,14 @@
 """Experiment of a block with a fluid-filled inclusion between plates (outlines, markers, stage).
 
 Frame: x from the fixed plate (0) to the moving one, y up, z lateral; metres.
+
+The mesh follows from the recording. Stream "sweep" holds outlines (or images to outline) of the
+phantom at rest, with the pose of its image plane at position 0; signal "sweep_position" says how
+far the plane then lay along its normal, m (paper 000, section 4.4).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,30 +16,203 @@ import numpy as np
 
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
-from validate.errors import ComparisonError
-from validate.parameters import Ranges, quantity, with_given
+from validate.errors import ComparisonError, RegistrationError, UsageError
+from validate.parameters import Ranges, known, quantity, take_units, with_given
 from validate.pipeline.experiment.experiment import Experiment, Input, Uncertainty, vary
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree, beside, changed_by
-from validate.pipeline.plates.inclusion_body import (
-    WITHIN,
-    inclusion,
-    measured_inclusion,
-    shifted,
-    sweep_stack,
-)
-from validate.pipeline.plates.inclusion_sweep import off_circles, outlined_sweep
-from validate.recording.types import Recording
+from validate.recording.types import Contours, Recording, Signal
 from validate.register.clocks import clock_sd
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import Sampling, Together, placed_markers
+from validate.register.observation import nearest_sample
 from validate.register.outlines.outlines import Corner, observe_outlines
 from validate.register.outlines.plane import cavity_sampler
+from validate.register.outlines.round_outlines import outlined_capsule
+from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.register.registration import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
-from validate.scene.geometries.inclusion import InclusionShape
+from validate.scene.geometries.box import member
+from validate.scene.geometries.inclusion import (
+    Block,
+    Capsule,
+    InclusionShape,
+    SlicedShape,
+    block_with_inclusion,
+)
+from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Contact as Contact
 from validate.scene.scene import Scene
+
+SWEEP, POSITION = "sweep", "sweep_position"
+_STILL = 0.1e-3  # m the stage may stand off its rest while the sweep is taken
+_BEHIND = 0.02  # of the outermost gap: how near the outermost slice an end may be moved
+
+
+def outlined_sweep(recording: Recording) -> Recording:
+    """Return the recording with images of a sweep replaced by the outlines found in them."""
+    if SWEEP not in recording.frames:
+        return recording
+    frames = {k: f for k, f in recording.frames.items() if k != SWEEP}
+    outlines = sweep_outlines(recording.frame(SWEEP))
+    return replace(recording, frames=frames, contours={**recording.contours, SWEEP: outlines})
+
+
+def stack_of(recording: Recording, sweep: Contours, stage: Signal) -> Stack:
+    """Return the stack of the `sweep`, taken while the stage was at rest.
+
+    Raises `RegistrationError` for a stage that had moved, and what `stacked` raises.
+    """
+    during = (sweep.t >= stage.t[0]) & (sweep.t <= stage.t[-1])
+    moved = np.abs(np.interp(sweep.t[during], stage.t, stage.y[:, 0]) - stage.y[0, 0])
+    if moved.size and moved.max() > _STILL:
+        raise RegistrationError(
+            f"the stage stood {1e3 * moved.max():.2f} mm away from rest during the sweep; "
+            "record the sweep with the stage at rest"
+        )
+    position = recording.signal(POSITION, "m")
+    return stacked(sweep, position.t, position.y[:, 0])
+
+
+def swept(stack: Stack, free: float = 0.0, wider: float = 0.0, longer: float = 0.0) -> SlicedShape:
+    """Return the surface of `free` sections, radii and length changed by m; ends stay behind
+    slices."""
+    at, ends = stack.positions, stack.ends + longer / 2 * np.array([-1.0, 1.0])
+    least = _BEHIND * float(np.diff(at).min())
+    ends = np.array([min(ends[0], at[0] - least), max(ends[1], at[-1] + least)])
+    return surface_of(replace(stack, radii=stack.radii + wider, ends=ends), free)
+
+
+def off_circles(stack: Stack) -> str:
+    """Return the distance of the outlines from their circles, in a sentence."""
+    worst = int(stack.off_round.argmax())
+    every = float(np.sqrt((stack.off_round**2).mean()))
+    return (
+        f"The inclusion is meshed from {len(stack.positions)} slices of a sweep: their outlines "
+        f"lie {1e3 * every:.3f} mm rms off circles, at most {1e3 * stack.off_round[worst]:.3f} mm "
+        f"({1e3 * stack.positions[worst]:+.1f} mm along it), with noise of {1e3 * stack.sd:.3f} mm."
+    )
+
+
+WITHIN = 0.1e-3  # m: the stage stood at a load
+
+
+@dataclass(frozen=True)
+class MeshedInclusion:
+    """None: centre x, z and radius from the rest outline, the rest from the declared sweep."""
+
+    shape: Literal["capsule", "sweep"] = quantity(
+        "capsule", "1", "capsule through the rest outline, or meshed from the outlines of a sweep"
+    )
+    free: float = quantity(
+        0.0, "1", "sections of a sweep: circles of equal area (0) to the outlines themselves (1)"
+    )
+    centre_x: float | None = quantity(None, "m", "centre along the stage; none: from the outline")
+    centre_y: float | None = quantity(None, "m", "height of the centre; none: from the sweep")
+    centre_z: float | None = quantity(None, "m", "lateral centre; none: from the outline")
+    radius: float | None = quantity(None, "m", "radius; none: from the outline")
+    length: float | None = quantity(None, "m", "length along y; none: from the sweep")
+    wider: float = quantity(0.0, "m", "added to the radius that is meshed")
+    longer: float = quantity(0.0, "m", "added to the length that is meshed")
+
+    def __post_init__(self) -> None:
+        take_units(self)
+        own = ("centre_x", "centre_y", "centre_z", "radius", "length")
+        given = [name for name in own if getattr(self, name) is not None]
+        if self.shape == "sweep" and given:
+            raise UsageError(
+                f"body.inclusion.{given[0]} applies to a capsule; a sweep contains the place "
+                "of its inclusion: set body.inclusion.wider or body.inclusion.longer"
+            )
+
+
+@dataclass(frozen=True)
+class BlockWithInclusion:
+    """A block from the origin with an inclusion that the recording shows; sets x0 to z1, cavity.
+
+    Sizes may stay open (None) until they are measured.
+    """
+
+    x: float | None = quantity(None, "m", "distance from the fixed to the moving plate", asked=True)
+    y: float | None = quantity(None, "m", "height", asked=True)
+    z: float | None = quantity(None, "m", "lateral size", asked=True)
+    cells: tuple[int, ...] = quantity(
+        (8, 9, 14), "1", "cells along x, y, z (8 x 9 x 14 has the 1328 nodes of paper 000)"
+    )
+    element: Literal["linear", "quadratic"] = quantity("linear", "1", "element order")
+    inclusion: MeshedInclusion = MeshedInclusion()
+
+    def __post_init__(self) -> None:
+        take_units(self)
+        if len(self.cells) != 3:
+            raise UsageError(f"body.cells = {self.cells}: expected three numbers of cells")
+
+    @property
+    def block(self) -> Block:
+        """Raises `UsageError` while a size is open."""
+        return Block(known(self.x, "body.x"), known(self.y, "body.y"), known(self.z, "body.z"))
+
+    @property
+    def cell_size(self) -> float:
+        """The edge m of a cube as large as a mean cell of the block without its inclusion."""
+        return float(np.cbrt(self.block.sizes.prod() / np.prod(self.cells)))
+
+    def scaled(self, share: float) -> "BlockWithInclusion":
+        return replace(self, cells=member(self.cells, share))
+
+    def __call__(self, recording: Recording, tree: Tree) -> Mesh:
+        x, y, z = self.cells
+        grid = (x + 1, y + 1, z + 1)
+        mesh = block_with_inclusion(self.block, grid, inclusion(recording, tree))
+        return quadratic(mesh) if self.element == "quadratic" else mesh
+
+
+def inclusion(recording: Recording, tree: Tree) -> InclusionShape:
+    """Return the inclusion that is meshed: what the user set, else what was measured."""
+    mine: MeshedInclusion = tree.scene.body.inclusion
+    if mine.shape == "sweep":
+        return swept(sweep_stack(recording, tree), mine.free, mine.wider, mine.longer)
+    measured = _outlined(recording, tree)
+    own = (mine.centre_x, mine.centre_y, mine.centre_z)
+    x, y, z = (m if o is None else o for o, m in zip(own, measured.centre, strict=True))
+    return Capsule(
+        (x, y, z),
+        (measured.radius if mine.radius is None else mine.radius) + mine.wider,
+        (measured.length if mine.length is None else mine.length) + mine.longer,
+    )
+
+
+def measured_inclusion(recording: Recording, tree: Tree) -> InclusionShape:
+    """Return the inclusion as measured: by the rest outline and the declared sweep, or by the
+    sweep."""
+    capsule = _outlined(recording, tree)  # which refuses a mirrored image
+    if tree.scene.body.inclusion.shape == "capsule":
+        return capsule
+    return swept(sweep_stack(recording, tree), tree.scene.body.inclusion.free)
+
+
+def sweep_stack(recording: Recording, tree: Tree) -> Stack:
+    """Return the slices of the recorded sweep, as the image is placed."""
+    sweep = shifted(recording.contour(SWEEP), tree)
+    return stack_of(recording, sweep, recording.signal(tree.settings.streams.stage, "m"))
+
+
+def shifted(contours: Contours, tree: Tree) -> Contours:
+    """Outlines with the correction of their image's pose."""
+    pose, how = contours.pose.copy(), tree.settings.registration
+    pose[[0, 2], 3] += how.image_shift_x, how.image_shift_z
+    return replace(contours, pose=pose)
+
+
+def _outlined(recording: Recording, tree: Tree) -> Capsule:
+    """Centre x, z and radius of the rest outline; height and length from record 'inclusion'."""
+    streams, how = tree.settings.streams, tree.settings.registration
+    contours = shifted(recording.contour(streams.outline), tree)
+    rest = holds_at(driving(recording, streams.stage, "m"), contours.t, (), within=WITHIN)[0]
+    index = nearest_sample(contours.t, instant(rest), "outlines")
+    moved = abs(how.image_shift_x) + abs(how.image_shift_z)
+    return outlined_capsule(contours, index, recording.record("inclusion"), moved)
+
 
 # --- How much plates rub: a share between slipping and bonded.
 
@@ -220,18 +397,15 @@ def placed(
     )  # fmt: skip
     swept = tree.scene.body.inclusion.shape == "sweep"
     said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
-    said = (*said, *_misplaced(measured, inclusion(recording, tree)))
-    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
-
-
-def _misplaced(measured: InclusionShape, meshed: InclusionShape) -> tuple[str, ...]:
-    """A word where the meshed inclusion is not where the rest outline lies."""
+    # A word where the meshed inclusion is not where the rest outline lies
+    meshed = inclusion(recording, tree)
     off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
     wide = meshed.radius - measured.radius
-    if off < 0.5e-3 and abs(wide) < 0.5e-3:
-        return ()
-    return (
-        f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
-        f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
-        "show this.",
-    )
+    if off >= 0.5e-3 or abs(wide) >= 0.5e-3:
+        said = (
+            *said,
+            f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
+            f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
+            "show this.",
+        )
+    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.readers import read_recording
@@ -90,7 +89,11 @@ def doubt(
     u, F = recording.signal(displacement, "m"), recording.signal(p.settings.seen.force, "N")
     size = np.abs(np.interp(u.t, F.t, F.y[:, 0] - F.y[0, 0]))
     top, way = float(size.max()), np.abs(u.y[:, 0] - u.y[0, 0])
-    slope = _slope(way, size)
+    # Stiffness N/m of specimen and machine together near the largest force
+    upper = size >= _UPPER * size.max()
+    if upper.sum() < _FEWEST or np.ptp(way[upper]) == 0:
+        return ""
+    slope = float(np.polyfit(way[upper], size[upper], 1)[0])
     if slope <= 0:
         return ""
     shifts = [C * top * slope for C in USUAL]
@@ -105,11 +108,3 @@ def doubt(
         f"force by {shown} % ({shifts[1]:.2g} N{against}). Press a rigid block and set "
         "machine.measured=FILE, or machine.compliance and machine.sd"
     )
-
-
-def _slope(way: Floats, size: Floats) -> float:
-    """Stiffness N/m of specimen and machine together near the largest force."""
-    upper = size >= _UPPER * size.max()
-    if upper.sum() < _FEWEST or np.ptp(way[upper]) == 0:
-        return 0.0
-    return float(np.polyfit(way[upper], size[upper], 1)[0])

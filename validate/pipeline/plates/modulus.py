@@ -312,12 +312,6 @@ class _Budget:
         name = "material.E" if first else f"material.E of {f.name}"
         on = f"force of {f.recording.name} from {100 * p.fit_from:.3g} to {100 * p.fit_to:.3g} %"
         parts = {k: u for k, u in self.parts.items() if u > 0}
-        return IdentifiedValue(
-            name, f.E, "Pa", f.name, f"{on} of strain", parts, len(f.fit.residual),
-            f.fit.freedom, COMMON, self._finding(),
-        )  # fmt: skip
-
-    def _finding(self) -> str:
         f = self.f
         d, F = f.log.d, f.log.force
         kept = d >= f.p.fit_from * f.size.height
@@ -328,7 +322,10 @@ class _Budget:
         beyond = d[kept] > f.p.fit_to * f.size.height
         off = misfit(residual[beyond], f.fit.noise, self._u_predicted(), f.fit.dependence)
         shape = pattern(at, residual, followed, f.log.noise, f.fit.dependence)
-        return finding(f.law, shape, off)
+        return IdentifiedValue(
+            name, f.E, "Pa", f.name, f"{on} of strain", parts, len(f.fit.residual),
+            f.fit.freedom, COMMON, finding(f.law, shape, off),
+        )  # fmt: skip
 
     def _u_predicted(self) -> float:
         """Standard uncertainty of the force beyond the window, N rms, from identification."""

@@ -47,13 +47,21 @@ def solve(
     built, scene = perf_counter() - start, scenes[0]
     seen = _registered(experiment, recordings, scenes, parameters, off)
     runs = _Runs(experiment, name, method, parameters, scene, built, tell)
-    done = tuple(
-        _refused(refused) if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True)
-    )
+    none = np.zeros(0)
+    not_run = Run("", none, none.astype(np.int64), np.zeros((0, 0, 3)),
+                  {"updates": Trace(none, "1")}, Outcome("refused", 0, refused),
+                  0.0, None)  # fmt: skip
+    done = tuple(not_run if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True))
     found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
     peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # bytes, of this process
     done = tuple(replace(run, memory=run.memory or peak) for run in done)
-    return MethodRun(name, _label(method, scene), case, scene, seen, done, stacked(found))
+    # What the method was run as, where parameters changed that
+    own = scene.mesh.order
+    order = getattr(method.scene, "order", own)
+    label = method.label if order == own else f"{method.label} [order {own}]"
+    if getattr(method.settings, "smooth", False):
+        label = f"{label} [smoothed: uses future samples]"
+    return MethodRun(name, label, case, scene, seen, done, stacked(found))
 
 
 def placed(
@@ -79,13 +87,6 @@ def _registered(
     pairs = zip(recordings, scenes, strict=True)
     seen = tuple(experiment.place(r, parameters, s) for r, s in pairs)
     return tuple(one.shifted(off) for one in seen) if off else seen
-
-
-def _refused(why: str) -> Run:
-    none = np.zeros(0)
-    traces = {"updates": Trace(none, "1")}
-    at, u = none.astype(np.int64), np.zeros((0, 0, 3))
-    return Run("", none, at, u, traces, Outcome("refused", 0, why), 0.0, None)
 
 
 def _scenes(
@@ -198,12 +199,3 @@ def between(
         for start, y in zip(starts, (t, *inputs.T), strict=True)
     ]
     return finer[0], np.stack(finer[1:], axis=1)
-
-
-def _label(method: Method, scene: AnyScene) -> str:
-    """The method's label, and what it was run as where parameters changed that."""
-    own = scene.mesh.order
-    order = getattr(method.scene, "order", own)
-    label = method.label if order == own else f"{method.label} [order {own}]"
-    smooth = getattr(method.settings, "smooth", False)
-    return f"{label} [smoothed: uses future samples]" if smooth else label

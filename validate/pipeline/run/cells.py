@@ -21,9 +21,14 @@ from validate.engine.worker_cache import fingerprint
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.experiment.experiment import Experiment, ReportAdditions
-from validate.pipeline.experiment.external import with_simulators
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.experiment.options import Options, configure, folder_of, mesh_files
+from validate.pipeline.experiment.options import (
+    Options,
+    configure,
+    folder_of,
+    mesh_files,
+    with_simulators,
+)
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Meshes
 from validate.pipeline.run.job import Job, job_on
@@ -198,13 +203,11 @@ class InStore:
         found: CellFound = record.value
         return found
 
-    def _there(self, cell: RunCell) -> bool:
-        record = self._records.get(cell.key)
-        return record is not None and (record.value is None or _enough(cell, record.value))
-
     def _finish(self, runs: ExperimentRuns, asked: Sequence[RunCell]) -> None:
         """Of these, what this run has not asked for before."""
-        cells = [cell for cell in asked if not self._there(cell)]
+        records = ((cell, self._records.get(cell.key)) for cell in asked)
+        cells = [cell for cell, r in records
+                 if r is None or not (r.value is None or _enough(cell, r.value))]  # fmt: skip
         if not cells:
             return
         wanted = {cell.key: w for (w, truth, _), cell in self._cells.items() if not truth}
@@ -234,30 +237,28 @@ class InStore:
                 wanted.case, wanted.method, wanted.split, wanted.off,
                 encoded(_compared_left_out(wanted.parameters), _AT), truth,
             )  # fmt: skip
+            # What the numbers of a run rest on besides what its cell says. A recording that is no
+            # file is known by its content.
+            recordings, true = runs.of_case(wanted.case)
+            hashes = [r.source.sha256 or fingerprint(r) for r in recordings]
+            method = replace(runs.method(wanted), label="")
+            if truth:  # seen in the scene of a method, whatever solves it
+                method = Method(scene=method.scene)
+            read = mesh_files(wanted.parameters, folder_of(self._experiment))
+            external = isinstance(method.settings, ExternalSimulator)
+            key = key_of(
+                cell, dict(self._job(runs).identity()),
+                encoded(method, f"methods.{wanted.method}"), hashes,
+                encoded(_compared_left_out(true), _AT) if truth else "",
+                [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
+                self._external(method.settings.command) if external else "",
+            )  # fmt: skip
             self._cells[at] = replace(
-                cell, key=key_of(cell, *self._rests_on(runs, wanted, truth)),
-                label="truth of the twin" if truth else what, whole=wanted.whole,
+                cell, key=key, label="truth of the twin" if truth else what, whole=wanted.whole,
                 other_mesh=_body(wanted.parameters) != _body(runs.parameters),
                 timed=wanted.whole and not truth,
             )  # fmt: skip
         return self._cells[at]
-
-    def _rests_on(self, runs: ExperimentRuns, wanted: RunWanted, truth: bool) -> tuple[Any, ...]:
-        """What the numbers of a run rest on besides what its cell says. A recording that is no
-        file is known by its content."""
-        recordings, true = runs.of_case(wanted.case)
-        hashes = [r.source.sha256 or fingerprint(r) for r in recordings]
-        method = replace(runs.method(wanted), label="")
-        if truth:  # seen in the scene of a method, whatever solves it
-            method = Method(scene=method.scene)
-        read = mesh_files(wanted.parameters, folder_of(self._experiment))
-        return (
-            dict(self._job(runs).identity()), encoded(method, f"methods.{wanted.method}"),
-            hashes, encoded(_compared_left_out(true), _AT) if truth else "",
-            [hashlib.sha256(f.read_bytes()).hexdigest() for f in read],
-            self._external(method.settings.command)
-            if isinstance(method.settings, ExternalSimulator) else "",
-        )  # fmt: skip
 
     def _external(self, command: str) -> str:
         """An external simulator as it is now; one of which that cannot be said, by this run."""

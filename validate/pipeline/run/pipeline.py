@@ -47,7 +47,7 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options, all_methods, chosen_cases, configure
 from validate.pipeline.experiment.origins import Opened, marked, opened
-from validate.pipeline.run.memory import coarser, require_room
+from validate.pipeline.run.estimate import coarser, require_room
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.pipeline.run.runs import ExperimentRuns, Solves
 from validate.register.markers.markers import MarkerObservation
@@ -167,7 +167,9 @@ def _compared(
     runs.ahead(variants)
     main = {name: runs.main(name) for name in methods}
     others = {case.name: runs.other(case) for case in runs.cases}
-    told = _told(runs, {MAIN: main, **others})
+    told = ReportAdditions()
+    if experiment.exhibits is not None and not runs.quick and runs.whole:
+        told = runs.told({MAIN: main, **others})
     results = tuple(_method(runs, main[name], others) for name in methods)
     effects = effects_of(runs, results)
     because, causes = explained_by(
@@ -260,14 +262,6 @@ def _following(experiment: Experiment, found: Opened, differing: tuple[Changed, 
 
 def _settings(parameters: Any, methods: Mapping[str, Method]) -> tuple[Parameter, ...]:
     return describe(parameters) + describe(methods, "methods.")
-
-
-def _told(runs: ExperimentRuns, cases: Cases) -> ReportAdditions:
-    """What the experiment adds; only when all of it was run."""
-    experiment = runs.experiment
-    if experiment.exhibits is None or runs.quick or not runs.whole:
-        return ReportAdditions()
-    return runs.told(cases)
 
 
 def _method(runs: ExperimentRuns, mine: MethodRun, others: Cases) -> MethodResult:

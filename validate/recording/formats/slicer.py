@@ -1,6 +1,6 @@
 """Reader of 3D Slicer landmarks: FCSV and markups JSON (.mrk.json), in mm."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,8 @@ def read_markups(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path.name}: not markups JSON ({error}); damaged") from None
     lists = found
     systems = {str(m.get("coordinateSystem", "LPS")) for m in lists}
-    units = {unit for m in lists for unit in _units(m)}
+    stated = [m.get("coordinateUnits", "mm") for m in lists]  # of a list, or of each axis
+    units = {str(u) for of in stated for u in (of if isinstance(of, list) and of else [of])}
     if len(systems) > 1 or len(units) > 1:
         raise RecordingError(
             f"{path.name}: lists in {sorted(systems)} and {sorted(units)}; save them in separate "
@@ -112,12 +113,6 @@ def read_markups(path: Path, options: Options) -> Recording:
     system = _SYSTEMS.get(next(iter(systems)), next(iter(systems)))
     given = {"unit": unit, **options}
     return _landmarks(path, points, system, "landmarks (markups JSON)", given)
-
-
-def _units(markups: Mapping[str, Any]) -> list[str]:
-    """The unit of a list, which may state one for each axis."""
-    stated = markups.get("coordinateUnits", "mm")
-    return [str(unit) for unit in stated] if isinstance(stated, list) and stated else [str(stated)]
 
 
 def _control(path: Path, point: Any) -> _Point:

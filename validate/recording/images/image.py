@@ -261,12 +261,8 @@ def shallow(deep: Sequence[NDArray[Any]], options: Options) -> tuple[tuple[Pixel
     bits = "floating point" if any(image.dtype.kind == "f" for image in deep) else "16 bits"
     said = "entered" if "white" in options else "the largest"
     told = f"{bits} converted to 8: 0 to {white:g} ({said}) became 0 to 255"
-    return tuple(_scaled(image, white) for image in deep), told
-
-
-def _scaled(image: NDArray[Any], white: float) -> Pixels:
-    levels = np.clip(np.nan_to_num(image) * (255 / white), 0, 255)
-    return np.asarray(np.rint(levels), dtype=np.uint8)
+    levels = (np.clip(np.nan_to_num(image) * (255 / white), 0, 255) for image in deep)
+    return tuple(np.asarray(np.rint(level), dtype=np.uint8) for level in levels), told
 
 
 def coverage(outline: Floats, shape: tuple[int, int], lines: int = 4) -> Floats:

@@ -108,7 +108,10 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     rate = above_zero(options, "rate")
     pixels: list[Pixels] = []
     for file in numbered(folder):
-        pixels.append(_read(file))
+        try:
+            pixels.append(decode_png(read_bytes(file, MAX_FILE)))
+        except RecordingError as error:
+            raise RecordingError(f"{file.name}: {error}; --as image-stack reads others") from None
         if sum(image.size for image in pixels) > MAX_STACK:
             raise RecordingError(f"{folder.name}: more than {MAX_STACK} bytes; split the stack")
     images, lens = straightened(tuple(pixels), options)

@@ -286,16 +286,11 @@ def _foxglove_cloud(m: Plain) -> Sequence[MessagePart]:
     offsets = {f["name"]: (f["offset"], f["type"]) for f in m["fields"]}
     data, stride = binary(m["data"]), int(m["point_stride"])
     x = _packed(data, offsets, stride, "<", len(data) // max(stride, 1))
-    return _points(*_own(m), _placed(x, m.get("pose")))
-
-
-def _placed(x: Floats, pose: Any) -> Floats:
-    """Points of a cloud in its frame: its own origin lies there by `pose`; none is no motion."""
-    if not pose:
-        return x
-    q = np.array([[*_xyz(pose["orientation"]), float(pose["orientation"]["w"])]])
-    turned = x @ rotations(q, "pose")[0].T if q.any() else x  # Protobuf's zeros: not said
-    return np.asarray(turned + np.array(_xyz(pose["position"])))
+    if pose := m.get("pose"):  # the cloud's own origin in its frame; none is no motion
+        q = np.array([[*_xyz(pose["orientation"]), float(pose["orientation"]["w"])]])
+        turned = x @ rotations(q, "pose")[0].T if q.any() else x  # Protobuf's zeros: not said
+        x = np.asarray(turned + np.array(_xyz(pose["position"])))
+    return _points(*_own(m), x)
 
 
 def _packed(data: bytes, offsets: Mapping[str, Any], stride: int, order: str, count: int) -> Floats:

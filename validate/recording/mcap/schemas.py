@@ -122,17 +122,13 @@ def stamp(ns: int) -> Json:
     return {"sec": ns // 10**9, "nsec": ns % 10**9}
 
 
-def _nullable(column: Floats) -> list[float | None]:
-    return [None if v != v else v for v in column.tolist()]
-
-
 def _ours(ns: int, frame: str) -> Json:
     return {"stamp": stamp(ns), "frame": frame}
 
 
 def markers_message(ns: int, frame: str, names: Sequence[str], x: Floats, sd: float) -> Json:
     """Return the message of one instant; x (k, 2 or 3) m, NaN becomes null."""
-    axes = [_nullable(x[:, axis]) for axis in range(x.shape[1])]
+    axes = [[None if v != v else v for v in column] for column in x.T.tolist()]
     places = dict(zip("xyz", [*axes, None], strict=False))
     return {**_ours(ns, frame), "names": list(names), **places, "sd": sd}
 

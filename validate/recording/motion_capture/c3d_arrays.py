@@ -113,19 +113,15 @@ def turned(path: Path, copy: Path) -> Path:
     begin = BLOCK * (max(raw[0], 2) - 1)
     wide = lies.each // max(4 * lies.points + lies.analog, 1) or 2
     spans = [*_HEADER, *_parameters(bytes(raw[: lies.at(0)]), begin), (lies.at(0), len(raw), wide)]
-    for span in spans:
-        _turn(raw, *span)
+    # Each number between two places is turned round; what is left over stays.
+    for first, last, width in spans:
+        end = first + (min(last, len(raw)) - first) // width * width
+        part = raw[first:end]
+        for i in range(width):
+            raw[first + i : end : width] = part[width - 1 - i :: width]
     raw[begin + 3] = INTEL
     copy.write_bytes(raw)
     return copy
-
-
-def _turn(raw: bytearray, begin: int, end: int, wide: int) -> None:
-    """Each number between two places turned round; what is left over stays."""
-    end = begin + (min(end, len(raw)) - begin) // wide * wide
-    part = raw[begin:end]
-    for i in range(wide):
-        raw[begin + i : end : wide] = part[wide - 1 - i :: wide]
 
 
 def _parameters(raw: bytes, begin: int) -> Iterator[_Span]:

@@ -77,7 +77,12 @@ class Link:
 
     def at(self, t: Floats) -> tuple[Ints, Floats]:
         """Indices of the poses nearest to t (m,) s, and whether they are near: one alone is."""
-        index = _nearest(self.t, t)
+        after = np.clip(np.searchsorted(self.t, t), 1, max(len(self.t) - 1, 1))
+        after = np.minimum(after, len(self.t) - 1)
+        before = np.maximum(after - 1, 0)
+        index = np.asarray(
+            np.where(np.abs(self.t[before] - t) <= np.abs(self.t[after] - t), before, after)
+        )
         return index, np.asarray((np.abs(self.t[index] - t) < _NEAR) | (len(self.t) == 1))
 
 
@@ -171,11 +176,3 @@ def _differing(direct: Link, way: Sequence[Link]) -> Iterator[str]:
 
 def _turned(R: Floats, x: Floats) -> Floats:
     return np.asarray((R @ x[..., None])[..., 0])
-
-
-def _nearest(times: Floats, t: Floats) -> Ints:
-    after = np.clip(np.searchsorted(times, t), 1, max(len(times) - 1, 1))
-    after = np.minimum(after, len(times) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.asarray(np.where(np.abs(times[before] - t) <= np.abs(times[after] - t),
-                               before, after))  # fmt: skip

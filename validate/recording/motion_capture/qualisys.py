@@ -57,7 +57,9 @@ def read_qualisys_analog(path: Path, options: Options) -> Recording:
     above = held.rows[:first]
     header = {r.cell(0): r.cell(1) for r in above}
     rate = as_number(header.get("FREQUENCY", "")) or 0.0
-    columns = _analog_columns(above)
+    # Names after their key, else the last line above the samples
+    named = [r.cells[1:] for r in above if r.cell(0) == _ANALOG_NAMES]
+    columns = [c for cells in (named or [r.cells for r in above[-1:]])[:1] for c in cells if c]
     if not columns or not 0 < rate < np.inf:
         raise RecordingError(f"{path.name}: names of channels: {columns}, FREQUENCY: {rate:g} Hz")
     body = [r for r in held.rows[first:] if any(r.cells)]
@@ -80,14 +82,6 @@ def read_qualisys_analog(path: Path, options: Options) -> Recording:
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, streams, told, never)
-
-
-def _analog_columns(above: tuple[TextRow, ...]) -> list[str]:
-    """Names after their key, else the last line above the samples."""
-    for row in above:
-        if row.cell(0) == _ANALOG_NAMES:
-            return [c for c in row.cells[1:] if c]
-    return [c for c in above[-1].cells if c] if above else []
 
 
 QUALISYS_ANALOG = Reader(

@@ -293,20 +293,16 @@ def _starts(
         return [(c.centre, c.radius if radius is None else radius) for c in found]
     place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
     if np.isnan(grey.at(place[None])).any():
+        height, width = 1e3 * np.array(grey.image.shape) * grey.m_per_px[::-1]
         raise RecordingError(
             f"rough centre ({1e3 * place[0]:.2f}, {1e3 * place[1]:.2f}) mm lies outside the image "
-            f"of {_size(grey)}; it is measured from the first pixel"
+            f"of {width:.1f} x {height:.1f} mm; it is measured from the first pixel"
         )
     if radius is not None:
         return [(place, radius)]
     sides = np.array(grey.image.shape[::-1]) * np.array(grey.m_per_px)
     largest = _ROUGH_RADIUS * float(sides.min())
     return [(place, largest * factor) for factor in (0.25, 0.5, 1.0, 1.5)]
-
-
-def _size(grey: Grey) -> str:
-    height, width = grey.image.shape
-    return f"{1e3 * width * grey.m_per_px[0]:.1f} x {1e3 * height * grey.m_per_px[1]:.1f} mm"
 
 
 def _walls(

@@ -102,7 +102,11 @@ def _said(key: str, text: str, table: Table) -> Said:
     column, colon, unit = body.rpartition(":")
     if colon and _named(column, table):
         return Said(column, unit, sign)
-    raise UsageError(f"--map {key}={text}: no column '{column or body}'; {_nearest(body, table)}")
+    labels = [c.label for c in table.columns]
+    raise UsageError(
+        f"--map {key}={text}: no column '{column or body}'; {did_you_mean(body, labels)}the file "
+        f"has {', '.join(map(repr, labels))}"
+    )
 
 
 def _named(text: str, table: Table) -> list[Column]:
@@ -113,11 +117,6 @@ def _named(text: str, table: Table) -> list[Column]:
     wanted = text.strip().casefold()
     labels = [c for c in table.columns if c.label.casefold() == wanted]
     return labels or [c for c in table.columns if c.name and c.name.casefold() == wanted]
-
-
-def _nearest(text: str, table: Table) -> str:
-    labels = [c.label for c in table.columns]
-    return f"{did_you_mean(text, labels)}the file has {', '.join(map(repr, labels))}"
 
 
 def columns_called(role: str, table: Table) -> list[Column]:

@@ -167,14 +167,14 @@ def specimens_in_book(path: Path, options: Options) -> dict[str, Options]:
 def _sheets(path: Path, options: Options, old: bool) -> list[_Sheet]:
     found = decoded("validate.recording.tables.workbook", path, {"old": float(old)})
     texts = {str(name): found[str(i)].tobytes() for i, name in enumerate(found["names"])}
-    return [_sheet(name, text, options.get("decimal")) for name, text in texts.items()]
-
-
-def _sheet(name: str, text: bytes, decimal: str | None) -> _Sheet:
-    try:
-        return _Sheet(name, specimen_tables(parse_tables(text, "utf-8", decimal or ".")))
-    except RecordingError as error:
-        return _Sheet(name, {}, str(error))
+    sheets = []
+    for name, text in texts.items():
+        try:
+            tables = specimen_tables(parse_tables(text, "utf-8", options.get("decimal") or "."))
+            sheets.append(_Sheet(name, tables))
+        except RecordingError as error:
+            sheets.append(_Sheet(name, {}, str(error)))
+    return sheets
 
 
 def _chosen(sheets: list[_Sheet], said: str | None) -> _Sheet:

@@ -60,7 +60,9 @@ def local_fit(
     A = np.stack(terms, axis=-1)
     y, w = values[index], np.ones(distance.shape)
     for _ in range(3 if robust else 1):
-        normal, c = _solved(A, y, w)
+        weighted = (A * w[..., None]).swapaxes(1, 2)
+        normal = weighted @ A + _EVEN * np.eye(A.shape[-1])
+        c = np.asarray(np.linalg.solve(normal, weighted @ y))
         off = np.abs(A @ c - y)
         scale = np.maximum(np.median(off, axis=1, keepdims=True), 1e-300)
         w = 1 / (1 + ((off / (_FAR * scale)) ** 2).sum(axis=-1)) ** 2
@@ -68,12 +70,6 @@ def local_fit(
     lever = np.asarray(np.linalg.inv(normal)[:, 0, 0], dtype=np.float64)
     slopes = c[:, 1 : d + 1].swapaxes(1, 2) / reach[..., None]
     return LocalFit(c[:, 0], slopes, 1.4826 * np.median(off, axis=1), lever)
-
-
-def _solved(A: Floats, y: Floats, w: Floats) -> tuple[Floats, Floats]:
-    weighted = (A * w[..., None]).swapaxes(1, 2)
-    normal = weighted @ A + _EVEN * np.eye(A.shape[-1])
-    return normal, np.asarray(np.linalg.solve(normal, weighted @ y))
 
 
 def noise(points: Floats, values: Floats, neighbours: int = 20) -> tuple[Floats, Floats]:

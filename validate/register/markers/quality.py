@@ -151,8 +151,14 @@ def register_points(
     mirror = measures.reflection(x, y, plain, _across(x.shape[1], up))
     bound = noise * np.sqrt(measures.chi_square_bound(_freedom(y, method)) / len(y))
     if mirror.proper > bound:
-        _refuse_mirrored(mirror, bound)
-        _refuse_relabelled(kept, x, y, plain, noise)
+        if measures.looks_mirrored(mirror, bound):
+            raise RegistrationError(
+                f"markers seem mirrored: residual {1e3 * mirror.proper:.3g} mm by a rotation, "
+                f"{1e3 * mirror.improper:.3g} mm by a reflection; check axis signs and handedness"
+            )
+        fault = label_fault(kept, x, y, plain, noise)
+        if fault is not None:
+            raise RegistrationError(fault)
     outliers = measures.find_outliers(kept, x, y, noise, _scaled(method))
     regular = ~np.isin(kept, [o.name for o in outliers])
     if outliers and not robust:
@@ -273,20 +279,6 @@ def _across(d: int, up: Up | None) -> Floats:
     direction = np.asarray(up[0], dtype=np.float64)
     across: Floats = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
     return across
-
-
-def _refuse_mirrored(found: Reflection, bound: float) -> None:
-    if measures.looks_mirrored(found, bound):
-        raise RegistrationError(
-            f"markers seem mirrored: residual {1e3 * found.proper:.3g} mm by a rotation, "
-            f"{1e3 * found.improper:.3g} mm by a reflection; check axis signs and handedness"
-        )
-
-
-def _refuse_relabelled(names: Sequence[str], x: Floats, y: Floats, fit: Fit, noise: float) -> None:
-    fault = label_fault(names, x, y, fit, noise)
-    if fault is not None:
-        raise RegistrationError(fault)
 
 
 def _left_out(k: int, missing: tuple[str, ...], excluded: tuple[str, ...]) -> list[str]:

@@ -115,8 +115,11 @@ class RoundOutlines:
         off = draw.white(self.wall, (1,)) + draw.white(self.scatter, left.shape)
         wider = 1 + (left + off) / self.diameters
         pairs = zip(wider, self.circles, self.contours.outlines, strict=True)
-        drawn = tuple(_about(np.asarray(c.centre) / self.scale, by, o) for by, c, o in pairs)
-        return replace(self, contours=replace(self.contours, outlines=drawn))
+        drawn = []
+        for by, circle, outline in pairs:
+            centre = np.asarray(circle.centre) / self.scale
+            drawn.append(centre + by * (outline - centre))
+        return replace(self, contours=replace(self.contours, outlines=tuple(drawn)))
 
     def _lengths(self, run: Simulated) -> Floats:
         """The distance (nt,) m of the two ends at the run's steps."""
@@ -150,11 +153,6 @@ class RoundOutlines:
 
     def rows(self) -> Rows | None:
         return None
-
-
-def _about(centre: Floats, by: float, outline: Floats) -> Floats:
-    """The outline (k, 2) m `by` times as large about a centre (2,) m."""
-    return centre + by * (outline - centre)
 
 
 def outlined_capsule(

@@ -96,7 +96,9 @@ class Climb:
     def __call__(self, rung: Rung, fastest: float | None) -> Reached | None:
         """The rung, with bounds against the time s of the `fastest` cell that is wanted (None:
         there is none yet); None where the rung has no cell."""
-        cells = [c for c in self._cells if c.part == "solver" and self._on(c, rung)]
+        solvers = {c: self._trial.solver(c.solver) for c in self._cells if c.part == "solver"}
+        cells = [c for c, solver in solvers.items() if solver.rung == rung
+                 and not (self._declared_law and solver.law != "linear")]  # fmt: skip
         if not cells:
             return None
         excluded: tuple[Excluded, ...] = ()
@@ -108,10 +110,6 @@ class Climb:
             self._experiment, self._trial, self._ran, self._done, self._quick, self._unit
         )
         return Reached(trade, excluded)
-
-    def _on(self, cell: TradeCell, rung: Rung) -> bool:
-        solver = self._trial.solver(cell.solver)
-        return solver.rung == rung and not (self._declared_law and solver.law != "linear")
 
     def _within(
         self, cells: Sequence[TradeCell], rung: Rung, fastest: float

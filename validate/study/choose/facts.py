@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -55,7 +54,11 @@ def stored_effects(experiment: Experiment, out: Path | None) -> ShownEffects | N
     path = reports_of(experiment.path, out) / experiment.name / "results.json"
     try:
         stored = json.loads(path.read_text(encoding="utf-8"))["effects"]
-        effects = [_shown(e) for e in stored]
+        effects = []
+        for e in stored:
+            seen_by = tuple(e["seen_by"])
+            by = [float(c["separation"]) for c in e["changes"] if c["name"] in seen_by]
+            effects.append(ShownEffect(e["name"], e["doc"], seen_by, max(by, default=0.0)))
         shown = tuple(e for e in effects if e.seen_by)
     except FileNotFoundError:
         return ShownEffects(unknown="no stored run")
@@ -64,12 +67,6 @@ def stored_effects(experiment: Experiment, out: Path | None) -> ShownEffects | N
     if not effects:
         return ShownEffects(unknown="the stored run compared no effects")
     return ShownEffects(shown, tuple(e.name for e in effects if not e.seen_by))
-
-
-def _shown(effect: dict[str, Any]) -> ShownEffect:
-    seen_by = tuple(effect["seen_by"])
-    by = [float(c["separation"]) for c in effect["changes"] if c["name"] in seen_by]
-    return ShownEffect(effect["name"], effect["doc"], seen_by, max(by, default=0.0))
 
 
 def with_effects(trial: Trial, experiment: Experiment, effects: ShownEffects | None) -> Trial:
@@ -159,11 +156,28 @@ def facts(trade: Trade, error: float, effects: ShownEffects | None = None) -> tu
     scene = trade.trial
     element = "P1" if "P1" in scene.meshes else next(iter(scene.meshes))
     body = scene.build(element, scene.meshes[element][0], "linear")
+    nu = body.material.nu
+    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: compare P1 with the other elements"
+    n = len(body.cavities)
+    means = (
+        "condensed response columns; the pressure keeps the volume constant"
+        if n
+        else "no pressure is computed"
+    )
     return (
-        _loading(scene, body), _strain(scene, body, trade), _poisson(body), _fluid(body),
-        _noise(trade, error), _mesh(trade),
+        _loading(scene, body),
+        _strain(scene, body, trade),
+        Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect"),
+        Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means),
+        _noise(trade, error),
+        Fact(
+            "reference",
+            f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its error "
+            f"about {trade.shown(trade.floor, 2)} (Richardson)",
+            "smaller errors cannot be distinguished",
+        ),
         *(Fact(*words) for words in effect_words(effects, trade.experiment, scene)),
-    )  # fmt: skip
+    )
 
 
 def _loading(scene: Trial, body: Scene) -> Fact:
@@ -226,22 +240,6 @@ def principal_strains(mesh: Mesh, u: Floats) -> Floats:
     return np.asarray(np.abs(np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2)).max(axis=1))
 
 
-def _poisson(body: Scene) -> Fact:
-    nu = body.material.nu
-    locks = f"above {LOCKING_FROM:g} linear tetrahedra lock: compare P1 with the other elements"
-    return Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect")
-
-
-def _fluid(body: Scene) -> Fact:
-    n = len(body.cavities)
-    means = (
-        "condensed response columns; the pressure keeps the volume constant"
-        if n
-        else "no pressure is computed"
-    )
-    return Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means)
-
-
 def _noise(trade: Trade, error: float) -> Fact:
     scene = trade.trial
     if scene.noise is None:
@@ -254,12 +252,3 @@ def _noise(trade: Trade, error: float) -> Fact:
         "a recording cannot detect such an error at a single point"
     )  # fmt: skip
     return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
-
-
-def _mesh(trade: Trade) -> Fact:
-    return Fact(
-        "reference", f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its error "
-                     f"about {trade.shown(trade.floor, 2)} (Richardson)",
-
-        "smaller errors cannot be distinguished",
-    )  # fmt: skip

@@ -86,7 +86,11 @@ class Stated:
     @property
     def terms(self) -> Terms:
         parts = {k: inf if u is None else u for k, u in self.numerical.items()}
-        inputs = (Sensitivity(k, _numbers(u, self.unit)) for k, u in self.inputs.items())
+        inputs = (
+            Sensitivity(k, Residual("u", "all", np.array(u)[:, None], 0.0, 0.0, self.unit,
+                                    "a standard uncertainty"))
+            for k, u in self.inputs.items()
+        )  # fmt: skip
         numerical = Numerical(parts, self.words, self.deciding)
         accept = Accept(self.name, self.limit, "as declared", statistic=self.statistic)
         return Terms(accept, numerical, tuple(inputs), self.fitted)
@@ -210,8 +214,3 @@ def _moved(input_: Sensitivity, statistic: Statistic) -> tuple[float, ...]:
     if statistic != "every":
         return (rms(change),)
     return tuple(np.linalg.norm(change, axis=1).tolist())
-
-
-def _numbers(u: tuple[float, ...], unit: str) -> Residual:
-    values = np.array(u)[:, None]
-    return Residual("u", "all", values, 0.0, 0.0, unit, "a standard uncertainty")

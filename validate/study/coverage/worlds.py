@@ -104,7 +104,10 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
         )
     }
     drawn = {k: r.value for k, r in enumerate(solved) if r.value is not None}
-    unsolved = _unsolved(method, [r.why for r in solved if r.value is None])
+    why = [r.why for r in solved if r.value is None]
+    unsolved = why and [
+        f"{method}: {len(why)} drawn truths have no solution and use straight lines: {why[0]}"
+    ]
     return Worlds(
         read, sides, drawn, whole, wrong, mistaken, moved,
         tuple(p for p in paths if _still(p, known, moved)),
@@ -136,12 +139,9 @@ class _Truth:
         first = _readings(self.study, self.by, (World(),))[World()]
         base = _needed(_alike(first, self.read), self.by)
         found = _readings(self.study, self.by, worlds, first.seconds)
-        return {w: self._from(base, _alike(r, self.read)) for w, r in found.items()}
-
-    def _from(self, base: ExactReading, record: Record[ExactReading]) -> Record[ExactReading]:
-        if record.value is None:
-            return record
-        return replace(record, value=self.read.plus(1.0, record.value, base))
+        alike = {w: _alike(r, self.read) for w, r in found.items()}
+        return {w: r if r.value is None else replace(r, value=self.read.plus(1.0, r.value, base))
+                for w, r in alike.items()}  # fmt: skip
 
 
 def _sides(
@@ -243,13 +243,6 @@ def _alike(record: Record[ExactReading], base: ExactReading) -> Record[ExactRead
         return replace(record, value=record.value.on(base))
     except ComparisonError as error:
         return replace(record, value=None, refused=str(error))
-
-
-def _unsolved(method: str, why: list[str]) -> tuple[str, ...]:
-    """A line where drawn inputs leave the truth without a solution: those draws are linear."""
-    if not why:
-        return ()
-    return (f"{method}: {len(why)} drawn truths have no solution and use straight lines: {why[0]}",)
 
 
 def _still(path: str, known: Mapping[str, ExactReading], moved: Mapping[str, ExactReading]) -> bool:

@@ -97,7 +97,25 @@ def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
             if together is not None:
                 p50, p99 = _step_times(stepper, ready.registered.inputs)
                 return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
-    return _one_by_one(bench, cell, folds)
+    scored, timing, steps = list[Scored](), Timing(), 0
+    segments: Segments | None = None
+    for seed in cell.seeds:
+        on_each = []
+        for one in bench.ready(cell, seed):
+            segments = segments or one.segments
+            runs = [_run(cell, one, fold, seed) for fold in folds]
+            timing.add(runs[0].step_s)
+            steps = len(runs[0].t)
+            on_each.append(_scored(bench, cell, one, folds, runs))
+        scored.append(_in_a_row(on_each))
+    assert segments is not None
+    return replace(
+        _put_together(scored, segments),
+        step_s=float(np.median(timing.p50)) if timing.p50 else None,
+        step_p99_s=float(np.median(timing.p99)) if timing.p99 else None,
+        setup_s=runs[0].setup_s,
+        steps=steps,
+    )
 
 
 def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
@@ -158,7 +176,8 @@ def _all_seeds(
         raise ComparisonError("diverged: the estimate is not finite")
     dof = int(batch.dof.sum())
     if not dof:
-        raise ComparisonError(f"invalid: {_unreached(stepper, len(inputs))}")
+        unheard = stepper.unheard([{"nis.dof": 0.0}] * len(inputs))  # type: ignore[attr-defined]
+        raise ComparisonError(f"invalid: {unheard}")
     measured, segments = np.isfinite(np.array(z)), first.segments
     names = [p.name for p in first.scene.probes]
     scored = []
@@ -206,10 +225,6 @@ def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ..
     return np.vstack([probes, markers]), tracks.names
 
 
-def _unreached(stepper: FilterStepper, steps: int) -> str:
-    return cast(str, stepper.unheard([{"nis.dof": 0.0}] * steps))  # type: ignore[attr-defined]
-
-
 def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:
     """Median and 99 % quantile (s) of the first steps, run as they are alone; the very first only
     warms up."""
@@ -225,28 +240,6 @@ def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:
 
 
 # --- seed by seed --------------------------------------------------------------------------------
-
-
-def _one_by_one(bench: Bench, cell: FilterCell, folds: Sequence[Fold]) -> FilterScores:
-    scored, timing, steps = list[Scored](), Timing(), 0
-    segments: Segments | None = None
-    for seed in cell.seeds:
-        on_each = []
-        for ready in bench.ready(cell, seed):
-            segments = segments or ready.segments
-            runs = [_run(cell, ready, fold, seed) for fold in folds]
-            timing.add(runs[0].step_s)
-            steps = len(runs[0].t)
-            on_each.append(_scored(bench, cell, ready, folds, runs))
-        scored.append(_in_a_row(on_each))
-    assert segments is not None
-    return replace(
-        _put_together(scored, segments),
-        step_s=float(np.median(timing.p50)) if timing.p50 else None,
-        step_p99_s=float(np.median(timing.p99)) if timing.p99 else None,
-        setup_s=runs[0].setup_s,
-        steps=steps,
-    )
 
 
 def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:

@@ -9,7 +9,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, Heat, NumberTable, S
 from validate.report.views.records import Shown, chart, grouped, table
 from validate.study.filters.blocks import Nested
 from validate.study.filters.plan import METHODS, FilterCell
-from validate.study.filters.ranking import NEAR, SAME_TIME, Ranked, Ranking, TruthPick
+from validate.study.filters.ranking import NEAR, SAME_TIME, Ranked, Ranking
 from validate.study.filters.score import LOG_LOSS, NIS, WITHHELD, WORDS, shown_unit, unit_text
 from validate.study.filters.study import FilterStudy
 from validate.study.sweep import Axis, named, short
@@ -84,7 +84,7 @@ def _heats(
         (study.by, f"error / {_unit(study)}", None),
     ):
         at = {(c.values[x.path], c.values[y.path]): _value(study, c, what) for c in cells}
-        values = np.array([[_nan(at.get((i, j))) for i in x.values] for j in y.values])
+        values = np.array([[at.get((i, j)) for i in x.values] for j in y.values], dtype=float)
         if np.isfinite(values).any():
             name = "nis" if what == NIS else "error"
             yield Heat(
@@ -92,10 +92,6 @@ def _heats(
                 f"{short(x.path)} and {short(y.path)}", short(x.path), short(y.path),
                 x.values, y.values, values, label, centre,
             )  # fmt: skip
-
-
-def _nan(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _curves(
@@ -145,7 +141,20 @@ def chosen_exhibits(study: FilterStudy) -> Iterator[Exhibit]:
             (table("nested", title, rows, columns),),
         )  # fmt: skip
     if picks := study.picks:
-        yield _agreement(picks)
+        near = sum(p.near for p in picks)
+        heads: Mapping[str, Shown] = {
+            "condition": lambda p: named(p.condition) or "recorded", "seed": "seed",
+            "picked without truth": "cell.name", "settings": lambda p: named(p.cell.settings),
+            "its true error / mm": "error", "best by truth": "best.name",
+            "settings of it": lambda p: named(p.best.settings), "least true error / mm": "least",
+            "ratio / 1": "ratio",
+        }  # fmt: skip
+        words = (
+            f"Where the truth is known: the filter setting of least {WITHHELD} has a true error "
+            f"within {100 * (NEAR - 1):.0f} % of the least in {near} of {len(picks)} recordings.",
+        )
+        shown = table("agreement", "The two rankings for each recording", picks[:_MOST], heads)
+        yield Exhibit("agreement", "Ranking with and without truth", words, (shown,))
 
 
 def _chosen_exhibits_unit(study: FilterStudy) -> str:
@@ -199,23 +208,6 @@ def _nested_words(study: FilterStudy) -> Iterator[str]:
     for ranking in study.rankings:
         if ranking.nested and ranking.blocks and not ranking.blocks.sure:
             yield f"{ranking.blocks.words}."
-
-
-def _agreement(picks: tuple[TruthPick, ...]) -> Exhibit:
-    near = sum(p.near for p in picks)
-    columns: Mapping[str, Shown] = {
-        "condition": lambda p: named(p.condition) or "recorded", "seed": "seed",
-        "picked without truth": "cell.name", "settings": lambda p: named(p.cell.settings),
-        "its true error / mm": "error", "best by truth": "best.name",
-        "settings of it": lambda p: named(p.best.settings), "least true error / mm": "least",
-        "ratio / 1": "ratio",
-    }  # fmt: skip
-    words = (
-        f"Where the truth is known: the filter setting of least {WITHHELD} has a true error within "
-        f"{100 * (NEAR - 1):.0f} % of the least in {near} of {len(picks)} recordings.",
-    )
-    shown = table("agreement", "The two rankings for each recording", picks[:_MOST], columns)
-    return Exhibit("agreement", "Ranking with and without truth", words, (shown,))
 
 
 # -------------------------------------------------------------------------------------------------

@@ -118,7 +118,8 @@ def plan(
         )
     parameters, _ = configure(experiment, Options(options.values, (), options.quick))
     methods = _methods(experiment, options.methods, axes)
-    seed_path = _seed_path(parameters) if experiment.repeats else ""
+    paths = [p.path for p in describe(parameters)] if experiment.repeats else []
+    seed_path = next((p for p in ("twin.seed", "seed") if p in paths), "")
     _require(axes, experiment, parameters, methods, seed_path)
     job = job_of(experiment, options.values, options.quick)
     chosen = [m for m in methods if m in filters] or filters
@@ -176,15 +177,12 @@ def _cells(
 def _keyed(experiment: Experiment, job: Job, bare: FilterCell) -> FilterCell:
     """The key holds every parameter and setting of the method as the cell will have it."""
     try:
-        made: Any = _described(*set_up(experiment, job, bare, bare.seeds[0]))
+        parameters, method = set_up(experiment, job, bare, bare.seeds[0])
+        both = (*describe(parameters), *describe(method, METHODS))
+        made: Any = [(p.path, repr(p.default)) for p in both]
     except UsageError as error:  # a combination that settings refuse: a failed row later
         made = str(error)
     return replace(bare, key=key_of(job, bare, made))
-
-
-def _described(parameters: Any, settings: Any) -> list[tuple[str, str]]:
-    both = (*describe(parameters), *describe(settings, METHODS))
-    return [(p.path, repr(p.default)) for p in both]
 
 
 def _methods(
@@ -224,12 +222,6 @@ def _usual(experiment: Experiment) -> set[str]:
     by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
     filters = {n for n, m in experiment.methods.items() if m.markers}
     return {*filters, *experiment.accepted, experiment.reference, by}
-
-
-def _seed_path(parameters: Any) -> str:
-    """The path of the twin's seed; "" where there is none."""
-    paths = [p.path for p in describe(parameters)]
-    return next((p for p in ("twin.seed", "seed") if p in paths), "")
 
 
 def _seeds(seeds: int | tuple[int, ...], parameters: Any, seed_path: str) -> tuple[int, ...]:

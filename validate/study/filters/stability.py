@@ -66,7 +66,12 @@ class FilterEndings:
 
     @property
     def rows(self) -> tuple[tuple[FilterChange, FilterEnding], ...]:
-        return tuple((c, self._ending(c)) for c in self.changes)
+        found = []
+        for change in self.changes:
+            r = self.done.records[change.key]
+            ending = r.value or FilterEnding("refused" if r.refused else "error", 0, 0, r.why)
+            found.append((change, ending))
+        return tuple(found)
 
     @property
     def bugs(self) -> tuple[str, ...]:
@@ -74,11 +79,6 @@ class FilterEndings:
         records = self.done.records
         return tuple(f"{c.label}: {records[c.key].failed}" for c in self.changes
                      if records[c.key].failed)  # fmt: skip
-
-    def _ending(self, change: FilterChange) -> FilterEnding:
-        record = self.done.records[change.key]
-        return record.value or FilterEnding("refused" if record.refused else "error", 0, 0,
-                                            record.why)  # fmt: skip
 
 
 def filter_endings(

@@ -11,35 +11,206 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from validate.arrays import Floats
 from validate.engine.cell import C, Plan, R, Where
 from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.pool import Pool
 from validate.engine.store import key_of
-from validate.errors import ComparisonError
+from validate.engine.worker_cache import Kept
+from validate.errors import ComparisonError, UsageError
 from validate.identify.identification import Identification, identify
-from validate.identify.least_squares import Fit, Space
-from validate.identify.profile import Side
-from validate.pipeline.calibration.calibrated import Identify, identified
-from validate.pipeline.calibration.free_parameters import asked
-from validate.pipeline.calibration.problem import Calibrated, Problem
+from validate.identify.least_squares import Fit, Space, fit
+from validate.identify.profile import Side, side
+from validate.identify.scaled_curve import linear_fit
+from validate.parameters import describe, with_values
+from validate.pipeline.calibration.calibrated import Identify, identified, open_free, problem_of
+from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
+from validate.pipeline.calibration.problem import Calibrated, Problem, with_free
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
-from validate.pipeline.experiment.options import Options
+from validate.pipeline.experiment.options import Options, all_methods, configure
+from validate.pipeline.experiment.origins import opened
 from validate.pipeline.run.job import Job, file_sha256
 from validate.pipeline.run.named_run import study_folder
-from validate.study.identify.cell import (
-    IdentifyBench,
-    Known,
-    LinearCell,
-    Of,
-    SideCell,
-    StartCell,
-    open_bench,
-    run_linear,
-    run_side,
-    run_start,
-)
+
+FreeOf = tuple[tuple[Free, ...], ...]  # of every calibration
+
+
+def asked(
+    experiment: Experiment, parameters: Any, wanted: Sequence[str] = ()
+) -> tuple[Experiment, FreeOf]:
+    """Return the experiment with its calibrations, and what is free of each.
+
+    Nothing wanted: what stands open, or all that is declared where nothing does. What is not
+    declared needs bounds, and is identified with the first calibration; an experiment without one
+    is calibrated by its first accepted method, on all that it judges. Raises `UsageError`.
+    """
+    if not wanted:
+        free = open_free(experiment, parameters)
+        if not any(free):
+            free = tuple(c.free for c in experiment.calibrations)
+        if not any(free):
+            raise UsageError(
+                f"{experiment.name} declares no calibration; name parameters with their bounds: "
+                "--parameters PATH=LOW:HIGH"
+            )
+        return experiment, free
+    named = [_parsed(experiment, parameters, text) for text in wanted]
+    twice = [f.path for i, f in enumerate(named) if f.path in [g.path for g in named[:i]]]
+    if twice:
+        raise UsageError(f"--parameters: {twice[0]} is given twice; give it once")
+    experiment = experiment if experiment.calibrations else _on_all(experiment, tuple(named))
+    # Every parameter to the calibration that declares it, the rest to the first one used
+    own = [[f for f in named if f.path in c.paths] for c in experiment.calibrations]
+    foreign = [f for f in named if not any(f in mine for mine in own)]
+    first = next((i for i, mine in enumerate(own) if mine), 0)
+    own[first] += foreign
+    still = open_free(experiment, parameters)
+    return experiment, tuple(
+        (*mine, *(f for f in left if f.path not in {m.path for m in mine})) if mine else ()
+        for mine, left in zip(own, still, strict=True)
+    )
+
+
+def _parsed(experiment: Experiment, parameters: Any, text: str) -> Free:
+    path, sign, bounds = (part.strip() for part in text.partition("="))
+    if path.startswith("methods."):
+        raise UsageError(
+            f"--parameters {path}: a setting of a method cannot be identified; give a parameter "
+            f"of the experiment, see `validate list {experiment.name}`"
+        )
+    declared = {f.path: f for c in experiment.calibrations for f in c.free}
+    if not sign:
+        with_values(parameters, {path: "0"} if path not in declared else {})
+        if path not in declared:
+            known = f"declared: {', '.join(declared)}; or " if declared else ""
+            raise UsageError(
+                f"--parameters {path}: no bounds; {known}give them: --parameters {path}=LOW:HIGH"
+            )
+        return declared[path]
+    low, colon, high = bounds.partition(":")
+    if not (colon and low and high):
+        raise UsageError(f"--parameters {text}: expected {path}=LOW:HIGH")
+    ends = [_number(parameters, path, end) for end in (low, high)]
+    known_free = declared.get(path)
+    helps = known_free.helps if known_free else ""
+    return Free(path, ends[0], ends[1], "asked for", helps)
+
+
+def _number(parameters: Any, path: str, text: str) -> float:
+    """In SI, as --set takes it."""
+    found = {p.path: p.default for p in describe(with_values(parameters, {path: text}))}[path]
+    if isinstance(found, bool) or not isinstance(found, float):
+        raise UsageError(f"--parameters {path}: not a number that can be varied")
+    return found
+
+
+def _on_all(experiment: Experiment, free: tuple[Free, ...]) -> Experiment:
+    names = tuple(
+        name for a in experiment.accept
+        for name in ([f"{a.quantity}@{load}" for load in a.loads] or [a.quantity])
+    )  # fmt: skip
+    method = next(iter(experiment.accepted), next(iter(experiment.methods)))
+    if not names:
+        raise UsageError(
+            f"{experiment.name} has no accepted methods: declare a calibration in its file"
+        )
+    every = Calibration(method, free, (Calibrates(names, name="all checked quantities"),))
+    return replace(experiment, calibrations=(every,))
+
+
+Known = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Of:
+    """Which problem: the number of a calibration, what is `wanted` as the user asks, and what
+    calibrations before it found."""
+
+    number: int
+    wanted: tuple[str, ...]
+    known: Known
+
+
+@dataclass(frozen=True)
+class StartCell:
+    """A fit from coordinates `start` (p,)."""
+
+    of: Of
+    start: tuple[float, ...]
+    label: str
+    key: str = ""
+    timed: bool = False
+
+
+@dataclass(frozen=True)
+class LinearCell:
+    """The closed form of a parameter that the residual may be linear in."""
+
+    of: Of
+    label: str
+    key: str = ""
+    timed: bool = False
+
+
+@dataclass(frozen=True)
+class SideCell:
+    """One side of a parameter's profile about the best fit."""
+
+    of: Of
+    best: Fit
+    parameter: int
+    sign: int
+    scale: float
+    label: str
+    key: str = ""
+    timed: bool = False
+
+
+class IdentifyBench:
+    """An experiment as its recordings have it, and the problems that were asked for."""
+
+    def __init__(self, experiment: Experiment, options: Options) -> None:
+        parameters, _ = configure(experiment, options)
+        found = opened(experiment, parameters)
+        self.parameters, self.recordings = found.parameters, found.recordings
+        self.experiment: Experiment = experiment.follows(
+            experiment, found.recordings, found.parameters
+        )
+        self.methods = all_methods(experiment, options)
+        self._problems: Kept[Problem] = Kept(8)
+
+    def problem(self, of: Of) -> Problem:
+        """Raise what loading the recordings that calibrate does."""
+        return self._problems.get(of, lambda: self._problem(of))
+
+    def _problem(self, of: Of) -> Problem:
+        parameters: Any = with_free(self.parameters, dict(of.known))
+        experiment, free = asked(self.experiment, self.parameters, of.wanted)
+        return problem_of(
+            experiment, of.number, free[of.number], parameters, self.methods, self.recordings
+        )
+
+
+def open_bench(job: Job) -> IdentifyBench:
+    return IdentifyBench(job.experiment(), Options(dict(job.values), (), job.quick))
+
+
+def run_linear(bench: IdentifyBench, cell: LinearCell) -> Fit:
+    problem = bench.problem(cell.of)
+    return linear_fit(problem.residual, problem.space)
+
+
+def run_start(bench: IdentifyBench, cell: StartCell) -> Fit:
+    return fit(bench.problem(cell.of).residual, np.array(cell.start))
+
+
+def run_side(bench: IdentifyBench, cell: SideCell) -> Side:
+    residual = bench.problem(cell.of).residual
+    return side(residual, cell.best, cell.parameter, cell.sign, cell.scale)
+
 
 KIND = "identify"
 STARTS, QUICK_STARTS = 10, 4

@@ -92,12 +92,21 @@ def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
     schemes = steppings_for(system.scene.mesh.kind)
     pulled = build(base.pulled(v))
     limit = stable_step(pulled, ExplicitLinear(1.0, "lumped", "mass"))
+    # Of K, of the consistent M, and of Newmark's J = 4/h^2 M + 2/h C + K at the paper's step
+    free = system.free
+    K, M, C = (X[free][:, free].toarray() for X in (system.K, system.M, system.C))
+    matrices = {"K": K, "M": M, "J": 4 / base.dt**2 * M + 2 / base.dt * C + K}
+    conditions = {}
+    for name, matrix in matrices.items():
+        values = eigvalsh(matrix)
+        if values[0] > 0:
+            conditions[name] = float(values[-1] / values[0])
     return Stepped(
         unknowns=len(system.free),
         lowest=float(modes["consistent"][0]),
         highest=float(modes["consistent"][-1]),
         schemes=tuple(_scheme(s, system, modes[s.mass], v, cell.steps) for s in schemes),
-        conditions=_conditions(system, base.dt),
+        conditions=conditions,
         locking=bench.locking(v),
         rounding=rounding(pulled, limit),
         drifts=tuple(_drifts(base, system, schemes, modes)) if cell.drift else (),
@@ -133,19 +142,6 @@ def measured_limit(radius: Callable[[float], float], near: float, border: float)
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if radius(middle) > border else (middle, high)
     return low
-
-
-def _conditions(system: System, dt: float) -> dict[str, float]:
-    """Of K, of the consistent M, and of Newmark's J = 4/h^2 M + 2/h C + K at the paper's step."""
-    free = system.free
-    K, M, C = (X[free][:, free].toarray() for X in (system.K, system.M, system.C))
-    matrices = {"K": K, "M": M, "J": 4 / dt**2 * M + 2 / dt * C + K}
-    found = {}
-    for name, matrix in matrices.items():
-        values = eigvalsh(matrix)
-        if values[0] > 0:
-            found[name] = float(values[-1] / values[0])
-    return found
 
 
 def _locking(pulled: Scene) -> float | None:

@@ -1,19 +1,277 @@
-"""Page of a stability map: sentence, part of results.json and table of cells."""
+"""Report of a stability map: claims, settings of papers, maps, limits and part of results.json."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
-from validate.compare.exhibit import NumberTable
+import numpy as np
+
+from validate.compare.exhibit import Exhibit, Mark, NumberTable, Panel, RegimeMap
 from validate.engine.cell import Record
+from validate.pipeline.ladder.ladder import PaperSetting, Turned
 from validate.report.stored.json_values import members
 from validate.report.views.records import Shown, table
 from validate.study.stability.cell import Stepped
-from validate.study.stability.exhibits import stability_exhibits
-from validate.study.stability.plan import StabilityCell
-from validate.study.stability.study import Stability, limit_error
+from validate.study.stability.plan import StabilityCell, axis, drift_variant
+from validate.study.stability.precision import DRIFT_STEPS, STEPS
+from validate.study.stability.study import Point, Stability, declared, limit_error, points
 from validate.study.study_page import Findings
+
+REGIMES = ("stable", "unresolved", "unstable", "refused")
+_WORDS = ("stable", "stable, h too large to resolve", "unstable", "refused")
+_WORST = 15  # limits shown; tables/cells.csv and results.json have them all
+_VARIANT = {
+    "E / Pa": "E", "nu / 1": "nu", "rho / kg/m3": "rho", "alpha / 1/s": "mass_damping",
+    "beta / s": "stiffness_damping", "mesh": "mesh", "altitude ratio": "quality",
+}  # fmt: skip
+_LABELS = {
+    "nu": "Poisson ratio", "E": "modulus / Pa", "damping": "damping alpha 1/s, beta s",
+    "quality": "worst altitude ratio", "mesh": "cells across",
+}  # fmt: skip
+# Rows that must be refused, before or after the axis itself.
+_BEYOND = {"nu": ("nu", 0.5, True), "E": ("E", 0.0, False), "quality": ("quality", 0.0, True)}
+
+
+def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
+    """In the order of a reader's questions: does it hold, where am I, where is the border, why."""
+    maps = tuple(m for name in _LABELS if (m := _map(study, name)) is not None)
+    return (
+        _claims(study),
+        *((_papers(study),) if study.base.papers else ()),
+        Exhibit("maps", "Stability limits of all schemes", tuple(_map_words(study)), regimes=maps),
+        _limits(study),
+        _conditions(study),
+        _drifts(study),
+        _refused(study),
+    )
+
+
+def _variant(at: str) -> Mapping[str, Shown]:
+    """What tables show of the variant that stands there in their records."""
+    return {heading: f"{at}.{name}" for heading, name in _VARIANT.items()}
+
+
+def _claims(study: Stability) -> Exhibit:
+    columns: Mapping[str, Shown] = {
+        "claim": "name", "worst / 1": "value", "limit / 1": "limit", "count": "count",
+        "verdict": lambda p: "holds" if p.holds else "fails", "what": "why",
+    }  # fmt: skip
+    claims = table("predictions", "Predicted and measured limits", study.predictions, columns)
+    words = (
+        "Measured: the spectral radius of the step map over all modes of the body; a limit is "
+        "the step at which it passes 1 (bisection). Predicted: the formula of each scheme "
+        "with the highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one "
+        "step map.",
+        "Large strain schemes (central, newton_dynamics) are evaluated at rest, where they "
+        "are linear; their limit changes as the body deforms.",
+    )
+    return Exhibit("predictions", "Predictions", words, (claims,))
+
+
+def _papers(study: Stability) -> Exhibit:
+    found = [one for paper in study.base.papers for one in _of_paper(study, paper)]
+    columns: Mapping[str, Shown] = {
+        "setting": "0.label", "source": "0.source", "h / ms": "1.dt", "scheme": "1.scheme",
+        "regime": lambda one: _WORDS[REGIMES.index(one[1].regime)], "radius / 1": "1.radius",
+        "h over limit / 1": lambda one: one[2] and one[0].dt / one[2], "why": "1.why",
+    }  # fmt: skip
+    note = "Refused: the scheme does not run with that material, so there is no radius."
+    title = "Settings of the papers"
+    return Exhibit("papers", title, (), (table("papers", title, found, columns, note),))
+
+
+def _of_paper(
+    study: Stability, paper: PaperSetting
+) -> Iterator[tuple[PaperSetting, Point, float | None]]:
+    """Each scheme at the paper's step, and its predicted limit s."""
+    cell = _cell(study, paper.variant)
+    if cell is None:
+        return
+    record = study.done.records[cell.key]
+    limits = {s.scheme: s.predicted for s in (record.value or Stepped()).schemes}
+    for p in points(cell, record, study.schemes):
+        if np.isclose(p.dt, paper.dt, rtol=1e-6):
+            yield paper, p, limits.get(p.scheme)
+
+
+# --- maps ----------------------------------------------------------------------------------------
+
+
+def _map_words(study: Stability) -> Iterator[str]:
+    yield (
+        f"Base: {study.base.words}; {_described(study.base.base)}. One quantity is changed at a "
+        "time here; pairs are in tables/cells.csv."
+    )
+    yield (
+        "Stable means that nothing grows, not that the motion is accurate. 'Too large to "
+        "resolve' means fewer than ten steps in the slowest period."
+    )
+
+
+def _map(study: Stability, name: str) -> RegimeMap | None:
+    """None where fewer than two rows were run."""
+    variants = _rows(study, name)
+    cells = [(v, c) for v in variants if (c := _cell(study, v)) is not None]
+    if len(cells) < 2:
+        return None
+    found = [list(points(c, study.done.records[c.key], study.schemes)) for _, c in cells]
+    panels = tuple(_panel(study, s, [c for _, c in cells], found) for s in study.schemes)
+    shown = tuple(_text(name, v) for v, _ in cells)
+    marks = tuple(_marks(study, name, [v for v, _ in cells]))
+    hollow = any(not m.on_map for m in marks)
+    more = " Hollow: differs from the base in further quantities; see the table." if hollow else ""
+    return RegimeMap(
+        name,
+        f"{study.experiment.name}: time step against {_LABELS[name].split(' / ')[0]}",
+        "time step / s",
+        _LABELS[name],
+        np.array(cells[0][1].steps),
+        shown,
+        _WORDS,
+        panels,
+        marks,
+        f"Line: predicted limit. Marks: settings of the papers.{more}",
+    )
+
+
+def _rows(study: Stability, name: str) -> tuple[Turned, ...]:
+    along = axis(study.base, name)
+    if name not in _BEYOND:
+        return along
+    where, value, after = _BEYOND[name]
+    beyond = replace(study.base.base, **{where: value})  # type: ignore[arg-type]
+    return (*along, beyond) if after and name != "quality" else (beyond, *along)
+
+
+def _panel(
+    study: Stability, scheme: str, cells: list[StabilityCell], found: list[list[Point]]
+) -> Panel:
+    codes = [[REGIMES.index(p.regime) for p in row if p.scheme == scheme] for row in found]
+    results = (study.done.records[c.key].value or Stepped() for c in cells)
+    limits = [next((s.predicted for s in r.schemes if s.scheme == scheme), None) for r in results]
+    border = np.array([np.nan if x is None else x for x in limits])
+    return Panel(scheme, np.array(codes), border)
+
+
+def _marks(study: Stability, name: str, rows: list[Turned]) -> Iterator[Mark]:
+    """Papers' settings whose value of this quantity is a row, or lies between two of E."""
+    for paper in study.base.papers:
+        at = _row_of(name, paper.variant, rows)
+        if at is not None:
+            on_map = any(_alike(paper.variant, v, name) for v in rows)
+            yield Mark(paper.label, paper.dt, at, on_map)
+
+
+def _row_of(name: str, v: Turned, rows: list[Turned]) -> float | None:
+    if name == "E":
+        known = [(i, r.E) for i, r in enumerate(rows) if r.E > 0]
+        indices, logs = [i for i, _ in known], [float(np.log(e)) for _, e in known]
+        return float(np.interp(np.log(v.E), logs, indices))
+    texts = [_text(name, r) for r in rows]
+    own = _text(name, v)
+    return float(texts.index(own)) if own in texts else None
+
+
+def _alike(one: Turned, other: Turned, name: str) -> bool:
+    """Equal, or but for a modulus between two rows of moduli."""
+    return one == other or (name == "E" and replace(one, E=other.E) == other)
+
+
+def _text(name: str, v: Turned) -> str:
+    if name == "damping":
+        return f"{v.mass_damping:g}, {v.stiffness_damping:g}"
+    return f"{getattr(v, name):g}"
+
+
+def _described(v: Turned) -> str:
+    return (
+        f"E {v.E:g} Pa, nu {v.nu:g}, rho {v.rho:g} kg/m3, alpha {v.mass_damping:g} 1/s, beta "
+        f"{v.stiffness_damping:g} s, {v.mesh} cells across"
+    )
+
+
+def _cell(study: Stability, v: Turned) -> StabilityCell | None:
+    return next((c for c in study.cells if c.variant == v), None)
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+def _limits(study: Stability) -> Exhibit:
+    found = [
+        (cell.variant, s, limit_error(s))
+        for cell in study.cells
+        for s in (study.done.records[cell.key].value or Stepped()).schemes
+        if s.predicted is not None
+    ]
+    found.sort(key=lambda one: -np.inf if one[2] is None else -abs(one[2]))
+    columns: Mapping[str, Shown] = {
+        "scheme": "1.scheme", **_variant("0"), "predicted limit / s": "1.predicted",
+        "measured limit / s": "1.measured", "relative difference / 1": "2",
+    }  # fmt: skip
+    title = (
+        f"Predicted and measured limits: the {min(_WORST, len(found))} with the largest difference "
+        f"of {len(found)}"
+    )
+    return Exhibit("limits", "Limits", (), (table("limits", title, found[:_WORST], columns),))
+
+
+def _conditions(study: Stability) -> Exhibit:
+    """Along every axis from the base: what a solver and a linear cell have to bear."""
+    wanted = dict.fromkeys(v for name in _LABELS for v in axis(study.base, name))
+    found = [
+        (v, study.done.records[c.key].value or Stepped())
+        for v in wanted
+        if (c := _cell(study, v)) is not None
+    ]
+    words = (
+        "Locking factor: compliance under the static load over that of mixed Taylor-Hood "
+        "elements on the same mesh (1: no locking; 0.1: ten times too stiff). It includes the "
+        "mesh error.",
+        "float32: largest difference from float64 over the largest displacement, of a direct "
+        f"static solution and of {STEPS} explicit steps at 2 % of the limit. J is that of average "
+        "acceleration at the paper's step; M is consistent.",
+    )
+    columns = {**_variant("0"), **_COST}
+    costs = table("conditions", "Conditioning, locking, single precision", found, columns)
+    return Exhibit(
+        "conditions", "Conditioning, locking and precision of the cells", words, (costs,)
+    )
+
+
+_COST: Mapping[str, Shown] = {
+    "cond K / 1": "1.conditions.K", "cond M / 1": "1.conditions.M", "cond J / 1": "1.conditions.J",
+    "locking factor / 1": "1.locking", "float32 static / 1": "1.rounding.static",
+    f"float32 {STEPS} steps, positions / 1": "1.rounding.positions",
+    f"float32 {STEPS} steps, velocities / 1": "1.rounding.velocities",
+    "warning": lambda one: one[1].warning or None,
+}  # fmt: skip
+
+
+def _drifts(study: Stability) -> Exhibit:
+    known = declared()
+    columns: Mapping[str, Shown] = {
+        "scheme": "scheme", "h / ms": "dt",
+        "keeps energy": lambda d: "yes" if known[d.scheme].conserves else "no",
+        "energy left, float64 / 1": "double", "energy left, float32 / 1": "single",
+    }  # fmt: skip
+    words = (
+        f"Undamped, {_described(drift_variant(study.base))}: all modes are advanced "
+        f"{DRIFT_STEPS:g} times by their step maps from the same strain energy. Explicit "
+        "schemes use half their limit, implicit ones the paper's step. Explicit schemes "
+        "conserve an energy of half steps.",
+    )
+    title, drifts = "Energy after 1e5 steps over the initial energy", (r.drifts for r in study.ran)
+    shown = table("drift", title, (d for found in drifts for d in found), columns)
+    return Exhibit("drift", "Drift", words, (shown,))
+
+
+def _refused(study: Stability) -> Exhibit:
+    pairs = ((c.variant, study.done.records[c.key].why) for c in study.cells)
+    columns = {**_variant("0"), "why": "1"}
+    shown = table("refused", "Refused schemes and reasons", (p for p in pairs if p[1]), columns)
+    return Exhibit("refused", "Refused", (), (shown,))
 
 
 def told(study: Stability) -> Findings:
@@ -49,11 +307,11 @@ def document(study: Stability) -> dict[str, Any]:
         **members(study.done, "reused", "seconds", "workers"),
         "predictions": [asdict(p) for p in study.predictions],
         "papers": [asdict(p) for p in study.base.papers],
-        "variants": [_variant(c, study.done.records[c.key]) for c in study.cells],
+        "variants": [_variant_members(c, study.done.records[c.key]) for c in study.cells],
     }
 
 
-def _variant(cell: StabilityCell, record: Record[Stepped]) -> dict[str, Any]:
+def _variant_members(cell: StabilityCell, record: Record[Stepped]) -> dict[str, Any]:
     content = asdict(record.value or Stepped())
     for scheme in content["schemes"]:
         scheme["radii"] = [float(f"{r:.10g}") for r in scheme["radii"]]

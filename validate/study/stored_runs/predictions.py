@@ -6,7 +6,7 @@ the same settings are repeats: where the specimen is one, their predictions are 
 """
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
@@ -80,7 +80,19 @@ def stored_runs(reports: Path) -> tuple[Seen, ...]:
 
     One run's checks are in memory at a time, and of each what is kept here.
     """
-    return _once([seen for f in report_folders(reports) if (seen := _read(f)) is not None])
+    # Of the same recordings one run counts
+    runs = [seen for f in report_folders(reports) if (seen := _read(f)) is not None]
+    found = [run for run in runs if run.why]
+    fit = sorted((run for run in runs if not run.why), key=lambda run: run.recorded)
+    for _, group in groupby(fit, key=lambda run: run.recorded):
+        first, *others = sorted(group, key=_standing)
+        instead = f"the same recordings as {first.folder}, which is used because "
+        found.append(first)
+        for other in others:
+            fewer = len(other.changed) > len(first.changed)
+            reason = "it has fewer changed settings" if fewer else "it is newer"
+            found.append(replace(other, why=instead + reason, predicted=(), left={}))
+    return tuple(sorted(found, key=lambda run: run.folder))
 
 
 def _read(folder: Path) -> Seen | None:
@@ -123,21 +135,6 @@ def _unfit(content: Json) -> str:
     if not any(m.get("accepted") for m in content["methods"]):
         return "it accepts no method"
     return ""
-
-
-def _once(runs: Sequence[Seen]) -> tuple[Seen, ...]:
-    """Of the same recordings one run counts."""
-    found = [run for run in runs if run.why]
-    fit = sorted((run for run in runs if not run.why), key=lambda run: run.recorded)
-    for _, group in groupby(fit, key=lambda run: run.recorded):
-        first, *others = sorted(group, key=_standing)
-        instead = f"the same recordings as {first.folder}, which is used because "
-        found.append(first)
-        for other in others:
-            fewer = len(other.changed) > len(first.changed)
-            reason = "it has fewer changed settings" if fewer else "it is newer"
-            found.append(replace(other, why=instead + reason, predicted=(), left={}))
-    return tuple(sorted(found, key=lambda run: run.folder))
 
 
 def _standing(run: Seen) -> tuple[int, list[int]]:

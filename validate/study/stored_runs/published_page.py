@@ -16,7 +16,7 @@ from validate.report.stored.folder import MARK
 from validate.report.views.numbers import with_unit
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
-from validate.study.loose_page import write_loose
+from validate.study.study_page import write_loose
 
 Json = dict[str, Any]
 LOG = logging.getLogger(__name__)
@@ -65,7 +65,9 @@ def _counted(results: Iterable[Json]) -> str:
 
 
 def _summary(entries: Sequence[Json], reports: Path) -> NumberTable:
-    links = {c["experiment"]: _report_of(c["experiment"], reports) for c in entries}
+    names = [c["experiment"] for c in entries]  # a link where their own report is stored
+    stored = {n for n in names if (reports / n / "report.html").is_file()}
+    links = {n: f"../{n}/report.html" if n in stored else "" for n in names}
     rows = tuple(
         (
             TableCell(c["experiment"], emphasis="strong", link=links[c["experiment"]]),
@@ -83,11 +85,6 @@ def _summary(entries: Sequence[Json], reports: Path) -> NumberTable:
         "A result counts as reproduced within the tolerance that the experiment declares, at most "
         "a tenth of the printed number. Settings, sketches and citations are not counted.",
     )  # fmt: skip
-
-
-def _report_of(name: str, reports: Path) -> str:
-    """The link to the experiment's own report, where it is stored."""
-    return f"../{name}/report.html" if (reports / name / "report.html").is_file() else ""
 
 
 def _differences(entries: Sequence[Json]) -> tuple[Intervals, ...]:

@@ -1,4 +1,4 @@
-"""Comparison of stored runs by the scores in their long tables."""
+"""Comparison of stored runs by the scores in their long tables, and its page."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from validate.checksums import read_sealed
+from validate.compare.exhibit import Exhibit, NumberTable, Picture
 from validate.compare.row import LongRow
 from validate.errors import ComparisonError, RecordingError, UsageError
 from validate.parameters import nearest_names
@@ -17,6 +18,8 @@ from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, long_table
 from validate.report.stored.folder import MARK
 from validate.report.stored.store import SCHEMA_VERSION
+from validate.report.views.records import table
+from validate.study.study_page import write_loose
 
 T = TypeVar("T")
 
@@ -252,16 +255,15 @@ def _columns(found: SideBySide) -> Iterator[tuple[int, int]]:
         yield from ((0, j) for j in range(1, len(found.runs)))
         return
     starts = [sum(len(r.methods) for r in found.runs[:i]) for i in range(len(found.runs))]
-    first, *others = (_ranked(r) for r in found.runs)
+    # Places of the methods, accepted ones first
+    first, *others = (
+        sorted(range(len(r.methods)), key=lambda i: r.methods[i] not in r.accepted)
+        for r in found.runs
+    )
     for start, other in zip(starts[1:], others, strict=True):
         ranks = product(range(len(first)), range(len(other)))
         for i, j in sorted(ranks, key=lambda ij: (abs(ij[0] - ij[1]), ij)):
             yield first[i], start + other[j]
-
-
-def _ranked(run: StoredRun) -> list[int]:
-    """Places of the methods, accepted ones first."""
-    return sorted(range(len(run.methods)), key=lambda i: run.methods[i] not in run.accepted)
 
 
 # --- A comparison of stored runs cut down to what is asked for, and put in order.
@@ -326,3 +328,57 @@ SORTS: Mapping[str, Callable[[Row], Any]] = MappingProxyType(
 def ordered(found: SideBySide, sort: str) -> SideBySide:
     """Its rows by one of `SORTS`; equal ones stay as they were stored."""
     return replace(found, rows=tuple(sorted(found.rows, key=SORTS[sort])))
+
+
+_PICTURES = 6  # pairs that are drawn
+_DRAWN = 40  # scores of a picture
+
+
+def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) -> Path:
+    """Replace `folder`; returns the path of report.html. Raises what `replace_folder` does."""
+    told = (
+        " and ".join(dict.fromkeys(r.experiment for r in found.runs)),
+        "Stored runs side by side",
+        "; ".join(f"{r.name} ({r.created})" for r in found.runs),
+        f"{len(found.rows)} scores of {len(found.runs)} runs, nothing was run again.",
+    )
+    shown, _, _ = pairs(found)
+    drawn = (_pair(i, p) for i, p in enumerate(shown, 1))
+    names = tuple(f"{r.name} {r.created}" for r in found.runs)
+    rows = tuple((path, *values) for path, values in found.parameters.items())
+    note = "" if rows else "None differs."
+    differing = NumberTable(
+        "parameters", "Parameters that differ, SI.", ("path", *names), rows, note
+    )
+    # Every score in every column, for the files
+    values = {column: f"values.{i}" for i, column in enumerate(found.columns)}
+    columns = {"method": "method", "score": "score", "unit": "unit", **values}
+    exhibits = (
+        *drawn,
+        Exhibit("parameters", "Parameters", (), (differing,)),
+        Exhibit("scores", "Scores", data=(table("scores", "Scores, SI.", found.rows, columns),)),
+    )
+    return write_loose(told, exhibits, document, folder, "Comparison", found.warnings)
+
+
+_PAIR = {
+    "method": "method", "score": "score", "one": "values.0", "other": "values.1",
+    "difference": "differences.1", "change / %": "changes.1", "unit": "unit",
+}  # fmt: skip
+
+
+def _pair(number: int, pair: Pair) -> Exhibit:
+    scores = table(f"pair_{number}", "Scores that both have, SI.", pair.rows, _PAIR)
+    return Exhibit(f"pair-{number}", f"{pair.one}, then {pair.other}", (), (scores,),
+                   pictures=_pictures(number, pair))  # fmt: skip
+
+
+def _pictures(number: int, pair: Pair) -> tuple[Picture, ...]:
+    from validate.report.charts.changes import picture
+
+    changed = [(f"{r.method}: {r.score}" if r.method else r.score, r.changes[1]) for r in pair.rows]
+    drawn = [(name, c) for name, c in changed if c is not None][:_DRAWN]
+    if not drawn or number > _PICTURES:
+        return ()
+    labels, changes = zip(*drawn, strict=True)
+    return (picture(f"changes_{number}", f"From {pair.one} to {pair.other}", labels, changes),)

@@ -1,16 +1,22 @@
-"""Summary of all stored runs: bias and scatter of predictions, by measured quantity."""
+"""Summary of all stored runs: bias and scatter of predictions by measured quantity; its page."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from validate.compare.bias import Predicted, Statement, area_metric, statement
+from validate.arrays import Floats
+from validate.compare.bias import Estimated, Predicted, Statement, area_metric, statement
+from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
 from validate.errors import UsageError
 from validate.report.stored.json_values import Json
+from validate.report.views.numbers import scale, shown_unit, significant, text, with_unit
+from validate.report.views.records import Shown, chart, grouped, table, value
 from validate.study.stored_runs.predictions import Foretold, Seen, predictions, stored_runs
+from validate.study.study_page import write_loose
 
 Range = tuple[float, float] | None
 
@@ -89,7 +95,16 @@ def _kinds(points: Sequence[Foretold], runs: Sequence[Seen]) -> tuple[OfKind, ..
 
 def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
     turned = [p for p in points if p.simulated <= 0]
-    covered = _covered(points, runs)
+    folders = {f for p in points for f in p.folders}
+    domains = [d for r in runs if r.folder in folders for d in r.domain]
+    sizes = [p.measured for p in points]
+    covered = Covered(
+        (min(sizes), max(sizes)),
+        points[0].unit,
+        _range(domains, lambda d: [d["strain"]]),
+        _range(domains, lambda d: [d["rate"]]),
+        _range(domains, lambda d: d["sides"] or []),
+    )
     if turned:
         first = turned[0]
         why = (
@@ -105,16 +120,228 @@ def _of_kind(kind: str, points: list[Foretold], runs: Sequence[Seen]) -> OfKind:
     return OfKind(kind, tuple(points), stated, covered, few)
 
 
-def _covered(points: Sequence[Foretold], runs: Sequence[Seen]) -> Covered:
-    folders = {f for p in points for f in p.folders}
-    domains = [d for r in runs if r.folder in folders for d in r.domain]
-    sizes = [p.measured for p in points]
-    return Covered(
-        (min(sizes), max(sizes)), points[0].unit, _range(domains, lambda d: [d["strain"]]),
-        _range(domains, lambda d: [d["rate"]]), _range(domains, lambda d: d["sides"] or []),
-    )  # fmt: skip
-
-
 def _range(domains: Sequence[Json], of: Callable[[Json], list[Any]]) -> Range:
     found = [float(value) for d in domains for value in of(d) if value is not None]
     return (min(found), max(found)) if found else None
+
+
+_PERCENT = 100.0
+_ROWS = 300  # of a table on the page
+_NAMED = 28  # experiments of a chart by name
+_ROOM = 1.3  # of a chart beyond its points, both ways
+#: Of a row's texts: what is stated, then where it holds.
+STATED = ("quantity", "bias / %", "scatter / %", "measurement / %", "predictions", "specimens")
+COVERED = ("size", "strain / %", "rate / 1/s", "body / mm")
+_WORDS = (
+    "Bias: predicted over true, less one. Scatter: relative standard deviation of the "
+    "predictions, without that of the measurements (a separate column). Unknown moduli, "
+    "geometry and friction are included in it. Both with 95 % intervals over specimens "
+    "(McGrattan and Toman 2011; NUREG-1824).",
+    "Repeats of one specimen under one load count once. All specimens have the same weight, "
+    "whatever the number of their loads. Undecided checks count. Fitted checks, quick runs "
+    "and runs with warnings do not. The first accepted method of each run counts.",
+    "A row is valid only for the sizes, strains, rates and bodies that it names.",
+)
+
+
+def write_summary(found: Summary, folder: Path) -> Path:
+    """Replace `folder`; returns the path of report.html. Raises what `replace_folder` does."""
+    told = (
+        "summary", "Prediction errors over all stored runs", f"{len(found.taken)} stored runs",
+        sentence(found),
+    )  # fmt: skip
+    points, all_points = _points("predictions", found.kinds)
+    runs, all_runs = _runs(found)
+    left = tuple(f"{_count(number, 'check')} of these runs not counted: {why}."
+                 for why, number in found.left.items())  # fmt: skip
+    exhibits = (
+        Exhibit("statement", "Measured recordings", _WORDS, (_table("statement", found.kinds),),
+                tuple(starmap(_against, enumerate(found.kinds, 1)))),
+        *_twins(found),
+        Exhibit("predictions", "Predictions that count", tables=(points,), data=(all_points,)),
+        Exhibit("runs", "Counted and excluded runs", left, (runs,),
+                data=(all_runs,)),
+    )  # fmt: skip
+    return write_loose(told, exhibits, document(found, predictions=False), folder, "Summary")
+
+
+def sentence(found: Summary) -> str:
+    """Return the statement over measured recordings in one sentence."""
+    if not found.kinds:
+        return "No stored run of a measured recording counts; twins are in a separate table."
+    points = sum(len(k.points) for k in found.kinds)
+    specimens = len({p.specimen for k in found.kinds for p in k.points})
+    parts = "; ".join(f"{k.kind} {_short(k)}" for k in found.kinds)
+    return f"{_count(points, 'prediction')} of {_count(specimens, 'specimen')}: {parts}."
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number != 1 else "")
+
+
+def _short(kind: OfKind) -> str:
+    if kind.stated is None:
+        return f"({kind.why})"
+    s = kind.stated
+    scatter = ""
+    if s.scatter is not None:
+        size = f"{percent(s.scatter.value)} %" if s.scatter.value else "no"
+        scatter = f", {size} scatter beyond the measurements'"
+    return f"{percent(s.bias.value - 1, sign=True)} %{scatter} ({s.points} of {s.specimens})"
+
+
+def percent(value: float, *, sign: bool = False) -> str:
+    """Return a relative value in per cent, two digits."""
+    plus = "+" if sign and value > 0 else ""
+    return plus + significant(_PERCENT * value, 2)
+
+
+def row(kind: OfKind) -> tuple[str, ...]:
+    """Return a kind of quantity as texts under `STATED` and `COVERED`."""
+    s, c = kind.stated, kind.covered
+    specimens = len({p.specimen for p in kind.points})
+    stated = ("–", "–", "–") if s is None else (
+        interval(s.bias, -1.0), "–" if s.scatter is None else interval(s.scatter), percent(s.own)
+    )  # fmt: skip
+    return (
+        kind.kind, *stated, str(len(kind.points)), str(specimens),
+        f"{spanned(c.size, c.unit)} {shown_unit(c.unit)}".strip(),
+        spanned(c.strain, "1", _PERCENT), spanned(c.rate, "1"), spanned(c.sides, "m"),
+    )  # fmt: skip
+
+
+def interval(found: Estimated, shift: float = 0.0) -> str:
+    """Return a value with its interval, in per cent."""
+    signed = shift != 0
+    if not signed and found.value == 0:
+        most = "" if found.high is None else f" (to {percent(found.high)})"
+        return f"none beyond the measurements'{most}"
+    value = percent(found.value + shift, sign=signed)
+    if found.low is None or found.high is None:
+        return f"{value} (no interval)"
+    ends = (percent(end + shift, sign=signed) for end in (found.low, found.high))
+    return f"{value} ({' to '.join(ends)})"
+
+
+def spanned(found: Range, unit: str, by: float = 1.0) -> str:
+    """From the least to the largest, with a unit where the heading has none."""
+    if found is None:
+        return "–"
+    low, high = (text(by * end, unit, 2) for end in found)
+    return low if low == high else f"{low} to {high}"
+
+
+def _table(name: str, kinds: tuple[OfKind, ...]) -> NumberTable:
+    rows = tuple((*row(kind), kind.why) for kind in kinds)
+    note = "" if rows else "No stored run counts."
+    return NumberTable(
+        name, "Grouped by measured quantity.", (*STATED, *COVERED, "why"), rows, note, below="why"
+    )
+
+
+def _against(number: int, kind: OfKind) -> Chart:
+    """Predicted over measured sizes, with the bands of both."""
+    stated, unit = kind.stated, shown_unit(kind.covered.unit) or "1"
+    drawn = [p for p in kind.points if p.simulated > 0]
+    names = dict.fromkeys(p.experiment for p in drawn)
+    others = dict.fromkeys(list(names)[_NAMED:], f"{len(names) - _NAMED} other experiments")
+    by_name = grouped(drawn, lambda p: others.get(p.experiment, p.experiment))
+    ends = scale(kind.covered.unit) * np.array([(p.measured, p.simulated) for p in drawn])
+    x = np.array([ends.min() / _ROOM, ends.max() * _ROOM]) if drawn else np.array([1.0, 10.0])
+    series = [*_band("measured = predicted", x, 1.0, stated.own if stated else 0.0)]
+    if stated is not None:
+        spread = stated.scatter.value if stated.scatter else 0.0
+        series += _band("bias of the models", x, stated.bias.value, spread)
+    chart_ = chart(
+        f"against_{number}", f"{kind.kind}: predicted against measured",
+        (f"measured / {unit}", "measured"), (f"predicted / {unit}", "simulated"),
+        points=by_name, log="xy",
+        caption="All counted checks. Bands: two standard deviations of the measurements, and of "
+        "the models' scatter.",
+    )  # fmt: skip
+    return replace(chart_, series=(*series, *chart_.series))
+
+
+def _band(label: str, x: Floats, by: float, sd: float) -> Iterator[Series]:
+    """The line y = by x, within two relative standard deviations."""
+    if sd:
+        low, high = (by * x * np.exp(sign * 2 * sd) for sign in (-1, 1))
+        yield Series(f"{label}, ± 2 sd", x, low, "band", high)
+    yield Series(label, x, by * x)
+
+
+def _twins(found: Summary) -> tuple[Exhibit, ...]:
+    """What twins say, in tables of their own; nothing without one."""
+    if not found.twins:
+        return ()
+    words = ("Recordings made by our finer models; they are not measurements.",)
+    page, data = _points("twin_predictions", found.twins)
+    tables = (_table("twins", found.twins), page)
+    return (Exhibit("twins", "Twins", words, tables, data=(data,)),)
+
+
+def _points(name: str, kinds: tuple[OfKind, ...]) -> tuple[NumberTable, NumberTable]:
+    """Predictions for the page, those with the largest errors, and all of them for the files."""
+    points = [p for k in kinds for p in k.points]
+    largest = set(sorted(points, key=lambda p: -abs(p.error) / p.measured)[:_ROWS])
+    words = (
+        "Sizes are along the measured direction; E, u_val and verdict are those of the check. "
+        "Area: between the distributions of prediction and measurement, in the unit of E."
+    )
+    note = _more(name, len(points), "largest")
+    columns: Mapping[str, Shown] = {
+        "experiment": "experiment", "check": "check", "specimen": "specimen",
+        "measured": _with_unit("measured"), "predicted": _with_unit("simulated"),
+        "ratio / 1": lambda p: p.simulated / p.measured, "E": _with_unit("error"),
+        "u_val": _with_unit("u_val"), "area": _with_unit(area_of), "verdict": "verdict",
+        "runs": lambda p: ", ".join(p.folders),
+    }  # fmt: skip
+    page = table("", words, (p for p in points if p in largest), columns, note, below="runs")
+    return page, table(name, words, points, {**columns, "unit": "unit"})
+
+
+def _with_unit(of: Shown) -> Shown:
+    """Each number with the unit of its prediction."""
+    return lambda p: TableCell(value(p, of), p.unit, with_unit(value(p, of), p.unit))
+
+
+def _more(name: str, count: int, which: str) -> str:
+    """The sentence below a table that shows a part, or nothing."""
+    if not count:
+        return "None."
+    return f"The {which} {_ROWS} of {count}: tables/{name}.csv has all." if count > _ROWS else ""
+
+
+def _runs(found: Summary) -> tuple[NumberTable, NumberTable]:
+    columns: Mapping[str, Shown] = {
+        "run": "folder", "counts": lambda r: "does not count" if r.why else "counts", "why": "why",
+    }  # fmt: skip
+    runs = table("runs", "Below one folder of reports.", found.runs, columns, below="why")
+    note = _more("runs", len(runs.rows), "first")
+    return replace(runs, name="", rows=runs.rows[:_ROWS], note=note), runs
+
+
+def document(found: Summary, *, predictions: bool = True) -> dict[str, Any]:
+    """One JSON document, SI; without predictions for a folder whose tables/ hold them."""
+    return {
+        "reports": found.reports.name,
+        "sentence": sentence(found),
+        "measured": [_stated(k, predictions) for k in found.kinds],
+        "twins": [_stated(k, predictions) for k in found.twins],
+        "runs": [{"folder": r.folder, "counts": not r.why, "why": r.why} for r in found.runs],
+        "checks_left_out": found.left,
+    }
+
+
+def _stated(kind: OfKind, predictions: bool) -> dict[str, Any]:
+    stated = {
+        "kind": kind.kind, "unit": kind.covered.unit, "why": kind.why,
+        "statement": None if kind.stated is None else asdict(kind.stated),
+        "covered": asdict(kind.covered),
+    }  # fmt: skip
+    return stated | ({"predictions": [_members(p) for p in kind.points]} if predictions else {})
+
+
+def _members(p: Foretold) -> dict[str, Any]:
+    names = (f.name for f in fields(p) if f.name != "changed")
+    return {name: getattr(p, name) for name in names} | {"area": area_of(p)}

@@ -6,14 +6,16 @@ those of their quarrel over memory.
 
 import platform
 import shlex
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU
 
 from validate.arrays import Floats
 from validate.engine.store import key_of
@@ -29,7 +31,58 @@ from validate.solve.external.program import words
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.march import march
 from validate.solve.types import Run, SceneSolver, Scheme, Stepper, StepTimes
-from validate.study.tradeoff.held import held_bytes
+
+_OF_A_FACTOR = 12  # bytes of an entry of L or U: a number and its row
+DEFINITION = (
+    "bytes of all arrays, sparse matrices and factors of the prepared solver, its scene, mesh "
+    "and system; temporary memory of the set-up is not included"
+)
+
+
+def held_bytes(thing: Any) -> int:
+    """Bytes reachable from `thing` through dataclasses, cached properties, tuples and mappings."""
+    seen: set[int] = set()
+    total, left = 0, [thing]
+    while left:
+        one = left.pop()
+        one = _owner(one) if isinstance(one, np.ndarray) else one
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        if isinstance(one, np.ndarray):
+            total += one.nbytes
+        elif isinstance(one, SuperLU):
+            total += _OF_A_FACTOR * int(one.nnz)
+        else:
+            left += _inside(one)
+    return total
+
+
+def _owner(array: np.ndarray) -> np.ndarray:
+    """The array whose memory a view shows."""
+    base = array.base
+    return _owner(base) if isinstance(base, np.ndarray) else array
+
+
+def _inside(one: Any) -> Iterable[Any]:
+    if isinstance(one, Mapping):
+        return list(one.values())
+    if isinstance(one, (tuple, list)):
+        return list(one)
+    if sparse.issparse(one):
+        return [
+            getattr(one, n) for n in ("data", "indices", "indptr", "offsets") if hasattr(one, n)
+        ]
+    if is_dataclass(one) and not isinstance(one, type):
+        own = [getattr(one, f.name) for f in fields(one)]
+        return own + list(getattr(one, "__dict__", {}).values())  # cached properties too
+    module = type(one).__module__ or ""
+    return (
+        list(vars(one).values())
+        if module.startswith("validate") and hasattr(one, "__dict__")
+        else []
+    )
+
 
 # --- External simulators on the ladder of a trade-off: each run is a separate process.
 
@@ -50,11 +103,13 @@ def with_simulators(trial: Trial, commands: Sequence[str]) -> Trial:
 
 def _rivals(trial: Trial, command: str) -> list[Rival]:
     words(command)
+    given = shlex.split(command)
+    called = Path(given[1] if len(given) > 1 else given[0]).stem
     own = tuple(e for e in trial.meshes if e in _CARRIED)
     laws: tuple[LawName, ...] = ("linear", *((trial.pair.law,) if trial.pair else ()))
     return [
         Rival(
-            f"{EXTERNAL}{_called(command)}" + ("" if law == "linear" else ", large strain"),
+            f"{EXTERNAL}{called}" + ("" if law == "linear" else ", large strain"),
             "external simulators", partial(_external, command, trial.dynamic), law=law,
             elements=own or ("-",), shortest=trial.steps[0],
         )
@@ -64,11 +119,6 @@ def _rivals(trial: Trial, command: str) -> list[Rival]:
 
 def _external(command: str, moving: bool, dt: float) -> ExternalSimulator:
     return ExternalSimulator(command, inertia=moving, seconds=_SECONDS)
-
-
-def _called(command: str) -> str:
-    given = shlex.split(command)
-    return Path(given[1] if len(given) > 1 else given[0]).stem
 
 
 # -------------------------------------------------------------------------------------------------

@@ -1,14 +1,14 @@
 """Report of a trade-off: front, parts of each error, set-up, memory, convergence, failures."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable
 from validate.pipeline.ladder.ladder import SHOWN
 from validate.report.views.records import Shown, chart, grouped, table
 from validate.study.filters.ranking import SAME_TIME
-from validate.study.tradeoff.held import DEFINITION
+from validate.study.tradeoff.cell import DEFINITION
 from validate.study.tradeoff.study import ERRORS, ParetoFront, Refinement, Trade, TradeRow
 
 _NAMES = {"error": "error", "total": "error including the law"}
@@ -60,7 +60,12 @@ def _front_exhibit(trade: Trade) -> Exhibit:
         _law_words(trade),
         _TIMES,
     ]
-    words += [s for by in _NAMES for s in _dominated(trade.front(by))]
+    for by in _NAMES:
+        if dominated := trade.front(by).dominated:
+            named_cells = "; ".join(dominated)
+            words.append(
+                f"Dominated by {_NAMES[by]}, on all tested meshes and steps: {named_cells}."
+            )
     words += [*scene.notes, *trade.locking]
     named = [by for by in _NAMES if by == "error" or trade.law_error is not None]
     fronts = [trade.front(by) for by in named]
@@ -80,12 +85,6 @@ def _law_words(trade: Trade) -> str:
         "difference to the reference, so linear and large-strain solvers are compared with "
         "one truth."
     )
-
-
-def _dominated(front: ParetoFront) -> Iterable[str]:
-    if front.dominated:
-        named = "; ".join(front.dominated)
-        yield f"Dominated by {_NAMES[front.by]}, on all tested meshes and steps: {named}."
 
 
 def _shares_of(trade: Trade) -> Mapping[str, Shown]:
