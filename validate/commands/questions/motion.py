@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -102,7 +102,26 @@ def _topic(recording: Recording, p: Tree) -> str | None:
     return p.settings.seen.markers if p.settings.seen.markers in recording.markers else None
 
 
+class _Firsts:
+    """First frequencies of the last recording's bodies: questions are listed again and again."""
+
+    recording: Recording | None = None
+    found: ClassVar[list[tuple[Tree, Path, float | None]]] = []
+
+
 def _first(recording: Recording, p: Tree, folder: Path) -> float | None:
+    p = replace(p, settings=replace(p.settings, ranges=type(p.settings.ranges)()))  # change none
+    if _Firsts.recording is not recording:
+        _Firsts.recording, _Firsts.found = recording, []
+    for body, at, first in _Firsts.found:
+        if (body, at) == (p, folder):
+            return first
+    first = _computed_first(recording, p, folder)
+    _Firsts.found.append((p, folder, first))
+    return first
+
+
+def _computed_first(recording: Recording, p: Tree, folder: Path) -> float | None:
     try:
         body = p.scene.body
         if isinstance(body, MeshFile) and unknowns_of(p, 1, folder) > _QUADRATIC:
