@@ -172,6 +172,10 @@ def _walk(
     scene, walk, state = stepper.scene, _Kept(), stepper.rest()
     rows = probe_rows(scene.mesh, scene.probes) if scene.probes else None
     often = -(-len(inputs) // _TOLD)
+    # Asked once: of a protocol with data the answer takes as long as a small step.
+    noticing = stepper if isinstance(stepper, Noticing) else None
+    uncertain = stepper if isinstance(stepper, Uncertain) else None
+    filtering = isinstance(stepper, Listening | Uncertain)  # schemes know their own limits
     for i, value in enumerate(inputs):
         if i % often == 0:
             tell(f"step {i + 1} of {len(inputs)}")
@@ -181,12 +185,12 @@ def _walk(
         except np.linalg.LinAlgError as singular:
             return walk, Outcome("diverged", i, f"a matrix became singular: {singular}")
         walk.seconds.append(perf_counter() - start)
-        if isinstance(stepper, Noticing):
-            walk.said.extend(w for w in stepper.notices(state) if w not in walk.said)
+        if noticing:
+            walk.said.extend(w for w in noticing.notices(state) if w not in walk.said)
         if state.failure:
             return walk, Outcome(state.failure[0], i, state.failure[1])
         seen = shown(state)
-        if why := _run_away(stepper, seen, rows, shown=i in at):
+        if filtering and (why := _run_away(stepper, seen, rows, shown=i in at)):
             return walk, Outcome("diverged", i, why)
         walk.updates.append(seen.updates)
         walk.numbers.append(seen.numbers)
@@ -196,16 +200,15 @@ def _walk(
             walk.points.append(points.apply(stepper.field(seen)))
         if i in at:
             walk.fields.append(stepper.field(seen))
-            if isinstance(stepper, Uncertain):
-                walk.sd.append(stepper.sd(seen))
+            if uncertain:
+                walk.sd.append(uncertain.sd(seen))
     return walk, Outcome("finished", len(inputs))
 
 
 def _run_away(stepper: Stepper, state: State, rows: Rows | None, *, shown: bool) -> str:
     """Why a filter's displacements at the probes, or at every node where a field is kept, are no
     result."""
-    filtering = isinstance(stepper, Listening | Uncertain)  # schemes know their own limits
-    if not filtering or (rows is None and not shown):
+    if rows is None and not shown:
         return ""
     u = stepper.field(state)
     found = float(np.abs(u if shown or rows is None else rows.apply(u)).max())
