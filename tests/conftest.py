@@ -13,7 +13,13 @@ import json
 import os
 import resource
 import subprocess
+import sys
 import warnings
+
+# Where Python may not keep its code, every process compiles the package and the tests anew: two
+# seconds a command, a third of collection. Before the tests are imported.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Before numpy is loaded: several processes of several threads each would quarrel over the cores.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
