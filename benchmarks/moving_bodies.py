@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import skfem
+from scipy.signal import lfilter
 from scipy.sparse.linalg import eigsh, spsolve
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
@@ -90,14 +91,14 @@ def _oscillator(w2: float, c: float, f: float, load: Floats, t: Floats) -> Float
     E = np.exp(-c * h / 2)
     C, S = np.cos(w * h).real, (np.sin(w * h) / w).real
     A = E * np.array([[C + c / 2 * S, S], [-w2 * S, C - c / 2 * S]])
-    x, q = np.zeros(2), np.zeros(len(t))
-    for i in range(1, len(t)):
-        slope = f * (load[i] - load[i - 1]) / h
-
-        before, after = ((f * y - c * slope / w2) / w2 for y in load[i - 1 : i + 1])
-        x = A @ (x - (before, slope / w2)) + (after, slope / w2)
-        q[i] = x[0]
-    return q
+    slope = f * np.diff(load) / h
+    before, after = ((f * y - c * slope / w2) / w2 for y in (load[:-1], load[1:]))
+    steps = np.array([after, slope / w2]) - A @ np.array([before, slope / w2])
+    # x[i] = A x[i-1] + steps[i], along the eigenvectors of A
+    decay, V = np.linalg.eig(A)
+    parts = zip(decay, np.linalg.solve(V, steps), strict=True)
+    x = V @ np.array([lfilter([1.0], [1.0, -a], part) for a, part in parts])
+    return np.append(0.0, x[0].real)
 
 
 def bricks(beam: Beam) -> tuple[Any, Any, Any, Any]:

@@ -6,8 +6,20 @@ of what a command does on a small body: only tests of reports look at figures, a
 blank ones.
 """
 
+import contextlib
 import gc
+import io
+import json
 import os
+import resource
+import subprocess
+import sys
+import warnings
+
+# Where Python may not keep its code, every process compiles the package and the tests anew: two
+# seconds a command, a third of collection. Before the tests are imported.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Before numpy is loaded: several processes of several threads each would quarrel over the cores.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -18,6 +30,8 @@ os.environ.setdefault("VALIDATE_WORKERS", "1")  # of `run`: the tests themselves
 from collections.abc import Callable, Generator, Iterator
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is found by what they test
@@ -25,6 +39,7 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 
 import pytest
 from hypothesis import settings
+from jinja2 import Environment
 from matplotlib.figure import Figure
 
 from validate.compare.result import Result
@@ -32,6 +47,9 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
+from validate.recording.formats import subprocess_decoder
+
+# private: _ended, _decode: the process between them is what `decoded_here` leaves out.
 
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
@@ -42,6 +60,9 @@ settings.register_profile("validate", deadline=None, derandomize=True)
 settings.load_profile("validate")
 BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
 _DRAW = Figure.draw
+_COMPILE = (
+    Environment.compile
+)  # private: of jinja2, which compiles the templates of every page anew
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -84,6 +105,43 @@ def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
             patch.setattr(Figure, "draw", lambda figure, renderer: None)
             patch.setenv("VALIDATE_NO_GL", "1")
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _templates_compiled_once() -> Iterator[None]:
+    """The templates of a page, which jinja2 compiles anew for every page: a tenth of a second."""
+    kept: dict[object, Any] = {}
+
+    def compiled(self: Environment, source: Any, *where: Any, **how: Any) -> Any:
+        key = (source, *where, *how.items())
+        if key not in kept:
+            kept[key] = _COMPILE(self, source, *where, **how)
+        return kept[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Environment, "compile", compiled)
+        yield
+
+
+@pytest.fixture
+def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are decoded in this process and without limits, for tests of what a file says.
+
+    Tests marked `own_process`, and those of every format in `test_nothing_beside_is_run`, show the
+    process that decodes a user's files."""
+    if request.node.get_closest_marker("own_process"):
+        return
+    module = subprocess_decoder
+    free = SimpleNamespace(**{**vars(resource), "setrlimit": lambda *limits: None})
+
+    def ended(decoder: str, path: Path, out: Path, given: Any, least: int) -> Any:
+        told = io.StringIO()
+        with contextlib.redirect_stdout(told), warnings.catch_warnings(action="ignore"):
+            code = module._decode(decoder, path.absolute(), out, "[0, 0]", json.dumps(dict(given)))
+        return subprocess.CompletedProcess((), code, told.getvalue().encode())
+
+    monkeypatch.setattr(module, "_ended", ended)
+    monkeypatch.setattr(module, "resource", free)
 
 
 @pytest.fixture

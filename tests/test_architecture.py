@@ -157,12 +157,18 @@ def _private_names(path: Path) -> set[str]:
     for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith(("validate", "exper")):
             names |= {name.name for name in node.names}
-        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) not in ("self", "cls"):
-            names |= {node.attr} - own
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("setattr"):
+        elif isinstance(node, ast.Attribute) and node.attr.startswith("_"):
+            on = node.value.id if isinstance(node.value, ast.Name) else ""
+            names |= set() if on in ("self", "cls") else {node.attr} - own
+        elif isinstance(node, ast.Call) and _called(node.func).endswith("setattr"):
             texts = [a.value for a in node.args[:2] if isinstance(a, ast.Constant)]
             names |= {text.rsplit(".", 1)[-1] for text in texts if isinstance(text, str)}
     return {n for n in names if n.startswith("_") and not n.startswith("__")} - OFFERED
+
+
+def _called(function: ast.expr) -> str:
+    """The last name of what is called."""
+    return str(getattr(function, "attr", getattr(function, "id", "")))
 
 
 def _reasons(path: Path) -> set[str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from validate.errors import SceneError
 
 _ROOT = Path("/")
+_ALWAYS = 1e7  # bytes that any process finds; reading what is free takes milliseconds
 _MOST = 0.9  # of what is free: an estimate is off, and other programs go on
 _GROUP = ("memory.max", "memory.current"), ("memory.limit_in_bytes", "memory.usage_in_bytes")
 
@@ -25,8 +26,10 @@ class MemoryShortError(SceneError):
 
 
 def require_memory(needed: float, what: str) -> None:
-    """Raises `MemoryShortError` where `needed` bytes for `what` are more than nine tenths of what
-    is free."""
+    """Raises `MemoryShortError` where `needed` bytes for `what`, of 10 MB and more, are above nine
+    tenths of what is free."""
+    if needed < _ALWAYS:
+        return
     free = free_memory()
     if free is not None and needed > _MOST * free:
         raise MemoryShortError(

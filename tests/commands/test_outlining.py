@@ -21,6 +21,8 @@ from validate.recording.outlines.outline import extract_outline
 from validate.recording.outlines.outline_tracking import EXPERTS
 from validate.recording.types import Frames, Recording, Source
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _read, _scale, _shape: called alone, case by case.
 
 SIDE = 0.2e-3  # m of a pixel

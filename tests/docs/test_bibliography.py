@@ -22,7 +22,7 @@ def docstrings(root: Path) -> Iterator[tuple[Path, str]]:
     for path in sorted([*(root / "validate").rglob("*.py"), *(root / "experiments").rglob("*.py")]):
         for node in nodes(path):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-                yield path, " ".join((ast.get_docstring(node) or "").split())
+                yield path, " ".join((ast.get_docstring(node, clean=False) or "").split())
 
 
 def cited(text: str) -> set[str]:

@@ -55,6 +55,13 @@ from validate.solve.types import State
 # private: _run: replaced, to bring a case about.
 # private: _socket: called alone, case by case.
 
+
+@pytest.fixture(autouse=True)
+def _collected() -> None:
+    """A loop collects garbage before it starts: not of all that this process has imported."""
+    gc.freeze()
+
+
 COARSE = {"body.plane": "10"}
 REST = (0.0031, 0.001)
 

@@ -15,6 +15,8 @@ from validate.recording.formats import subprocess_decoder
 from validate.recording.motion_capture import c3d
 from validate.recording.motion_capture.c3d import _require_whole, read_c3d
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _LOADING, _SHARED: replaced by a small number: a short test.
 # private: _require_whole: a file of its length, without content.
 # private: _streams: replaced, to bring a case about.
@@ -102,6 +104,7 @@ def test_a_cut_file_is_told_with_its_bytes_before_any_library_reads_it(tmp_path:
             read_c3d(path, {})
 
 
+@pytest.mark.own_process
 @pytest.mark.parametrize(
     ("source", "line"),
     [
@@ -137,6 +140,7 @@ raise SystemExit(subprocess_decoder._decode(decoder, Path(path), Path(out), *lim
 """
 
 
+@pytest.mark.own_process
 def test_a_missing_library_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"x")
     with pytest.raises(UsageError, match=re.escape(install_command("dicom"))):
@@ -329,6 +333,7 @@ def test_a_file_without_a_rate_or_streams_is_refused(
         read_c3d(path, {})
 
 
+@pytest.mark.own_process
 def test_a_decoder_that_the_machine_starts_too_late_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,8 @@ import pytest
 from validate.errors import RecordingError
 from validate.recording.motion_capture.c3d import read_c3d
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 SCALE, RATE, SGI, INTEL = 0.05, 60.0, 86, 84
 GAIN, OFFSET = 0.25, 100  # of the analog channel
 

@@ -17,6 +17,8 @@ from validate.recording.images import dicom as dicom_files
 from validate.recording.images.dicom import read_dicom
 from validate.recording.readers import recognised
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _MOST, _PACKED: replaced by a small number: a short test.
 # private: _box, _images, _moments, _require_few_bytes, _series: called alone, case by case.
 # private: _frames, _read: replaced, to bring a case about.
@@ -97,6 +99,7 @@ def test_what_is_no_readable_image_says_why(path: Path, why: str) -> None:
         read_dicom(path, {})
 
 
+@pytest.mark.own_process
 def test_without_the_library_the_line_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -28,6 +28,8 @@ from validate.recording.tables.workbook import (
     read_xlsx,
 )
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _Sheet, _chosen, _tests: sheets of a known kind.
 
 TABLE = [["Time", "Stauchung", "Kraft"], ["s", "mm", "N"]]
@@ -120,6 +122,7 @@ def test_what_unpacks_to_too_much_is_refused(
         workbook.arrays(path)
 
 
+@pytest.mark.own_process
 def test_without_the_library_the_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

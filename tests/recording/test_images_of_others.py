@@ -20,6 +20,8 @@ from validate.recording.mcap import known_messages as raw
 from validate.recording.mcap.known_messages import RawImage, decode_picture
 from validate.recording.readers import recognised
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _numbers: called alone, case by case.
 
 SAID = {"m_per_px": "0.1mm", "rate": "20"}
@@ -53,6 +55,7 @@ def test_a_video_has_the_containers_times(tmp_path: Path, name: str, code: str) 
     assert got.metadata["provenance"]["colour"] == "grey, as recorded"
 
 
+@pytest.mark.own_process
 def test_a_videos_rate_scale_and_every_frame_are_the_users(tmp_path: Path) -> None:
     path = film(tmp_path / "x.mp4", colour=True)
     with pytest.raises(UsageError, match="has no scale; give it, as --m-per-px"):

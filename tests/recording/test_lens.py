@@ -13,6 +13,8 @@ from validate.recording.images import lens
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.images.png_stack import read_png_stack
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 SIZE = (320, 240)
 K = np.array([[260.0, 0, 158], [0, 255.0, 121], [0, 0, 1]])
 D = np.array([-0.3, 0.09, 1e-3, -5e-4, 0.0])
@@ -118,6 +120,7 @@ def test_what_is_no_calibration_is_one_line(
         read_png_stack(shots, {**SAID, "lens": str(tmp_path / name)})
 
 
+@pytest.mark.own_process
 def test_images_of_another_size_are_refused_and_the_lens_is_printed(
     shots: Path, tmp_path: Path
 ) -> None:

@@ -13,6 +13,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.formats import matlab_arrays
 from validate.recording.formats.matlab import read_matlab
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _unpacks: called alone, case by case.
 
 GEL = "field/gel-indentation/parCoordA.mat"
@@ -92,6 +94,7 @@ def test_one_wrong_byte_of_a_packed_variable_fails_its_checksum(tmp_path: Path) 
             read_matlab(path, {"unit": "m"})
 
 
+@pytest.mark.own_process
 @pytest.mark.parametrize(
     ("stated", "held", "said"),
     [(2**30, 100, "a variable of 1073741832 bytes unpacked, the limit is 536870912"),

@@ -37,6 +37,8 @@ from validate.testing.readers import (
 )
 from validate.testing.requirements import refusal
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 
 def make_mcap(path: Path) -> None:
     write_recording(sample_recording(), path)

@@ -18,6 +18,8 @@ from validate.recording.formats.rosbag import read_bag
 from validate.recording.mcap.read import read_all, read_recording
 from validate.recording.readers import recognised
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _opened: called alone, case by case.
 
 KIND = "geometry_msgs/WrenchStamped"

@@ -13,6 +13,8 @@ from validate.recording.images.metaimage import read_metaimage
 from validate.recording.images.nrrd import read_nrrd
 from validate.recording.types import Recording
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 TOOL = re.compile(r"\w+To\w+Transform")
 READ = {"mha": read_metaimage, "mhd": read_metaimage, "seq.nrrd": read_nrrd}
 EACH_ENDING = pytest.mark.parametrize("ending", READ)

@@ -12,6 +12,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.images.metaimage import read_metaimage
 from validate.recording.images.nrrd import read_nrrd
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 KINDS = ["list", "domain", "domain", "domain"]
 DIRECTIONS = np.array([[np.nan] * 3, [0.1, 0, 0], [0, 0.2, 0], [0, 0, 1]])
 

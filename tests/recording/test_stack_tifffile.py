@@ -12,6 +12,8 @@ from validate.recording.images import image_stack
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.readers import recognised
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 LEVELS = np.random.default_rng(0).integers(0, 4096, (3, 40, 50)).astype(np.uint16)
 BYTES = (LEVELS >> 4).astype(np.uint8)
 SAID = {"m_per_px": "1mm", "rate": "2"}

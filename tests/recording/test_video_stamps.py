@@ -15,6 +15,8 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.images import video
 from validate.recording.images.video import VIDEO, read_video
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _last_box, _times: called alone, case by case.
 # private: _require_few: replaced, to bring a case about.
 

@@ -20,6 +20,8 @@ from validate.scene.mesh_files import meshio_arrays, third_party_meshes, vtu
 from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 # private: _body: called alone, case by case.
 
 SIZE = (0.01, 0.02, 0.03)
@@ -143,6 +145,7 @@ def test_a_sphere_is_filled_to_its_volume(tmp_path: Path, monkeypatch: pytest.Mo
     assert [f.name for f in tmp_path.iterdir()] == ["ball.stl"]
 
 
+@pytest.mark.own_process
 def test_an_open_surface_is_refused_with_its_open_edges(tmp_path: Path) -> None:
     pv.Plane(i_resolution=2, j_resolution=2).triangulate().save(tmp_path / "open.stl")
     with pytest.raises(SceneError, match=r"open\.stl: 8 open.*8 triangles"):
@@ -156,6 +159,7 @@ def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
     assert cell_volumes(body.mesh).sum() == pytest.approx(90e-6, rel=0.01)
 
 
+@pytest.mark.own_process
 @pytest.mark.parametrize(
     ("name", "text", "why"),
     [
@@ -360,6 +364,7 @@ def test_a_series_of_two_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.M
         vtu.arrays(tmp_path / "a.pvd")
 
 
+@pytest.mark.own_process
 @pytest.mark.parametrize(
     ("head", "says"),
     [

@@ -13,6 +13,8 @@ from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 FILES = Path(__file__).parent / "gmsh"
 SIDES = {f"side{i}": n for i, n in enumerate((6, 6, 12, 12, 12, 12), 1)}
 

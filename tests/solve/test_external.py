@@ -30,6 +30,8 @@ from validate.solve.march import run_scheme
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Run
 
+pytestmark = pytest.mark.usefixtures("decoded_here")
+
 SIZE = (0.02, 0.02, 0.04)
 SCENE = Scene(
     grid(SIZE, (1, 1, 2)),
@@ -250,6 +252,7 @@ def _gone(pid: int) -> bool:
     return False
 
 
+@pytest.mark.own_process
 def test_output_and_memory_are_bounded(tmp_path: Path) -> None:
     run = solved(shell("exec head -c 3000000 /dev/zero > x", output=1.0))
     assert "limit of its output" in run.outcome.why or "File too large" in run.outcome.why

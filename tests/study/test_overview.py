@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,17 +17,23 @@ from validate.study.stored_runs.overview import share, stored, write_overview
 FIRST, SECOND = "2026-11-21T04:00:00+00:00", "2026-11-22T05:00:00+00:00"
 
 
-@pytest.fixture
-def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder where `cube` ran twice, with another modulus, and `ball` once."""
-    monkeypatch.setenv("VALIDATE_NO_GL", "1")
-    result = small_result()
+    result, folder = small_result(), tmp_path_factory.mktemp("reports")
     other = tuple(
         replace(p, default=2e4) if p.path == "material.E" else p for p in result.parameters
     )
-    write_report(result, tmp_path / "cube", created=FIRST)
-    write_report(replace(result, parameters=other), tmp_path / "cube", created=SECOND)
-    write_report(replace(result, name="ball"), tmp_path / "ball", created=FIRST)
+    write_report(result, folder / "cube", created=FIRST)
+    write_report(replace(result, parameters=other), folder / "cube", created=SECOND)
+    write_report(replace(result, name="ball"), folder / "ball", created=FIRST)
+    return folder
+
+
+@pytest.fixture
+def reports(written: Path, tmp_path: Path) -> Path:
+    """A copy, which a test may add to."""
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
     return tmp_path
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -98,7 +98,26 @@ def proposal(recording: Recording, p: Tree, folder: Path) -> Proposal:
     return Proposal(STATIC, f"{facts}: slow enough for statics")
 
 
+class _Firsts:
+    """First frequencies of the last recording's bodies: questions are listed again and again."""
+
+    recording: Recording | None = None
+    found: ClassVar[list[tuple[Tree, Path, float | None]]] = []
+
+
 def _first(recording: Recording, p: Tree, folder: Path) -> float | None:
+    p = replace(p, settings=replace(p.settings, ranges=type(p.settings.ranges)()))  # change none
+    if _Firsts.recording is not recording:
+        _Firsts.recording, _Firsts.found = recording, []
+    for body, at, first in _Firsts.found:
+        if (body, at) == (p, folder):
+            return first
+    first = _computed_first(recording, p, folder)
+    _Firsts.found.append((p, folder, first))
+    return first
+
+
+def _computed_first(recording: Recording, p: Tree, folder: Path) -> float | None:
     try:
         body = p.scene.body
         if isinstance(body, MeshFile) and unknowns_of(p, 1, folder) > _QUADRATIC:

@@ -6,9 +6,10 @@ import re
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from shlex import quote
-from types import ModuleType
+from types import CodeType, ModuleType
 
 from validate.catalogue import FILE, card, experiment_files, name_of, searched_folders, shipped
 from validate.errors import UsageError, ValidateError
@@ -94,6 +95,7 @@ def _executed(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=beside)
     if spec is None or spec.loader is None:
         raise UsageError(f"{path} cannot be loaded as Python")
+    spec.loader = _AsItStands(name, str(file))
     module = importlib.util.module_from_spec(spec)
     package = ModuleType(package_name(path))
     package.__path__ = [str(file.parents[1] if beside else file.parent), str(shipped())]
@@ -112,6 +114,15 @@ def _executed(path: Path) -> ModuleType:
             f"(`python {quote(str(path))}` shows the full traceback)"
         ) from error
     return module
+
+
+class _AsItStands(SourceFileLoader):
+    """Runs the text of a file: code that Python keeps of it may be that of another text, as long
+    and written in the same second."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
 
 
 def _unload(package: str) -> None:
