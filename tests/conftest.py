@@ -39,7 +39,6 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 
 import pytest
 from hypothesis import settings
-from jinja2 import Environment
 from matplotlib.figure import Figure
 
 from validate.compare.result import Result
@@ -60,9 +59,6 @@ settings.register_profile("validate", deadline=None, derandomize=True)
 settings.load_profile("validate")
 BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
 _DRAW = Figure.draw
-_COMPILE = (
-    Environment.compile
-)  # private: of jinja2, which compiles the templates of every page anew
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -104,22 +100,6 @@ def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
         if request.path.parent.name in BLANK:
             patch.setattr(Figure, "draw", lambda figure, renderer: None)
             patch.setenv("VALIDATE_NO_GL", "1")
-        yield
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _templates_compiled_once() -> Iterator[None]:
-    """The templates of a page, which jinja2 compiles anew for every page: a tenth of a second."""
-    kept: dict[object, Any] = {}
-
-    def compiled(self: Environment, source: Any, *where: Any, **how: Any) -> Any:
-        key = (source, *where, *how.items())
-        if key not in kept:
-            kept[key] = _COMPILE(self, source, *where, **how)
-        return kept[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Environment, "compile", compiled)
         yield
 
 

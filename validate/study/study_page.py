@@ -6,19 +6,21 @@ A study's folder holds results.json, tables, figures and the page; its cells sta
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.result import Result
 from validate.engine.execution import CELLS
 from validate.parameters import Parameter
-from validate.pipeline.experiment.experiment import Experiment
 from validate.report.export.tables import write_csv
 from validate.report.stored.folder import MARK, replace_folder
 from validate.report.stored.history import carried, write_lines
 from validate.report.stored.json_values import Json, write_json
 from validate.report.stored.provenance import Made
 from validate.report.stored.store import document
+
+if TYPE_CHECKING:  # it loads all solvers, which a page over stored runs does not need
+    from validate.pipeline.experiment.experiment import Experiment
 
 
 def write_loose(
@@ -83,7 +85,7 @@ class Findings:
 
 
 def write_study(
-    experiment: Experiment, told: Findings, folder: Path, made: Made | None = None
+    experiment: "Experiment", told: Findings, folder: Path, made: Made | None = None
 ) -> Path:
     """Replace all of `folder` but its cells; returns the path of report.html.
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.resources import files
 from itertools import count
 from typing import Any
@@ -195,8 +196,17 @@ def _shown(template: str, exhibits: Iterable[DrawnExhibit]) -> str:
 
 
 def _template(name: str) -> Template:
+    """A template, compiled once a process; tables of each page are numbered from 0."""
+    number, environment = count(), _environment()
+    environment.filters["table_id"] = lambda table: (
+        f"{safe_name(table.name or 'table')}-{next(number)}"
+    )
+    return environment.get_template(name)
+
+
+@cache
+def _environment() -> Environment:
     folder = files("validate.report.page")
-    number = count()
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         loader=FunctionLoader(lambda n: folder.joinpath(n).read_text("utf-8")),
@@ -213,9 +223,8 @@ def _template(name: str) -> Template:
         least_width=least_width,
         json=_json,
         sort_key=_sort_key,
-        table_id=lambda table: f"{safe_name(table.name or 'table')}-{next(number)}",
     )
-    return environment.get_template(name)
+    return environment
 
 
 def least_width(picture: Picture) -> int:
