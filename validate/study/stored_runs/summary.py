@@ -15,8 +15,8 @@ from validate.errors import UsageError
 from validate.report.stored.json_values import Json
 from validate.report.views.numbers import scale, shown_unit, significant, text, with_unit
 from validate.report.views.records import Shown, chart, grouped, table, value
+from validate.study.loose_page import write_loose
 from validate.study.stored_runs.predictions import Foretold, Seen, predictions, stored_runs
-from validate.study.study_page import write_loose
 
 Range = tuple[float, float] | None
 
