@@ -54,7 +54,7 @@ def test_quadratic_hexahedra_are_listed_as_vtk_does() -> None:
         no_gl()
     from vtkmodules.vtkCommonDataModel import vtkTriQuadraticHexahedron
 
-    from validate.report.scenes.stills import vtk_order
+    from validate.report.scenes.panels import vtk_order
 
     theirs = vtkTriQuadraticHexahedron().GetParametricCoords()
     assert LATTICE[3][vtk_order()] == pytest.approx(np.array(theirs[: 3 * 27]).reshape(27, 3))

@@ -204,7 +204,7 @@ def test_captions_of_maps_have_units(made: dict[str, DrawnExhibit]) -> None:
 def test_maps_are_rendered_where_gl_is(result: Result) -> None:
     if not gl.available():
         no_gl()
-    from validate.report.scenes.stills import rendered
+    from validate.report.scenes.panels import rendered
 
     shown_map = result.exhibits[1].maps[0]
     low = rendered(shown_map, (0.0, 0.01)).pixels

@@ -2,7 +2,7 @@
 
 Arrays stay SI; `numbers` alone turns them into what people read (mm, N, Pa). Each section of the
 page is a function of the result that returns None where it does not apply. matplotlib draws in the
-files named after what they show, pyvista in `stills` only, jinja2 fills the page
+files named after what they show, pyvista in `panels` only, jinja2 fills the page
 in `html` only.
 """
 

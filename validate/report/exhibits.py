@@ -122,7 +122,7 @@ def _map(known: tuple[str, ...], shown: tuple[NodeMap, Range]) -> Picture:
     gl.learn(known)
     if shown[0].mesh.dimension != 3 or not gl.available():
         return encoded(drawn(*shown))
-    from validate.report.scenes.stills import rendered  # vtk reads its window class when imported
+    from validate.report.scenes.panels import rendered  # vtk reads its window class when imported
 
     return encoded(rendered(*shown))
 

@@ -1,7 +1,6 @@
-"""Still pictures of bodies with what was measured on them, by pyvista off screen.
+"""Sheets of still pictures: instants below each other, methods side by side, colour bars below.
 
-`sheet` draws the scene of the page's view that turns: instants below each other, methods side by
-side. Import only after `gl.available()`.
+`sheet` draws the scene of the page's view that turns. Import only after `gl.available()`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,198 +8,43 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from textwrap import fill
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pyvista as pv
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from PIL import Image
-from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
-from validate.arrays import Floats, Ints
-from validate.compare.exhibit import NodeMap, Picture, Pixels
-from validate.report.charts.style import MEASURED, PALETTE, draw
-from validate.report.scenes.body import Camera, camera
-from validate.report.scenes.body_scene import BodyScene, SeenMarkers, fields
-from validate.report.scenes.element_surface import Surface, surface_of
-from validate.report.scenes.maps import Range, bar_title, colours, triad, values, words
+from validate.arrays import Floats
+from validate.compare.exhibit import Picture, Pixels
+from validate.report.charts.style import draw
+from validate.report.scenes.body_scene import BodyScene, fields
+from validate.report.scenes.maps import Range
+from validate.report.scenes.panels import (
+    ERRORS,
+    THROUGH,
+    TOOL,
+    Stage,
+    add_markers,
+    add_outlines,
+    add_probes,
+    rendered_body,
+    triangulated,
+)
 from validate.report.scenes.residual_arrows import rounded_down
 from validate.report.views.numbers import significant
-from validate.scene.mesh import Mesh
-from validate.scene.shape_functions import LATTICE
 
 ONE_COLUMN, TWO_COLUMNS = 85.0, 175.0  # mm of a journal's page
 DPI = 300
 _INCH = 25.4  # mm
-_PIXELS = 480  # across a panel
-_EDGES = 1500  # facets above which edges of elements would hide the colours
-_OUTLINE = 60  # points of a measured outline
-_LONGEST, _MARKER = 0.1, 0.011  # of the body's size: the longest arrow, the radius of a marker
+_LONGEST = 0.1  # of the body's size: the longest arrow
 _POINTS, _LETTER = 7.0, 0.056  # size of the letters, and inches that one takes
 _LINE, _BAR = 0.13, 0.44  # inches of a line of text, of the colour bars below a row
 _PAGE = 9.0  # inches that a sheet may be high
 _LEAST = 1e-9  # what is smaller, of mm, %, Pa or of what differs, is rounding
 _AT_REST = 1e-3  # of the largest displacement: below it nothing has moved
 _DISPLACEMENT, _ERROR = "displacement / mm", "marker error / mm"
-_ERRORS = LinearSegmentedColormap.from_list("errors", ["#FFE0CC", PALETTE[1], "#4A1800"])
-_SIMULATED = "#FF4FD8"  # of an outline: no colour of the body
-_TOOL: Mapping[str, Any] = {"color": "#A9B0B7", "ambient": 0.3, "opacity": 0.4}
-_THROUGH = 0.25  # opacity of a body with particles in it
-_RIM: Mapping[str, Any] = {"color": "#202020", "line_width": 1, "opacity": 0.3}
-_LINE_ART: Mapping[str, Any] = {"ambient": 0.7, "diffuse": 0.3}
-
-
-# --- one panel ------------------------------------------------------------------------------------
-
-# VTK_TETRA, _HEXAHEDRON, _QUADRATIC_TETRA (local order as ours), _TRIQUADRATIC_HEXAHEDRON.
-_CELL = {4: 10, 8: 12, 10: 24, 27: 29}
-# Twice the places of the nodes that VTK lists behind the corners of a quadratic hexahedron: middles
-# of edges, then of faces, then of the cell.
-_BEHIND = "100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"
-
-
-def vtk_order() -> list[int]:
-    """Our local number of each node of a quadratic hexahedron as VTK lists them."""
-    ours = (2 * LATTICE[3]).astype(int).tolist()
-    behind = [ours.index([int(c) for c in place]) for place in _BEHIND.split()]
-    return [*range(8), *behind]
-
-
-class _Stage:
-    """A window that takes one picture after another, all with one camera."""
-
-    def __init__(self, seen_by: Camera, size: float) -> None:
-        half = 1.04 * seen_by.half
-        half = np.maximum(half, half.max() * np.array([0.5, 0.3]))
-        pixels = [_PIXELS, round(_PIXELS * half[1] / half[0])]
-        plotter: Any = pv.Plotter
-        self.plotter = plotter(off_screen=True, window_size=pixels, lighting="light kit")
-        self.plotter.set_background("white")
-        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
-        at = self.plotter.camera
-        at.focal_point = tuple(seen_by.middle)
-        at.position = tuple(seen_by.middle + 5 * size * seen_by.away)
-        at.up = tuple(seen_by.up)
-        at.parallel_projection, at.parallel_scale = True, half[1]
-        at.clipping_range = 0.1 * size, 20 * size
-
-    def add(self, mesh: Any, **look: Any) -> None:
-        if mesh.n_points:
-            self.plotter.add_mesh(
-                mesh, reset_camera=False, show_scalar_bar=False, render=False, **look
-            )
-
-    def shot(self) -> Pixels:
-        """The picture (h, w, 3), after which the window is empty."""
-        self.plotter.render_window.Render()
-        taken = vtkWindowToImageFilter()  # the plotter's own way renders three times
-        taken.SetInput(self.plotter.render_window)
-        taken.ReadFrontBufferOff()
-        taken.ShouldRerenderOff()
-        taken.Update()
-        image: Any = pv.wrap(taken.GetOutput())
-        wide, high, _ = image.dimensions
-        self.plotter.clear_actors()
-        return np.array(image.active_scalars, dtype=np.uint8).reshape(high, wide, 3)[::-1]
-
-
-@dataclass(frozen=True)
-class _Body:
-    """What is drawn of a mesh: its surface, and where a plane (normal, point) opens it its cells
-    (n, 3) mm at rest."""
-
-    surface: Surface
-    rest: Floats
-    cells: Any = None
-    plane: tuple[Floats, Floats] | None = None
-
-    def add(
-        self, stage: _Stage, x: Floats, shown: Floats, span: Range, ramp: str, opacity: float = 1.0
-    ) -> None:
-        """Nodes at x (n, 3) mm in the colours of `shown` (n,)."""
-        look = {"scalars": "value", "cmap": ramp, "clim": span, "ambient": 0.6, "diffuse": 0.45,
-                "nan_color": "#C9CED3", "opacity": opacity}  # fmt: skip
-        surface = self.surface
-        triangles = surface.every(surface.triangles).reshape(-1, 3)
-        outside = _triangulated(surface.at(self.rest), triangles)
-        rims = surface.every(surface.rim)
-        lines = np.insert(rims, 0, rims.shape[1], axis=1).ravel()
-        edges = pv.PolyData(outside.points, lines=lines)
-        for one, how in ((outside, look), *([(edges, _RIM)] if len(rims) <= _EDGES else [])):
-            one.point_data["value"], one.point_data["x"] = surface.at(shown), surface.at(x)
-            self._moved(
-                stage,
-                one if self.plane is None else one.clip(normal=self.plane[0], origin=self.plane[1]),
-                how,
-            )
-        if self.plane is not None:
-            self.cells.point_data["value"], self.cells.point_data["x"] = shown, x
-            self._moved(stage, self.cells.slice(normal=self.plane[0], origin=self.plane[1]), look)
-
-    def _moved(self, stage: _Stage, mesh: Any, look: Mapping[str, Any]) -> None:
-        if mesh.n_points:
-            mesh.points = np.asarray(mesh.point_data["x"])
-            stage.add(mesh, **look)
-
-
-def _body(mesh: Mesh, rest: Floats, plane: tuple[Floats, Floats] | None = None) -> _Body:
-    if plane is None:
-        return _Body(surface_of(mesh), rest)
-    count = mesh.cells.shape[1]
-    cells = mesh.cells[:, vtk_order()] if count == 27 else mesh.cells
-    kinds = np.full(len(cells), _CELL[count], dtype=np.uint8)
-    grid = pv.UnstructuredGrid(np.insert(cells, 0, count, axis=1).ravel(), kinds, rest)
-    return _Body(surface_of(mesh), rest, grid, plane)
-
-
-def _triangulated(nodes: Floats, triangles: Ints) -> Any:
-    return pv.PolyData(nodes, np.insert(triangles, 0, 3, axis=1).ravel())
-
-
-def _add_markers(
-    stage: _Stage, seen: SeenMarkers, frame: int, size: float, by: float, top: float
-) -> None:
-    """Balls where markers were measured, arrows `by` times as long from where they are simulated,
-    both in the colours of the error up to `top` mm."""
-    error = seen.errors[frame]
-    there = np.isfinite(error)
-    measured, error = seen.measured[frame][there], error[there]
-    if not len(measured):
-        return
-    radius = _MARKER * size * min(1.0, float(np.sqrt(60 / len(error))))
-    look = {"scalars": "error", "cmap": _ERRORS, "clim": (0.0, top), **_LINE_ART}
-    points = pv.PolyData(measured)
-    points.point_data["error"] = error
-    ball = pv.Sphere(radius=radius, theta_resolution=14, phi_resolution=14)
-    stage.add(points.glyph(geom=ball, scale=False, orient=False), **look)
-    arrows = by * (measured - seen.simulated[frame][there])
-    long = np.linalg.norm(arrows, axis=1) > 1.5 * radius
-    if long.any():
-        tails = pv.PolyData(measured[long] - arrows[long])
-        tails.point_data["arrow"], tails.point_data["error"] = arrows[long], error[long]
-        tails.point_data["length"] = np.linalg.norm(arrows[long], axis=1)
-        slim = pv.Arrow(tip_radius=0.1, shaft_radius=0.04)
-        stage.add(tails.glyph(geom=slim, scale="length", orient="arrow", factor=1.0), **look)
-
-
-def _add_outlines(stage: _Stage, measured: Floats, simulated: Floats, size: float) -> None:
-    ball = pv.Sphere(radius=0.0065 * size, theta_resolution=10, phi_resolution=10)
-    points = pv.PolyData(measured[:: -(-len(measured) // _OUTLINE)])
-    stage.add(points.glyph(geom=ball, scale=False, orient=False), color=MEASURED, **_LINE_ART)
-    tube = pv.lines_from_points(simulated, close=True).tube(radius=0.004 * size)
-    stage.add(tube, color=_SIMULATED, **_LINE_ART)
-
-
-def _add_probes(stage: _Stage, places: Floats, size: float) -> None:
-    diamond = pv.PlatonicSolid("octahedron", radius=0.009 * size)
-    points = pv.PolyData(places)
-    stage.add(points.glyph(geom=diamond, scale=False, orient=False), color="white", **_LINE_ART)
-
-
-# --- a sheet of them ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -299,9 +143,9 @@ def _panels(
 ) -> dict[_Cell, Pixels]:
     """Opened where the body has a cavity; markers, of which those on the part that is taken away
     would hang in the air, stand on the whole body then."""
-    stage, found = _Stage(scene.camera, scene.size), dict[_Cell, Pixels]()
+    stage, found = Stage(scene.camera, scene.size), dict[_Cell, Pixels]()
     plane = (scene.cut.normal, scene.cut.at * scene.cut.normal) if scene.cut else None
-    bodies = [_body(m.result.scene.mesh, m.nodes, plane) for m in scene.methods]
+    bodies = [rendered_body(m.result.scene.mesh, m.nodes, plane) for m in scene.methods]
     for cell, v in shown.items():
         method, whole = scene.methods[cell.method], plane is None or cell.by == _ERROR
         body = replace(bodies[cell.method], plane=None) if whole else bodies[cell.method]
@@ -309,19 +153,19 @@ def _panels(
         compared = cell.less is None and cell.by in (_DISPLACEMENT, _ERROR)
         inside = compared and method.markers is not None and method.markers.inside
         x = method.nodes + method.u()[cell.frame]
-        body.add(stage, x, v, spans[cell.scale], ramp, _THROUGH if inside else 1.0)
+        body.add(stage, x, v, spans[cell.scale], ramp, THROUGH if inside else 1.0)
         for tool in scene.tools:
-            solid = _triangulated(tool.nodes + tool.shifts[cell.frame], tool.triangles)
+            solid = triangulated(tool.nodes + tool.shifts[cell.frame], tool.triangles)
             if plane is not None and tool.plate and not whole:
                 solid = solid.clip(normal=plane[0], origin=plane[1])
-            stage.add(solid, **_TOOL)
+            stage.add(solid, **TOOL)
         if compared and whole and method.markers:
             top = spans[_ERROR][1]
-            _add_markers(stage, method.markers, cell.frame, scene.size, by, top)
+            add_markers(stage, method.markers, cell.frame, scene.size, by, top)
         if compared and method.probes is not None:
-            _add_probes(stage, method.probes[1][cell.frame], scene.size)
+            add_probes(stage, method.probes[1][cell.frame], scene.size)
         if compared and method.outlines and not (whole and plane):
-            _add_outlines(stage, *method.outlines[cell.frame], scene.size)
+            add_outlines(stage, *method.outlines[cell.frame], scene.size)
         found[cell] = stage.shot()
     stage.plotter.close()
     return found
@@ -483,7 +327,7 @@ class _Layout:
             ]
             each = count * self.across / len(both)
             for j, name in enumerate(both):
-                ramp: Colormap = _ERRORS if name == _ERROR else mpl.colormaps[
+                ramp: Colormap = ERRORS if name == _ERROR else mpl.colormaps[
                     "cividis" if name.startswith("difference") else "viridis"]  # fmt: skip
                 self._bar(figure, name, ramp, start * self.across + j * each, each, y)
             start += count
@@ -508,29 +352,3 @@ class _Layout:
         last.set_horizontalalignment("right")
         quantity = f"difference / {name.rpartition(' / ')[2]}" if name.startswith("diff") else name
         bar.set_label(quantity, fontsize=_POINTS, labelpad=1)
-
-
-# --- numbers at the nodes -------------------------------------------------------------------------
-
-
-def rendered(shown: NodeMap, span: Range) -> Picture:
-    """Return the map on the undeformed surface, from a camera that only the mesh moves."""
-    nodes = 1e3 * shown.mesh.nodes
-    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    seen_by = camera(nodes, np.array([0.0, 0.0, -1.0]), None, flat=False)
-    stage = _Stage(seen_by, size)
-    _body(shown.mesh, nodes).add(stage, nodes, values(shown), span, colours(span))
-    panel, said = stage.shot(), words(shown, span)
-    stage.plotter.close()
-
-    def paint(figure: Figure) -> None:
-        ax = figure.subplots()
-        high, wide = panel.shape[:2]
-        ax.imshow(panel, interpolation="lanczos", extent=(0, wide, 0, high))
-        ax.set_axis_off()
-        triad(ax, seen_by.away)
-        bar = ScalarMappable(Normalize(*span), colours(span))
-        figure.colorbar(bar, ax=ax, label=bar_title(shown), shrink=0.8)
-
-    pixels = draw(paint, 5.6, 4.3)
-    return Picture(f"map_{shown.name}", said, f"Render: {said}", pixels, photo=True)
