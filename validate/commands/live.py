@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.catalogue import reports_of
 from validate.commands.arguments import complain, pairs
 from validate.commands.display import relative, say, table
@@ -61,7 +60,11 @@ def run(
     }  # fmt: skip
     groups = {"due to force": done.late, "work": done.work,
               "work, changes of contact": done.work[done.changed > 0]}  # fmt: skip
-    said["times"] = {k: _quantiles(v) for k, v in groups.items() if len(v)}
+    names = (*(f"p{100 * q:g}" for q in QUANTILES), "max")
+    said["times"] = {
+        what: dict(zip(names, TickTimes(v).quantiles, strict=True)) | {"n": len(v)}
+        for what, v in groups.items() if len(v)
+    }  # fmt: skip
     said["largest_force"] = float(np.linalg.norm(done.F, axis=1).max()) if len(done.F) else None
     said["realtime"] = realtime
     if len(done.t):
@@ -85,11 +88,6 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun
         host, port = source.address
         complain(f"listens on {host} port {port} (UDP), see docs/how-to/live.md; Ctrl-C ends it")
         return live(made.stepper, source, seconds)
-
-
-def _quantiles(seconds: Floats) -> dict[str, float]:
-    names = (*(f"p{100 * q:g}" for q in QUANTILES), "max")
-    return dict(zip(names, TickTimes(seconds).quantiles, strict=True)) | {"n": len(seconds)}
 
 
 def _told(done: LiveRun, said: dict[str, Any]) -> None:

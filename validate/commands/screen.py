@@ -160,18 +160,13 @@ def check_passages(checks: Sequence[Json]) -> list[Passage]:
     for i, (verdict, members) in enumerate(groups.items()):
         title = f"Checks: {verdict}{', worst first' if len(members) > 1 else ''}"
         if i == 0:
-            title += f" ({_legend(ordered)})"
+            limits = {c["limit"] is not None for c in ordered}
+            one = "limit" if True in limits else "2 u_val"
+            title += f" ({legend('limit, or 2 u_val without one' if len(limits) > 1 else one)})"
         keep = 3 if i == 0 else 1
         more = "more, none of them worse: --verbose"
         passages.append(Passage(title, tuple(members), keep, 8, more))
     return passages
-
-
-def _legend(checks: Sequence[Json]) -> str:
-    limits = {c["limit"] is not None for c in checks}
-    if len(limits) > 1:
-        return legend("limit, or 2 u_val without one")
-    return legend("limit" if True in limits else "2 u_val")
 
 
 def _row(check: Json, *, several: bool) -> list[str]:

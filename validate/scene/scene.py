@@ -337,6 +337,9 @@ class Scene:
         """Return the scene on this mesh of its body: words become places, symmetry holds its
         planes."""
         held, places = tuple(getattr(self.body, "held", ())), getattr(self.body, "places", {})
+        # What does not lock in cells of this kind near nu = .5
+        unlocked: Dilatation = "nodal_mean" if mesh.order == 1 else "pointwise"
+        unlocked = "mixed" if mesh.bricks else unlocked
         sides = []  # one foundation for every place that is joined by "+"
         for f in self.foundations:
             joined = f.facets.split("+") if isinstance(f.facets, str) else [f.facets]
@@ -364,7 +367,7 @@ class Scene:
             contacts=tuple(
                 standing(c, mesh, getattr(self.body, "middle", ())) for c in placed(self.contacts)
             ),
-            dilatation=_unlocked(mesh) if self.dilatation == "by_element" else self.dilatation,
+            dilatation=unlocked if self.dilatation == "by_element" else self.dilatation,
             regions=tuple(_chosen(r, mesh, self.material) for r in self.regions),
             copies=self.copies * getattr(self.body, "copies", 1),
         )
@@ -519,13 +522,6 @@ def _placed(part: P, mesh: Mesh, places: Mapping[str, Place]) -> P:
         return part
     place = places[facets] if facets in places else place_of(facets, mesh)
     return replace(part, facets=place)  # type: ignore[type-var]
-
-
-def _unlocked(mesh: Mesh) -> Dilatation:
-    """What does not lock in cells of this kind near nu = .5."""
-    if mesh.bricks:
-        return "mixed"
-    return "nodal_mean" if mesh.order == 1 else "pointwise"
 
 
 def _each(cavity: Cavity, mesh: Mesh) -> tuple[Cavity, ...]:

@@ -195,9 +195,13 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
     except (NotImplementedError, RuntimeError) as error:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
+            instead = "decompress it first, as with `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
+            if "MPEG" in name or "HEVC" in name:
+                instead = ("they are a video: extract it, as with `gdcmraw -i x.dcm -o x.mp4`, and "
+                           "import that")  # fmt: skip
             raise UsageError(
                 f"its pixels are in '{name}', which no permissively licensed library decodes; "
-                f"{_unpacked_by(name)}"
+                f"{instead}"
             ) from None
         raise
 
@@ -209,13 +213,6 @@ def _codec(ds: pydicom.Dataset) -> str:
         import_module("gdcm")  # its absence is told with what to install
         return "gdcm"
     return "pillow" if syntax in (*JPEGTransferSyntaxes, *JPEG2000TransferSyntaxes) else ""
-
-
-def _unpacked_by(name: str) -> str:
-    """What a user can do about pixels in a transfer syntax of that name."""
-    if "MPEG" in name or "HEVC" in name:
-        return "they are a video: extract it, as with `gdcmraw -i x.dcm -o x.mp4`, and import that"
-    return "decompress it first, as with `dcmdjpeg x.dcm y.dcm` or `gdcmconv --raw`"
 
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:

@@ -254,13 +254,6 @@ def _even(block: TextBlock) -> TextBlock:
 # --- where tables begin and end ------------------------------------------------------------------
 
 
-def _poses(row: Sequence[str]) -> str:
-    """What to do with a trajectory without names."""
-    if not (len(row) == 8 and is_row(row, 8)):
-        return ""
-    return "; for poses over time, the line: # timestamp tx ty tz qx qy qz qw"
-
-
 def _blocks(split: Split) -> list[TextBlock]:
     lines, run = split.lines, split.run
     # Indices of the lines of names that rows follow: the nearest line of names above each.
@@ -274,10 +267,12 @@ def _blocks(split: Split) -> list[TextBlock]:
             top = -1
     if not tops or tops[0] > run:
         between = {"\t": " <tab> "}.get(split.separator, split.separator)
+        line, first = lines[run]
+        poses = "; for poses over time, the line: # timestamp tx ty tz qx qy qz qw"
         raise RecordingError(
-            f"the table at line {lines[run][0]} has no column names; add a line such as "
+            f"the table at line {line} has no column names; add a line such as "
             f"'{between.join(('Time (s)', 'Displacement (mm)', 'Force (N)'))}' above it"
-            f"{_poses(lines[run][1])}"
+            f"{poses if len(first) == 8 and is_row(first, 8) else ''}"
         )
     sizes = [_size(lines, tops, k) for k in range(len(tops))]
     least = min(MIN_ROWS, max(sizes))

@@ -290,20 +290,13 @@ def picked(role: str, column: Column, table: Table, said: Said | None) -> Pick:
     try:
         factor = si_factor(unit, QUANTITY[role])
     except RecordingError as error:
-        raise RecordingError(
-            f"column '{column.label}' as {role}: {error}; {_way_out(role, column)}"
-        ) from error
+        weight = (column.unit or "").lower()
+        fix = (f"if columns are swapped or the unit is wrong, give --map '{role}={column.label}:"
+               "UNIT' or another COLUMN")  # fmt: skip
+        if role == "force" and weight in ("g", "kg"):
+            fix = f"give --map 'force={column.label}:{weight}f'"
+        raise RecordingError(f"column '{column.label}' as {role}: {error}; {fix}") from error
     return Pick(role, column, unit, factor, table.numbers(column) * factor, said)
-
-
-def _way_out(role: str, column: Column) -> str:
-    weight = (column.unit or "").lower()
-    if role == "force" and weight in ("g", "kg"):
-        return f"give --map 'force={column.label}:{weight}f'"
-    return (
-        "if columns are swapped or the unit is wrong, give --map "
-        f"'{role}={column.label}:UNIT' or another COLUMN"
-    )
 
 
 def _same(a: Floats, b: Floats) -> bool:

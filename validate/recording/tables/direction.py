@@ -124,9 +124,14 @@ def signs(
                 "compression", f"{names} go negative, and tension is positive by convention"
             )
     if kind is None:
+        # A test that presses no plate on a whole face, by the names of its columns
+        neither = ("; a bent or an indented body is neither: give compression if the tool moves "
+                   "into it and answer experiment = body in `validate new`")  # fmt: skip
+        if not _NEITHER.search(f"{displacement.column.label} {force.column.label}"):
+            neither = ""
         raise UsageError(
             f"unclear whether compression or tension: '{displacement.column.label}' goes "
-            f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}{_of_neither(displacement, force)}"
+            f"{_way(d)}, '{force.column.label}' {_way(f)}; {ASK}{neither}"
         )
     if kind.name == "tension" and not kind.said and d + f < 0 and d * f >= 0:
         raise RecordingError(
@@ -137,15 +142,6 @@ def signs(
     written = "opposite signs" if d * f < 0 else f"{_way(d or f)} as written"
     why = f"{written} in a {kind.name} test"
     return Signs(wanted * (d or f) or 1, wanted * (f or d) or 1, why, kind)
-
-
-def _of_neither(displacement: Pick, force: Pick) -> str:
-    """What to say of a test that presses no plate on a whole face, by the names of its columns."""
-    text = f"{displacement.column.label} {force.column.label}"
-    if not _NEITHER.search(text):
-        return ""
-    return ("; a bent or an indented body is neither: give compression if the tool moves into it "
-            "and answer experiment = body in `validate new`")  # fmt: skip
 
 
 def excursion(x: Floats) -> int:

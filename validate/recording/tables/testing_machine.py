@@ -86,9 +86,11 @@ def check_derived(base: Pick, derived: Pick, divisor: float, lines: Sequence[int
     if base.unit_is_said:
         return f"{what} (unit given by --map, not checked)"
     if abs(abs(slope) - 1) > SCALE:
-        raise RecordingError(
-            f"{what} m{'2' if base.role == 'force' else ''}: {_cause(slope, base)}"
-        )
+        fix = f"give the true unit with --map '{base.role}={base.column.label}:UNIT'"
+        cause = f"expected 1: sizes and columns contradict each other; correct one or {fix}"
+        if power := _power_of_ten(abs(slope)):
+            cause = f"contradictory units (a factor of 1e{power:+d}); {fix}, or the true size"
+        raise RecordingError(f"{what} m{'2' if base.role == 'force' else ''}: {cause}")
     rest = np.abs(derived.values - start - slope * expected)
     # How far one row may be off: what most rows are off, at most a part of the range.
     extent = np.ptp(derived.values)
@@ -158,14 +160,6 @@ def check_height(displacement: Pick, closing: Floats, height: float) -> None:
             f"{height * 1e3:.4g} mm high: wrong unit or swapped columns; give the unit with "
             f"--map 'displacement={displacement.column.label}:UNIT'"
         )
-
-
-def _cause(slope: float, base: Pick) -> str:
-    fix = f"give the true unit with --map '{base.role}={base.column.label}:UNIT'"
-    power = _power_of_ten(abs(slope))
-    if power:
-        return f"contradictory units (a factor of 1e{power:+d}); {fix}, or the true size"
-    return f"expected 1: sizes and columns contradict each other; correct one or {fix}"
 
 
 def _power_of_ten(ratio: float) -> int:

@@ -143,21 +143,20 @@ def _power(study: Coverage) -> Exhibit:
     power = table("power", "Rate at which a wrong model differs", found, columns,
                   folded=len(found) > 30)  # fmt: skip
     title = "Errors of parameters that would be detected"
-    return Exhibit("power", title, words, (power,), tuple(_charts(study)))
+    # All checks together by parameter, then each check; the perfect model at 0 %
+    charts = []
+    for t in study.together:
+        charts.append(_chart(study, t.method, None, t.share))
+        charts += [
+            _chart(study, t.method, q.stated.name, q.share) for q in study.quantities
+            if q.method == t.method and q.finding.word != "no evidence" and t.checks > 1
+        ]  # fmt: skip
+    return Exhibit("power", title, words, (power,), tuple(charts))
 
 
 def _share_at(by: float, powers: Sequence[Power]) -> float | None:
     """The share where the parameter is wrong by so much."""
     return next((p.share.value for p in powers if p.by == by and p.share), None)
-
-
-def _charts(study: Coverage) -> Iterator[Chart]:
-    """All checks together by parameter, then each check; the perfect model at 0 %."""
-    for t in study.together:
-        yield _chart(study, t.method, None, t.share)
-        for q in study.quantities:
-            if q.method == t.method and q.finding.word != "no evidence" and t.checks > 1:
-                yield _chart(study, t.method, q.stated.name, q.share)
 
 
 def _chart(study: Coverage, method: str, name: str | None, perfect: Share) -> Chart:

@@ -139,21 +139,19 @@ def quantity(given: Given, stated: Stated, records: Sequence[Draws], whole: bool
     known = [u for u in judged.u_val if u is not None]
     errors = np.array([e for e in judged.E if e is not None])
     off = {k: v for r in records for k, v in r.off.items()}
+    if stated.fitted:
+        finding = Finding("no evidence", None, stated.fitted)
+    elif None in stated.numerical.values():
+        finding = Finding("no answer", None, f"nothing bounds u_num: {stated.words}")
+    else:
+        finding = find_fault(share, terms)
     return Quantity(
         given.method, stated, share, undecided, rejected, false_good, false_bad, terms,
-        _finding(stated, share, terms), judged,
+        finding, judged,
         float(np.sqrt(np.mean(errors**2))) if len(errors) else 0.0,
         float(np.median(known)) if known else None,
         off.get(stated.name) if given.steps and not whole else None,
     )  # fmt: skip
-
-
-def _finding(stated: Stated, share: Share, terms: tuple[Term, ...]) -> Finding:
-    if stated.fitted:
-        return Finding("no evidence", None, stated.fitted)
-    if None in stated.numerical.values():
-        return Finding("no answer", None, f"nothing bounds u_num: {stated.words}")
-    return find_fault(share, terms)
 
 
 def _terms_shown(

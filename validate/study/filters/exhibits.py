@@ -131,7 +131,15 @@ _MOST = 60  # picks shown; cells.csv and results.json have all
 def chosen_exhibits(study: FilterStudy) -> Iterator[Exhibit]:
     """Nested choices, and the ranking without truth beside the one with it."""
     unit = shown_unit(_chosen_exhibits_unit(study))[1]
-    rows = [row for r in study.rankings if r.nested for row in _nested_rows(r)]
+    rows: list[tuple[Entry, ...]] = []
+    for ranking in study.rankings:
+        if (nested := ranking.nested) is None:
+            continue
+        condition, total = named(ranking.condition), sum(nested.chosen.values())
+        often = sorted(nested.chosen.items(), key=lambda one: -one[1])[:_OFTEN]
+        times = ", ".join(f"{setting} {count} of {total}" for setting, count in often)
+        rows.append((condition, "the chosen setting", nested.error.mean, nested.error.half, times))
+        rows += [(condition, name, e, None, None) for name, e in nested.beside.items()]
     if rows:
         head = ("condition", "what", f"error / {unit}", f"± 95 % / {unit}", "times chosen")
         title = "Setting chosen on some blocks and markers, error reported on the others"
@@ -160,16 +168,6 @@ def chosen_exhibits(study: FilterStudy) -> Iterator[Exhibit]:
 def _chosen_exhibits_unit(study: FilterStudy) -> str:
     first = next(r for ranking in study.rankings for r in ranking.rows)
     return study.unit if first.result.sums(study.by) is not None else "m"
-
-
-def _nested_rows(ranking: Ranking) -> Iterator[tuple[Entry, ...]]:
-    nested, condition = ranking.nested, named(ranking.condition)
-    assert nested is not None
-    total = sum(nested.chosen.values())
-    often = sorted(nested.chosen.items(), key=lambda one: -one[1])[:_OFTEN]
-    times = ", ".join(f"{setting} {count} of {total}" for setting, count in often)
-    yield condition, "the chosen setting", nested.error.mean, nested.error.half, times
-    yield from ((condition, name, e, None, None) for name, e in nested.beside.items())
 
 
 def chosen_line(nested: Nested, study: FilterStudy) -> str:
@@ -397,20 +395,16 @@ def _pareto_exhibit(study: FilterStudy) -> Exhibit:
         table(f"pareto_{i}", f"Pareto front{_under(r)}, {title}", r.front, columns)
         for i, r in enumerate(shown, start=1)
     )
-    words = tuple(s for r in shown for s in _dominated(r))
-    return Exhibit("pareto", "Error against time per step", words, tables, charts)
-
-
-def _dominated(ranking: Ranking) -> Iterator[str]:
-    """One sentence naming the methods that are nowhere on the front."""
-    methods = dict.fromkeys(r.cell.name for r in ranking.rows)
-    front = {r.cell.name for r in ranking.front}
-    beaten = [m for m in methods if m not in front]
-    if beaten:
-        yield (
-            f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times "
-            f"within a factor of {SAME_TIME:g} count as equal, because step times are noisy."
-        )
+    words = []  # a sentence naming the methods that are nowhere on the front
+    for ranking in shown:
+        methods = dict.fromkeys(r.cell.name for r in ranking.rows)
+        front = {r.cell.name for r in ranking.front}
+        if beaten := [m for m in methods if m not in front]:
+            words.append(
+                f"Dominated{_under(ranking)}, at every setting tried: {', '.join(beaten)}. Times "
+                f"within a factor of {SAME_TIME:g} count as equal, because step times are noisy."
+            )
+    return Exhibit("pareto", "Error against time per step", tuple(words), tables, charts)
 
 
 def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:

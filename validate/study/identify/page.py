@@ -1,6 +1,6 @@
 """Report of an identification: page, sentence, values, profiles and part of results.json."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -78,12 +78,16 @@ def _of(one: Calibrated) -> Exhibit:
          f.evaluations, "converged" if f.converged else f"did not: {f.why}")
         for i, f in enumerate(found.fits)
     )  # fmt: skip
+    heats = (
+        Heat(f"correlations_{method}", "Correlations of the estimates", "parameter", "parameter",
+             found.space.names, found.space.names, found.correlations, "correlation / 1", 0.0),
+    ) if len(found.space.names) > 1 else ()  # fmt: skip
     starts = NumberTable(
         f"starts_{method}", "Result of every start", head, rows, below="ended", folded=True
     )
     return Exhibit(
         f"profiles_{method}", f"Profiles, {method}", words, (starts,), charts,
-        heats=tuple(_correlations(one)),
+        heats=heats,
     )  # fmt: skip
 
 
@@ -102,16 +106,6 @@ def _profile(one: Calibrated, e: Profiled) -> Chart:
         f"profile_{method}_{e.name.replace('.', '_')}", f"{e.name}: profile", label,
         "rise of chi-square / 1", (line, points), (("95 %", RISE),), caption=f"{verdict(e)}.",
     )  # fmt: skip
-
-
-def _correlations(one: Calibrated) -> Iterator[Heat]:
-    """None of a single parameter."""
-    names = one.found.space.names
-    if len(names) > 1:
-        yield Heat(
-            f"correlations_{one.problem.calibration.method}", "Correlations of the estimates",
-            "parameter", "parameter", names, names, one.found.correlations, "correlation / 1", 0.0,
-        )  # fmt: skip
 
 
 def _si(one: Calibrated) -> list[str]:

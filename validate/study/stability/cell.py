@@ -4,7 +4,7 @@ Radii, measured and predicted limits, condition numbers, locking, rounding and d
 line for which the variant is refused.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -101,6 +101,12 @@ def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
         values = eigvalsh(matrix)
         if values[0] > 0:
             conditions[name] = float(values[-1] / values[0])
+    # Schemes whose map knows its state: at half their limit, or at the paper's step
+    drifts = []
+    for s in schemes if cell.drift else ():
+        if s.name not in ("modal", "quasi_static"):
+            h = _DRIFT_SHARE * s.limit(system) if s.limit else base.dt
+            drifts.append(drift(s, h, modes[s.mass]))
     return Stepped(
         unknowns=len(system.free),
         lowest=float(modes["consistent"][0]),
@@ -109,7 +115,7 @@ def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
         conditions=conditions,
         locking=bench.locking(v),
         rounding=rounding(pulled, limit),
-        drifts=tuple(_drifts(base, system, schemes, modes)) if cell.drift else (),
+        drifts=tuple(drifts),
         warning="; ".join(f"{one.cause}: {one.where}" for one in locking_of(system.scene)),
     )
 
@@ -153,16 +159,6 @@ def _locking(pulled: Scene) -> float | None:
     system = build(pulled)
     f = system.loads[system.free, 0]
     return float(f @ system.factor().solve(f)) / mixed
-
-
-def _drifts(
-    base: StabilityBody, system: System, schemes: tuple[Stepping, ...], modes: dict[str, Floats]
-) -> Iterable[Drift]:
-    """Schemes whose map knows its state: at half their limit, or at the paper's step."""
-    for s in schemes:
-        if s.name not in ("modal", "quasi_static"):
-            h = _DRIFT_SHARE * s.limit(system) if s.limit else base.dt
-            yield drift(s, h, modes[s.mass])
 
 
 # --- kept ----------------------------------------------------------------------------------------

@@ -36,10 +36,16 @@ _BEYOND = {"nu": ("nu", 0.5, True), "E": ("E", 0.0, False), "quality": ("quality
 def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions: does it hold, where am I, where is the border, why."""
     maps = tuple(m for name in _LABELS if (m := _map(study, name)) is not None)
+    words = (
+        f"Base: {study.base.words}; {_described(study.base.base)}. One quantity is changed at a "
+        "time here; pairs are in tables/cells.csv.",
+        "Stable means that nothing grows, not that the motion is accurate. 'Too large to "
+        "resolve' means fewer than ten steps in the slowest period.",
+    )
     return (
         _claims(study),
         *((_papers(study),) if study.base.papers else ()),
-        Exhibit("maps", "Stability limits of all schemes", tuple(_map_words(study)), regimes=maps),
+        Exhibit("maps", "Stability limits of all schemes", words, regimes=maps),
         _limits(study),
         _conditions(study),
         _drifts(study),
@@ -96,17 +102,6 @@ def _of_paper(
 
 
 # --- maps ----------------------------------------------------------------------------------------
-
-
-def _map_words(study: Stability) -> Iterator[str]:
-    yield (
-        f"Base: {study.base.words}; {_described(study.base.base)}. One quantity is changed at a "
-        "time here; pairs are in tables/cells.csv."
-    )
-    yield (
-        "Stable means that nothing grows, not that the motion is accurate. 'Too large to "
-        "resolve' means fewer than ten steps in the slowest period."
-    )
 
 
 def _map(study: Stability, name: str) -> RegimeMap | None:

@@ -6,7 +6,7 @@ those of their quarrel over memory.
 
 import platform
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -338,10 +338,9 @@ def _field_seconds(stepper: Stepper, inputs: Floats) -> float:
     state = stepper.step(stepper.rest(), inputs)
     if state.failure:
         return 0.0
-    return float(np.median([_timed(lambda: stepper.field(state)) for _ in range(_FIELDS)]))
-
-
-def _timed(call: Callable[[], object]) -> float:
-    start = perf_counter()
-    call()
-    return perf_counter() - start
+    seconds = []
+    for _ in range(_FIELDS):
+        start = perf_counter()
+        stepper.field(state)
+        seconds.append(perf_counter() - start)
+    return float(np.median(seconds))
