@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from importlib.metadata import PathDistribution
@@ -11,7 +12,7 @@ import pytest
 
 from validate.catalogue import experiment_files, shipped
 
-# Kernels are compiled anew in every copy of the package: minutes where the cores are shared.
+# Kernels that this clone never ran are compiled in the copy: minutes where the cores are shared.
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheel"), pytest.mark.timeout(600)]
 
 
@@ -24,7 +25,20 @@ def installed(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> P
          "--no-build-isolation", "--target", str(site), str(project_root)],
         check=True, timeout=200,
     )  # fmt: skip
+    carry_kernels(project_root / "validate", site / "validate")
     return site
+
+
+def carry_kernels(ours: Path, copy: Path) -> None:
+    """Compiled loops, which are those of the same files: numba knows them by size and time."""
+    for source in ours.rglob("*.py"):
+        if (copied := copy / source.relative_to(ours)).is_file():
+            when = source.stat()
+            os.utime(copied, ns=(when.st_atime_ns, when.st_mtime_ns))
+    for code in ours.rglob("__pycache__/*.nb[ci]"):
+        to = copy / code.relative_to(ours)
+        to.parent.mkdir(exist_ok=True)
+        shutil.copyfile(code, to)
 
 
 def called(site: Path, cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -67,7 +81,7 @@ def test_every_shipped_experiment_is_listed_from_an_empty_folder(
 
 
 def test_every_shipped_recording_is_found(installed: Path, tmp_path: Path) -> None:
-    """Those of all experiments but the one whose logs are made by others, which says so."""
+    """Those of all experiments but the two whose data are made by others and lie elsewhere."""
     script = """
 import sys, validate
 from pathlib import Path
@@ -76,7 +90,7 @@ from validate.pipeline.experiment.find import load_file
 print(validate.__file__)
 for path in experiment_files(Path.cwd()).values():
     e = load_file(path)
-    if e.name != "ecoflex_cylinder":
+    if e.name not in ("ecoflex_cylinder", "gel_indentation"):
         print(e.name, len(e.load(e.parameters, path.parent)))
 """
     done = subprocess.run(
@@ -86,7 +100,7 @@ for path in experiment_files(Path.cwd()).values():
     assert done.returncode == 0, done.stderr
     home, *lines = done.stdout.splitlines()
     assert home == str(installed / "validate" / "__init__.py")
-    assert len(lines) == len(experiment_files(shipped())) - 1
+    assert len(lines) == len(experiment_files(shipped())) - 2
     assert all(int(line.split()[1]) >= 1 for line in lines)
 
 
@@ -99,8 +113,8 @@ def test_a_run_from_an_empty_folder_reports_there(installed: Path, tmp_path: Pat
 
 
 def test_a_check_from_an_empty_folder_holds(installed: Path, tmp_path: Path) -> None:
-    done = called(installed, tmp_path, "check", "kf_cube", "--json")
+    done = called(installed, tmp_path, "check", "bending_rod", "--json")
     assert done.returncode == 0, done.stderr
     (found,) = json.loads(done.stdout)
-    assert (found["experiment"], found["holds"]) == ("kf_cube", True)
+    assert (found["experiment"], found["holds"]) == ("bending_rod", True)
     assert [p.relative_to(tmp_path) for p in tmp_path.glob("*/*")] == [Path("reports/published")]

@@ -5,7 +5,6 @@ tolerance.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,13 +15,13 @@ from experiments.ekf_cube.tables import readings_table
 from validate.compare.result import MethodResult, Result
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
-from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import folder_of
 from validate.scene.geometries.box import box
 from validate.scene.scene import Scene
 
-pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
+# A shipped experiment as it is replayed; its first test waits for the whole run.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 STEP = (
     0.29447e-3  # s, critical on the shipped mesh (ours); an earlier study's is 0.24 ms on its own
@@ -41,18 +40,9 @@ def scene(cube: Experiment) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def printed(cube: Experiment) -> Result:
-    """The paper's step and filter on the recorded case."""
-    names = ("nfem", "nfem_printed", "nfem_printed_run", "ekf_printed", "ekf_held")
-    return run_in_memory(cube, {}, names, quick=True)
-
-
-@pytest.fixture(scope="module")
-def stiff(cube: Experiment) -> Result:
-    """Models 25 % stiffer than the truth, node A seen at 200 Hz."""
-    case = next(c for c in cube.cases if c.name == "stiff_model_200Hz")
-    names = ("nfem", "ekf_companion", "reduced_modes")
-    return run_in_memory(replace(cube, cases=(case,)), {}, names)
+def printed(whole: Callable[[str], Result]) -> Result:
+    """The paper's step and filter on the recorded case, and models 25 % stiffer than the truth."""
+    return whole("ekf_cube")
 
 
 def of(result: Result, name: str) -> MethodResult:
@@ -128,22 +118,22 @@ def test_table_1_stands_beside_ours_and_is_not_called_reproduced(printed: Result
     assert all(f.ours is not None and f.theirs is not None for f in figures)
 
 
-def test_only_a_reduced_filter_corrects_a_node_that_nobody_measures(stiff: Result) -> None:
+def test_only_a_reduced_filter_corrects_a_node_that_nobody_measures(printed: Result) -> None:
     """An earlier study: node-level filters transfer nothing, 20 modes and a load bias do. Ours
     leave .87 and .34 of the plain error under a ramp."""
-    plain = scores(stiff, "nfem")["node_B.rmse@stiff_model_200Hz"]
-    node = scores(stiff, "ekf_companion")["node_B.rmse@stiff_model_200Hz"]
-    reduced = scores(stiff, "reduced_modes")["node_B.rmse@stiff_model_200Hz"]
+    plain = scores(printed, "nfem")["node_B.rmse@stiff_model_200Hz"]
+    node = scores(printed, "ekf_companion")["node_B.rmse@stiff_model_200Hz"]
+    reduced = scores(printed, "reduced_modes")["node_B.rmse@stiff_model_200Hz"]
     assert node > 0.8 * plain
     assert reduced < 0.45 * plain
 
 
-def test_the_accepted_filter_decides_and_does_not_claim_too_much(stiff: Result) -> None:
+def test_the_accepted_filter_decides_and_does_not_claim_too_much(printed: Result) -> None:
     """Its claim at B, part of u_val, is below the limit and above its error (NEES below 1)."""
-    (check,) = of(stiff, "reduced_modes").checks
+    (check,) = of(printed, "reduced_modes").checks
     assert check.verdict == "same model"
     assert 0.5e-5 < check.u_input < 1.5e-5  # ours: .012 mm of the limit's .03
-    found = scores(stiff, "reduced_modes")
+    found = scores(printed, "reduced_modes")
     assert 0.05 < found["node_B.nees.per_dof"] < 1
     assert 0.05 < found["node_B.nees.per_dof@stiff_model_200Hz"] < 1
 
@@ -158,7 +148,6 @@ def test_readings_of_the_force_are_totals_or_per_node(cube: Experiment, scene: S
     assert rows["consistent"][-1] == "finished"
 
 
-@pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     result = whole("ekf_cube")
     assert result.passed

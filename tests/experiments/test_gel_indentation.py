@@ -6,15 +6,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from beside import experiment
+from beside import beside, experiment
 from scipy.io import savemat
 
 from experiments.gel_indentation import box as box_module
 from experiments.gel_indentation import particles as pair_module
 from experiments.gel_indentation import poisson_ratio as between_module
 from experiments.gel_indentation.box import FACES, GelBoxes, _axis, load, stated
-from experiments.gel_indentation.particles import motion, side_of
+from experiments.gel_indentation.particles import checked_links, motion, side_of
 from experiments.gel_indentation.poisson_ratio import RATIOS, best_ratio, solved
+from validate.compare.exhibit import NumberTable
 from validate.errors import RecordingError, RegistrationError, UsageError
 from validate.parameters import with_values
 from validate.pipeline.experiment.options import Options
@@ -63,6 +64,9 @@ def test_another_pair_is_linked_in_the_scale_that_is_said(tmp_path: Path) -> Non
     assert int(told["linked"]) > 2700
     x, u = motion(recording)
     assert u[:, 2].min() == pytest.approx(-20 * 0.5e-6, rel=0.2)
+    files = (folder / "one.mat", folder / "two.mat")
+    *_, linked, backward, otherwise, known, wrong = checked_links(recording, files, 0.5e-6).rows[-1]
+    assert (linked > 90, backward > 98, otherwise < 1, known > 80, wrong < 1) == (True,) * 5
     ends = stated(recording)
     assert ends["body.x"] == pytest.approx(75e-6, abs=15e-6)
     assert ends["body.bottom"] < ends["body.middle"] < ends["body.top"] < x[:, 2].max()
@@ -126,6 +130,9 @@ def test_the_upper_box_is_predicted_by_the_lower_one(
 ) -> None:
     """Ratios of the error to the floor; aims: 1.5 in the lower box, 2.2 in the upper one."""
     monkeypatch.setenv("VALIDATE_SHARED_DATA", str(shared_data))
+    # The links are checked on a smaller pair: on this one it takes a sixth of the time.
+    none = NumberTable("links", "Links", ("z (µm)",), ())
+    monkeypatch.setattr(beside("gel_indentation", "exhibits"), "checked_links", lambda *_: none)
     result = compare(experiment("gel_indentation"), Options({}))
     (nu,) = (s for s in result.identified if s.name == "material.nu")
     assert 0.44 < nu.value < 0.49

@@ -5,25 +5,23 @@ Numbers are those of an earlier study of the paper. Its wrong model is 20 % stif
 the range: noise in NRMSE is 1/1.2 of that study's, the models' own error is not.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from beside import beside, experiment
+from beside import experiment
 
 from validate.compare.result import MethodResult, Result
 from validate.errors import UsageError
-from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options, folder_of
 from validate.pipeline.run.pipeline import compare as compare_with
 
-pytestmark = pytest.mark.slow  # a shipped experiment as it is replayed
+# A shipped experiment as it is replayed; its first test waits for the whole run.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
-SOME = ("fem", "kf_printed", "kf_load", "load_scale")
-# Of methods that are left out.
+# Of speed.
 TIMED = ("FEM step over filter step", "step of FEM", "step of KF-FEM", "rate of KF-FEM")
 PROBES = ("node_A", "node_B", "corner")
 
@@ -34,17 +32,8 @@ def cube() -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def some(cube: Experiment) -> Iterator[Result]:
-    """Four methods, one wrong model, few output frames, and 50 seeds for the printed Q only."""
-    methods = {name: cube.methods[name] for name in SOME}
-    reduced = replace(
-        cube, methods=methods, accepted=("fem",), cases=cube.cases[:1], frames=10,
-        published=tuple(f for f in cube.published if f.name not in TIMED),
-    )  # fmt: skip
-    seeds = beside("kf_cube", "seeds")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(seeds, "VARIANCES", (seeds.PRINTED,))
-        yield run_in_memory(reduced)
+def some(whole: Callable[[str], Result]) -> Result:
+    return whole("kf_cube")
 
 
 def of(result: Result, name: str) -> MethodResult:
@@ -120,7 +109,6 @@ def test_noise_along_the_load_and_two_states_correct_every_node(some: Result) ->
     assert nrmse(some, "load_scale", "@stiff_model") == pytest.approx([0.0028 / 1.2] * 3, abs=1e-3)
 
 
-@pytest.mark.timeout(900)
 def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     result = whole("kf_cube")
     assert result.passed

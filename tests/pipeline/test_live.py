@@ -57,8 +57,11 @@ from validate.solve.types import State
 
 
 @pytest.fixture(autouse=True)
-def _collected() -> None:
-    """A loop collects garbage before it starts: not of all that this process has imported."""
+def _collected() -> Iterator[None]:
+    """A loop collects garbage before it starts, and has all of it looked at from then on: not what
+    this process has imported, or thousands of tests."""
+    gc.freeze()
+    yield
     gc.freeze()
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 from html import unescape
 from html.parser import HTMLParser
 
@@ -32,6 +33,12 @@ def made(result: Result) -> tuple[dict[str, DrawnExhibit], str]:
     )
 
 
+@cache
+def small() -> tuple[dict[str, DrawnExhibit], str]:
+    """The small result, drawn once: it is frozen."""
+    return made(small_result())
+
+
 def empty(result: Result) -> str:
     return page(result, (), CREATED, band(result))
 
@@ -54,7 +61,7 @@ class _Tags(HTMLParser):
 
 
 def test_self_contained_and_well_formed() -> None:
-    _, text = made(small_result())
+    _, text = small()
     tags = _Tags()
     tags.feed(text)
     assert tags.open == []
@@ -67,7 +74,7 @@ def test_self_contained_and_well_formed() -> None:
 
 def test_the_body_and_all_checks_stand_first_and_once() -> None:
     """Before the contents, whose sections link to them."""
-    _, text = made(small_result())
+    _, text = small()
     head = text[: text.index("<nav")]
     for name in ("body", "intervals_limits"):
         if f'id="figure-{name}"' in text:
@@ -81,7 +88,7 @@ def test_the_body_and_all_checks_stand_first_and_once() -> None:
 
 @pytest.mark.slow
 def test_sections_of_a_recording_with_force_only() -> None:
-    found, _ = made(small_result())
+    found, _ = small()
     assert set(found) == {
         "checks", "curves", "discrimination", "body", "methods", "published", "identified",
         "scores", "recording", "parameters",
@@ -96,7 +103,7 @@ def test_sections_when_nothing_finished() -> None:
 
 @pytest.mark.slow
 def test_all_recordings_are_drawn() -> None:
-    found, _ = made(small_result())
+    found, _ = small()
     level, off = found["curves"].exhibit.charts
     labels = [s.name for s in level.series if s.style == "points"]
     assert labels == ["measured, cube_a", "measured, cube_b"]
@@ -148,13 +155,13 @@ def test_first_sections_of_an_experiment_are_open_and_all_of_a_study() -> None:
 
 
 def test_names_are_escaped() -> None:
-    _, text = made(small_result())
+    _, text = small()
     assert "soft <cube>" not in text
     assert "A cube &lt;between&gt; plates" in text
 
 
 def test_every_picture_has_words_and_units() -> None:
-    found, text = made(small_result())
+    found, text = small()
     pictures = [p for s in found.values() for p in s.pictures if p.name != "intervals_limits"]
     assert pictures  # the checks are lines of text
     assert len(re.findall(r"<img [^>]*alt=\"[^\"]+\"", text)) == len(pictures)
@@ -162,7 +169,7 @@ def test_every_picture_has_words_and_units() -> None:
 
 
 def test_check_row_shows_two_u_val_and_its_parts() -> None:
-    found, _ = made(small_result())
+    found, _ = small()
     table, declared, sampled = found["checks"].exhibit.tables
     assert declared.rows == (("modulus", "within 5 %", "assumed"),)
     assert [shown(entry) for entry in sampled.rows[0]] == [
@@ -176,7 +183,7 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
 
 
 def test_sentences_say_what_can_and_cannot_be_told_apart() -> None:
-    found, _ = made(small_result())
+    found, _ = small()
     first, second = found["discrimination"].exhibit.words
     assert "can distinguish it, by force.plate" in first
     assert "cannot be distinguished" in second

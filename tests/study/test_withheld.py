@@ -298,6 +298,7 @@ def test_a_filter_that_does_not_know_its_error_gives_no_interval(
     assert (check.u_input > 0) == used
 
 
+@pytest.mark.slow
 def test_a_measured_recording_is_ranked_on_blocks_and_other_markers(
     shared_data: Path, tmp_path: Path
 ) -> None:

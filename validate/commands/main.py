@@ -235,7 +235,7 @@ def check(names: tuple[str, ...], workers: int | None, **options: Any) -> int:
 
     \b
     Example:
-      validate check kf_cube
+      validate check bending_rod
     """
     with _pool(workers) as pool:
         from validate.commands import check as checking

@@ -380,7 +380,9 @@ class Body:
     def _blocks(self, u: Floats) -> Iterator[_Block]:
         """The cells, material by material, block by block."""
         d = self.mesh.dimension
-        nodal = np.pad(u.reshape(-1, d), [(0, 0), (0, 3 - d)])
+        nodal = u.reshape(-1, d)
+        if d < 3:
+            nodal = np.pad(nodal, [(0, 0), (0, 3 - d)])
         for part, law, kappa in self.parts:
             local = np.swapaxes(nodal[self.mesh.cells[part]], 1, 2)
             if self.lag is not None:
