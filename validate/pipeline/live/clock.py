@@ -127,6 +127,15 @@ def _behind() -> int:
     return os.sched_get_priority_min(os.SCHED_FIFO)
 
 
+def _first_too(threads: tuple[int, ...]) -> None:
+    """The stepper's own threads behind the loop and before all others, where the loop is first."""
+    if not (threads and hasattr(os, "sched_getscheduler")):
+        return
+    if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO:
+        for thread in threads:
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_behind()))
+
+
 def live(
     stepper: HandStepper,
     source: Places,
@@ -136,11 +145,7 @@ def live(
 ) -> LiveRun:
     """Run until the source ends, or for so many seconds; an interruption ends it, too."""
     stepper.warm()
-    # The stepper's own threads behind the loop and before all others, where the loop is first
-    if stepper.threads and hasattr(os, "sched_getscheduler"):
-        first = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO
-        for thread in stepper.threads if first else ():
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_behind()))
+    _first_too(stepper.threads)
     kept, skipped = _Ticked(), 0
     with quiet():
         try:
