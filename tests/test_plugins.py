@@ -280,6 +280,24 @@ READER = Reader("odd", "an odd file", fails, fails, "nothing")
     ]
 
 
+def test_a_reader_may_leave_the_clocks_of_its_streams_out(tmp_path: Path) -> None:
+    module = """
+import numpy as np
+from validate.recording.reader import Reader
+from validate.recording.types import Recording, Signal, Source
+def read(path, given):
+    force = Signal(np.arange(5.0), np.zeros((5, 1)), "N", 0.1, "machine")
+    source = Source(str(path), "", 0, "made here")
+    return Recording("gauge", source, 0, signals={"force": force})
+READER = Reader("gauge", "a gauge", lambda p: p.suffix == ".gauge", read, "its ending")
+"""
+    package(tmp_path / "site", "gauge", "[validate.readers]\ngauge = gauge:READER\n", module)
+    (tmp_path / "pull.gauge").write_text("five samples")
+    code, out, err = called("inspect", "pull.gauge", site=tmp_path / "site", cwd=tmp_path)
+    assert (code, err) == (0, "")
+    assert "force" in out
+
+
 @pytest.mark.parametrize("kind", ["plates", "body"])
 def test_a_new_experiment_has_its_law_with_its_coefficients(
     site: Path, tmp_path: Path, kind: str

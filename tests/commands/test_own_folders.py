@@ -30,6 +30,7 @@ def own(tmp_path: Path) -> Path:
         "leaves": RUNS.format(then="raise SystemExit"),
         "unread": "EXPERIMENT = (",
         "helper": RUNS.format(then="").replace("EXPERIMENT", "OTHER"),
+        "dotless": RUNS.format(then="from helper import OTHER"),
     }
     for name, text in texts.items():
         (folder / f"{name}.py").write_text(text, "utf-8")
@@ -66,6 +67,7 @@ def test_one_of_the_users_hiding_a_shipped_one_is_said(own: Path) -> None:
         ("leaves", "leaves.py, line 3: SystemExit"),
         ("unread", "'(' was never closed (unread.py, line 1)"),
         ("helper", "defines no EXPERIMENT"),
+        ("dotless", "is imported with a dot: `from .helper import ...`"),
     ],
 )
 @pytest.mark.parametrize("command", [["list"], ["run"], ["check"], ["study", "stability"]])

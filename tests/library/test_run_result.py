@@ -20,7 +20,9 @@ from validate.errors import UsageError
 from validate.library import load
 from validate.library.run_result import RunResult
 from validate.pipeline import run_in_memory
+from validate.recording.types import Recording, Signal, Source
 from validate.report.stored.store import document
+from validate.study.stored_runs.overview import write_overview
 
 pytestmark = pytest.mark.xdist_group("library")
 
@@ -170,6 +172,38 @@ def test_a_run_that_was_replaced_says_so(ran: RunResult) -> None:
 def test_what_is_no_run_is_refused(tmp_path: Path, ran: RunResult) -> None:
     with pytest.raises(UsageError, match="no stored run at"):
         validate.open_run(tmp_path)
+    overview = write_overview(ran.folder.parent).parent
+    with pytest.raises(UsageError, match="not a run"):
+        validate.open_run(overview)
+
+
+def test_words_of_another_kind_are_refused_before_a_run() -> None:
+    with pytest.raises(UsageError, match="list of names"):
+        validate.run("kf_cube", methods="fem")
+    with pytest.raises(UsageError, match="values by path"):
+        validate.run("kf_cube", set="E=3")  # type: ignore[arg-type]
+
+
+def test_a_view_of_others_that_cannot_be_filled_costs_a_warning(ran: RunResult) -> None:
+    code = (
+        "import sys, validate; from validate.report import VIEWS, View\n"
+        "VIEWS.add(View('mine', 'Mine', {'part': 'score'}, form='points', x='condition',"
+        " by='label'))\n"
+        "print(*validate.open_run(sys.argv[1]).plot)"
+    )
+    command = [sys.executable, "-c", code, str(ran.folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == list(ran.plot)
+    assert "'mine' (views) is not asked further" in done.stderr
+
+
+def test_streams_below_another_stream_have_nodes_of_their_own() -> None:
+    t = np.arange(3.0), np.arange(5.0)
+    source = Source("a.mcap", "", 0, "made here")
+    signals = {name: Signal(at, np.zeros((len(at), 1)), "N", 0.1, "machine")
+               for name, at in zip(("force", "force/raw/x"), t, strict=True)}  # fmt: skip
+    tree = Recording("two", source, 0, signals=signals).to_xarray()
+    assert {name: len(tree[name].time) for name in tree.children} == {"force": 3, "force.raw.x": 5}
 
 
 def test_import_is_light_and_functions_are_also_packages() -> None:

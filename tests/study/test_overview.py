@@ -65,6 +65,16 @@ def test_a_first_run_with_other_parameters_is_told_beside_the_declared_one(repor
     assert changed["cone+E"] == "first run"  # of which no declared run is stored
 
 
+def test_pages_over_several_runs_and_of_studies_are_linked(reports: Path) -> None:
+    for place in ("summary", "cube/study-choose"):
+        (reports / place).mkdir()
+        (reports / place / "report.html").write_text("a page")
+    text = write_overview(reports).read_text("utf-8")
+    assert 'href="../summary/report.html"' in text
+    assert 'href="../cube/study-choose/report.html"' in text
+    assert "../published" not in text
+
+
 def test_shares_of_limits_over_the_runs_are_a_curve(reports: Path) -> None:
     write_overview(reports)
     with (reports / "overview" / "tables" / "chart_trend.csv").open() as file:

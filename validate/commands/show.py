@@ -15,8 +15,7 @@ from validate.report.long_table import LongTable
 from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.views.drawers import drawable, save, terminal
-from validate.report.views.standard import VIEWS
-from validate.report.views.view_filling import filled
+from validate.report.views.view_filling import filled_views
 from validate.study.stored_runs.score_comparison import read_table
 
 
@@ -56,8 +55,8 @@ def folder_of(run: str, reports: Path | None) -> Path:
 
 def shown_of(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:
     """Name, form and content of views that have rows, then of the run's own tables and charts."""
-    for view in (*VIEWS, *(View.from_json(v) for v in table.head.get("views", ()))):
-        found = filled(view, table)
+    own = (View.from_json(v) for v in table.head.get("views", ()))
+    for view, found in filled_views(table, own):
         if found.words or found.tables or drawable(found):
             yield view.name, view.form, found
     file = folder / MARK if folder.is_dir() else folder

@@ -193,7 +193,7 @@ def open_run(path: str | Path) -> RunResult:
     Raises `UsageError` where no run is stored there, and for the folder of a study.
     """
     folder = Path(path).resolve()
-    content = content_of(read_table(folder, "score*", "check*", "published*"))
-    if not content["methods"]:
+    table = read_table(folder, "score*", "check*", "published*")
+    if not table.head.get("methods"):
         raise UsageError(f"{path}: a study or a comparison, not a run; open its report.html")
-    return RunResult(folder if folder.is_dir() else folder.parent, content)
+    return RunResult(folder if folder.is_dir() else folder.parent, content_of(table))

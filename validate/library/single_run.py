@@ -5,6 +5,7 @@ from pathlib import Path
 
 from validate.engine.cell import Where
 from validate.engine.pool import Pool
+from validate.errors import UsageError
 from validate.library.experiments import load
 from validate.library.run_report import reported_run
 from validate.library.run_result import RunResult, open_run
@@ -39,6 +40,11 @@ def run(
     that cannot be written, `RecordingError`, `SceneError`, `RegistrationError` or
     `ComparisonError` for an experiment that cannot be run.
     """
+    if isinstance(methods, str) or not isinstance(set or {}, Mapping):
+        raise UsageError(
+            f"methods={methods!r}, set={set!r}: expected a list of names, and values by path as "
+            'set={"material.E": "14 kPa"}'
+        )
     texts = as_texts(set)
     options = Options(texts, tuple(methods), quick, anyway, tuple(simulators), case)
     command = (

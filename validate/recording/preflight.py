@@ -142,8 +142,10 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
 
 
 def _stream_topic(name: str, recording: Recording) -> tuple[Topic, list[str]]:
-    stream, clock = recording.streams[name], recording.clock[name]
+    stream = recording.streams[name]
     ns = np.rint(1e9 * stream.t).astype(np.int64) + recording.t0_ns
+    # A reader may leave its streams' clocks out: then their times are all that is known.
+    clock = recording.clock.get(name) or clock_of(name, None, ns, ns)
     unit = stream.unit if isinstance(stream, Signal) else "m"
     topic = Topic(
         name, type(stream).__name__.lower(), "", "", "", len(stream.t), int(ns[0]), int(ns[-1]),

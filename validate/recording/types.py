@@ -52,10 +52,19 @@ def labelled(
 
 
 def tree_of(streams: Mapping[str, "DataArray"], name: str, facts: Mapping[str, Any]) -> "DataTree":
-    """Return the arrays of `labelled` as a tree, each in a node of its topic."""
+    """Return the arrays of `labelled` as a tree, each in a node of its topic.
+
+    Below a topic that is a stream itself the others have a dot: a node shares its parent's times.
+    """
     from xarray import DataTree
 
-    tree = DataTree.from_dict({topic: array.to_dataset() for topic, array in streams.items()})
+    nodes = {}
+    for topic, array in streams.items():
+        above = [t for t in streams if topic.startswith(f"{t}/")]
+        top = min(above, key=len, default="")
+        place = f"{top}.{topic[len(top) + 1 :].replace('/', '.')}" if top else topic
+        nodes[place] = array.to_dataset()
+    tree = DataTree.from_dict(nodes)
     tree.name, tree.attrs = name, dict(facts)
     return tree
 

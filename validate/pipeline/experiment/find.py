@@ -109,10 +109,11 @@ def _executed(path: Path) -> ModuleType:
         _unload(package.__name__)
         # What is wrong in the words of the library needs no class.
         kind = "" if isinstance(error, ValidateError) else f"{type(error).__name__}: "
-        raise UsageError(
-            f"{path}{_place(error, path)}: {kind}{error}; correct the file "
-            f"(`python {quote(str(path))}` shows the full traceback)"
-        ) from error
+        advice = f"correct the file (`python {quote(str(path))}` shows the full traceback)"
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing and (file.parent / f"{missing}.py").is_file():
+            advice = f"a file beside it is imported with a dot: `from .{missing} import ...`"
+        raise UsageError(f"{path}{_place(error, path)}: {kind}{error}; {advice}") from error
     return module
 
 

@@ -16,7 +16,7 @@ from validate.report.sections.provenance import parameters, recording
 from validate.report.sections.registration import registration
 from validate.report.sections.verdicts import found_besides, verdicts
 from validate.report.views.standard import VIEWS
-from validate.report.views.view_filling import filled
+from validate.report.views.view_filling import filled, filled_views
 
 Made = Callable[[Result], Exhibit | None]
 
@@ -93,12 +93,8 @@ def parts(result: Result, table: Callable[[], LongTable]) -> Iterator[tuple[int,
         filled_ = tuple(filled(known[name], table()) for name in views)
         yield place, Begun(s.anchor, s.title, filled_, s.also)
         if s.anchor == "curves":
-            own = [filled(view, table()) for view in result.views]
-            own += [
-                VIEWS.answer(v, lambda v: filled(v, table()), Exhibit("", ""))
-                for v in VIEWS.further
-            ]
-            shown = (e for e in own if any(getattr(e, n) for n in _LISTS))
+            own = filled_views(table(), (*result.views, *VIEWS.further), standard=False)
+            shown = (e for _, e in own if any(getattr(e, n) for n in _LISTS))
             yield from ((place, exhibit) for exhibit in (*result.exhibits, *shown))
 
 

@@ -17,7 +17,7 @@ from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.views.drawers import drawable, figure_of
 from validate.report.views.standard import VIEWS
-from validate.report.views.view_filling import filled
+from validate.report.views.view_filling import filled_views
 
 _DPI = 130
 _DRAWN = re.compile("^(chart|intervals|heat)_")  # of files of what is drawn from numbers
@@ -36,7 +36,7 @@ def _figures(
 ) -> Mapping[str, Callable[[], Figure]]:
     table = stored_table(folder, part=NOT_SHOWN)
     own = (View.from_json(v) for v in table.head.get("views", ()))
-    exhibits = [filled(view, table) for view in (*VIEWS, *own)]
+    exhibits = [exhibit for _, exhibit in filled_views(table, own)]
     exhibits += stored_exhibits(read_sealed(folder / MARK))
     drawn = {_name(part.name): partial(figure_of, part, table)
              for exhibit in exhibits for part in drawable(exhibit)}  # fmt: skip

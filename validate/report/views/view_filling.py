@@ -35,6 +35,7 @@ from validate.report.views.numbers import (
     to_decimal_of,
     with_unit,
 )
+from validate.report.views.standard import VIEWS
 from validate.units import in_si, si_of, split
 
 _TWO = 2.0  # standard uncertainties of an interval
@@ -52,6 +53,17 @@ WORDS: Mapping[str, Emphasis] = {
     "outlier": "bad",
 }  # fmt: skip
 Grid = dict[tuple[str, ...], dict[str, list[LongRow]]]
+
+
+def filled_views(
+    table: LongTable, own: Iterable[View] = (), *, standard: bool = True
+) -> Iterator[tuple[View, Exhibit]]:
+    """Yield the views of the registry where `standard`, then a run's `own`, each with its exhibit.
+
+    One that is not the package's and cannot be filled costs a warning, and nothing else.
+    """
+    for view in (*(VIEWS if standard else ()), *own):
+        yield view, VIEWS.answer(view, lambda v: filled(v, table), Exhibit("", ""))
 
 
 def filled(view: View, table: LongTable) -> Exhibit:

@@ -15,6 +15,10 @@ from validate.report.views.view_filling import WORDS
 from validate.study.loose_page import write_loose
 
 FOLDER = "overview"
+_OVER = {
+    "summary": "summary: bias and scatter over all runs",
+    "published": "printed figures, and ours",
+}
 _NAMED = 3  # changed parameters and moved checks that are named
 
 
@@ -99,7 +103,8 @@ def write_overview(reports: Path) -> Path:
     found = stored(reports)
     words = [s.verdict for s in found]
     counted = ", ".join(f"{words.count(w)} {w}" for w in dict.fromkeys(words))
-    exhibit = Exhibit("runs", "Stored runs", (), (_table(found),), _trends(found))
+    tables = (_table(found), *_pages(reports))
+    exhibit = Exhibit("runs", "Stored runs", (), tables, _trends(found))
     told = ("overview", "All stored runs", reports.resolve().name,
             f"{len(found)} stored runs: {counted}.")  # fmt: skip
     members = [
@@ -130,7 +135,23 @@ def _table(found: Sequence[StoredRun]) -> NumberTable:
         "Evidence: checks on data that neither calibrated nor made the model. A share of the limit "
         "(of those checks) above 1 fails for its value alone; the verdict counts 2 u_val, too. "
         "Bias and scatter over all of them: validate summary.",
+        below="changed since the run before",
     )  # fmt: skip
+
+
+def _pages(reports: Path) -> tuple[NumberTable, ...]:
+    """Links to the pages beside this one: over several runs, and of studies."""
+    over = [(words, reports / name / "report.html") for name, words in _OVER.items()]
+    studies = sorted(reports.glob("*/study-*/report.html"))
+    over += [(f"study of {f.parents[1].name}: {f.parent.name.removeprefix('study-')}", f)
+             for f in studies]  # fmt: skip
+    rows = tuple(
+        (TableCell(words, link=f"../{file.relative_to(reports).as_posix()}"),)
+        for words, file in over if file.is_file()
+    )  # fmt: skip
+    if not rows:
+        return ()
+    return (NumberTable("", "Pages over several runs, and of studies", ("page",), rows),)
 
 
 def _trends(found: Sequence[StoredRun]) -> tuple[Chart, ...]:

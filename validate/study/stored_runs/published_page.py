@@ -3,6 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,4 +118,5 @@ def _section(entry: Json) -> Exhibit:
     table = long_table({"methods": (), **entry}, name)
     shown = [filled(view_of(view), table) for view in ("published", "settings")]
     return Exhibit(name, f"{name}: {entry['title']}", (f"Source: {entry['source']}.",),
-                   tuple(t for view in shown for t in view.tables))  # fmt: skip
+                   tuple(replace(t, below="reason" if "reason" in t.headings else t.below)
+                         for view in shown for t in view.tables))  # fmt: skip
