@@ -202,7 +202,11 @@ def test_streams_below_another_stream_have_nodes_of_their_own() -> None:
     source = Source("a.mcap", "", 0, "made here")
     signals = {name: Signal(at, np.zeros((len(at), 1)), "N", 0.1, "machine")
                for name, at in zip(("force", "force/raw/x"), t, strict=True)}  # fmt: skip
-    tree = Recording("two", source, 0, signals=signals).to_xarray()
+    recording = Recording("two", source, 0, signals=signals)
+    rows = recording.to_pandas()
+    assert rows.groupby("stream").time.max().to_dict() == {"force": 2.0, "force/raw/x": 4.0}
+    assert set(rows.unit) == {"N"}
+    tree = recording.to_xarray()
     assert {name: len(tree[name].time) for name in tree.children} == {"force": 3, "force.raw.x": 5}
 
 

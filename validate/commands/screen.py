@@ -11,7 +11,7 @@ from validate.commands.arguments import Detail
 from validate.commands.display import console, error_shown, say
 from validate.report.views.bars import bar, legend
 from validate.report.views.layout import wrapped
-from validate.report.views.numbers import scale, shown_unit, significant
+from validate.report.views.numbers import scale, shown_unit, significant, to_decimal_of
 
 LINES = 25
 _NAME = 12  # characters of a name that is cut
@@ -179,12 +179,15 @@ def _row(check: Json, *, several: bool) -> list[str]:
         drawn = bar(check["value"], doubt, limit)
     else:
         drawn = bar(check["value"], 0.0, doubt) if 0 < doubt < float("inf") else ""
-    # 0.102 ± 0.271 of 0.410 mm: the error, its 2 u_val and the limit in one unit
+    # 0.10 ± 0.27 of 0.410 mm: the error, its 2 u_val and the limit in one unit
     half = None if u_val is None else 2 * u_val
     factor, unit = scale(check["unit"]), shown_unit(check["unit"])
     if unit == "Pa" and max(abs(v or 0.0) for v in (check["value"], half, limit)) >= 1000:
         factor, unit = 1e-3, "kPa"
-    error = "0" if error_shown(check) == "below noise" else significant(check["value"] * factor)
-    bound = "no bound" if half is None else significant(half * factor)
+    error, bound = significant(check["value"] * factor), "no bound"
+    if half is not None:  # both to the same decimal
+        bound, error = to_decimal_of(half * factor, check["value"] * factor)
+    if error_shown(check) == "below noise":
+        error = "0"
     of = "" if limit is None else f" of {significant(limit * factor)}"
     return [name, drawn, f"{error} ± {bound}{of} {unit}".strip()]

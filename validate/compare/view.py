@@ -64,14 +64,16 @@ class View:
 
     def __post_init__(self) -> None:
         if self.form not in get_args(Form):
-            raise UsageError(f"view '{self.name}': {nearest_names(self.form, set(get_args(Form)))}")
+            known = nearest_names(self.form, set(get_args(Form)))
+            raise UsageError(f"view '{self.name}': no form '{self.form}'; {known}")
         require_columns(self.rows, LongRow._fields)
         plotted = self.form in ("lines", "points")
         labels = (*(() if plotted else texts(self.x)), *texts(self.by), *self.also, self.each)
         columns = (text.partition(":")[2] for text in self.columns.values())
         for name in (*labels, *texts(self.y), *columns):
             if name and name not in _COLUMNS:
-                raise UsageError(f"view '{self.name}': {nearest_names(name, set(_COLUMNS))}")
+                known = nearest_names(name, set(_COLUMNS))
+                raise UsageError(f"view '{self.name}': no column '{name}'; {known}")
         if not texts(self.x) and self.form != "sentences":
             raise UsageError(f"view '{self.name}': x is missing; name a column, e.g. 'method'")
 

@@ -22,6 +22,7 @@ from validate.errors import RecordingError, UsageError
 from validate.installation import install_command
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from xarray import DataArray, DataTree
 from validate.arrays import Ints
 
@@ -361,6 +362,21 @@ class Recording:
         source = self.source
         facts = {"source": source.path, "sha256": source.sha256, "t0_ns": self.t0_ns}
         return tree_of({t: s.to_xarray() for t, s in self.streams.items()}, self.name, facts)
+
+    def to_pandas(self) -> "DataFrame":
+        """Return all streams but images as one long table: `stream`, `time` s, `value`, `unit`, and
+        where there are several the `marker`, `axis` or `column`.
+
+        Raises `UsageError` where xarray is not installed, which brings pandas.
+        """
+        arrays = {t: s.to_xarray() for t, s in self.streams.items() if not isinstance(s, Frames)}
+        parts = [array.to_dataframe("value").reset_index().assign(stream=t, unit=array.units)
+                 for t, array in arrays.items()]  # fmt: skip
+        if not parts:
+            raise UsageError(f"{self.name}: no stream of numbers")
+        from pandas import concat
+
+        return concat(parts, ignore_index=True)
 
     @property
     def streams(self) -> Mapping[str, Stream]:

@@ -129,6 +129,7 @@
       width: Math.max(280, figure.clientWidth), height: HEIGHT, series, bands,
       scales: { x: { time: false, ...scale("x") }, y: scale("y") },
       axes: [axis(found.x), { ...axis(found.y), size: 62 }],
+      legend: { markers: { dash: (u, i) => (u.series[i].dash || []).length ? "dashed" : "solid" } },
       cursor: { drag: { x: true, y: true, uni: 20 } },
       hooks: { setSeries: [(u, number, options) => {
         if (together || number == null || options.show == null) return;
