@@ -124,7 +124,9 @@ def _instants(
     d = np.interp(own, stage.t, stage.y[:, 0])
     first = int(np.abs(d).argmin())
     goals = np.linspace(d[first], d[first:].max(), card.holds + 1)
-    picked = [first, *(first + int(np.abs(d[first:] - goal).argmin()) for goal in goals[1:])]
+    # Of two images equally near, to a nanometre, the first: rounding would choose by the method.
+    away = [np.abs(d[first:] - goal).round(9) for goal in goals[1:]]
+    picked = [first, *(first + int(distance.argmin()) for distance in away)]
     steps: Ints = np.unique(nearest_samples(stage.t, own[picked], stage.name))
     if len(steps) < 2:
         raise ComparisonError(
