@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 from calibrating import NU, OPEN, OPENED, E, known
 
-from validate.pipeline.calibration.calibrated import calibrated, closed, identified_by
+from validate.pipeline.calibration.calibrated import (
+    calibrated,
+    closed,
+    identified_by,
+    with_inputs,
+)
 from validate.pipeline.calibration.calibration import Calibrates, Calibration
 from validate.pipeline.experiment.experiment import (
     Experiment,
@@ -52,6 +57,14 @@ def test_an_input_changes_the_value_as_a_new_identification_does() -> None:
     rest = 1.96 * np.hypot(one.parts["Poisson ratio"], one.parts["other specimens"])
     assert high - one.value > rest
     assert one.value - low > rest
+
+
+def test_the_range_of_an_identified_parameter_gives_way_to_its_covariance() -> None:
+    shipped = DOUBTED.load(OPENED, Path())
+    fitted, _ = calibrated(DOUBTED, OPENED, DOUBTED.methods, shipped)
+    found = with_inputs(DOUBTED, fitted).uncertainty
+    assert found is not None
+    assert [i.name for i in found.inputs] == ["Poisson ratio", "identified material.E"]
 
 
 def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
