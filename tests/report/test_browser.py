@@ -458,9 +458,10 @@ def test_a_curve_is_saved_as_vectors_as_it_is_shown(browser: str, tmp_path: Path
     top = ElementTree.fromstring(found["text"])
     drawn = {kind: list(top.iter(f"{{http://www.w3.org/2000/svg}}{kind}"))
              for kind in ("polyline", "circle", "polygon", "text")}  # fmt: skip
-    assert [len(drawn[kind]) for kind in ("polyline", "circle", "polygon")] == [1, 4, 1]
+    lengths = [len(drawn[kind]) for kind in ("polyline", "circle", "polygon")]
+    assert lengths == [1, 4 + 1, 1]  # and the sign of the legend
     words = [one.text or "" for one in drawn["text"]]
-    assert {"time / s", "force / N", "\u2014 a <line>", "\u2014 dots"} <= set(words)
+    assert {"time / s", "force / N", "a <line>", "dots", "band"} <= set(words)
     assert not any("hidden" in text for text in words)
     points = np.array([p.split(",") for p in drawn["polyline"][0].get("points", "").split()], float)
     frame = next(r for r in top.iter("{http://www.w3.org/2000/svg}rect") if r.get("stroke"))
@@ -470,6 +471,49 @@ def test_a_curve_is_saved_as_vectors_as_it_is_shown(browser: str, tmp_path: Path
     slopes = np.diff(points[:, 1]) / np.diff(points[:, 0])
     assert (slopes < 0).all()  # y rises upward on paper
     assert np.ptp(slopes) == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.slow
+def test_checks_and_pictures_are_saved_too(browser: str, tmp_path: Path) -> None:
+    page = of(with_checks(3))(tmp_path / "r")
+    action = """const files = [], texts = [];
+      URL.createObjectURL = blob => { texts.push(blob.text()); return "#"; };
+      HTMLAnchorElement.prototype.click = function () { files.push(this.download); };
+      for (const d of document.querySelectorAll("details")) d.open = true;
+      for (const b of document.querySelectorAll("figure > .note button")) b.click();
+      found.files = files; found.texts = await Promise.all(texts);"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    drawings = dict(zip(found["files"], map(ElementTree.fromstring, found["texts"]), strict=True))
+    checks = drawings.pop("figure-intervals_limits.svg")
+    svg = "{http://www.w3.org/2000/svg}"
+    words = [one.text or "" for one in checks.iter(f"{svg}text")]
+    assert sum("force.plate@" in text for text in words) == 3
+    assert sum(text.endswith("good enough") for text in words) == 2
+    dots = [float(one.get("cx", "nan")) for one in checks.iter(f"{svg}circle")]
+    assert len(set(dots)) == 3
+    assert drawings
+    for drawing in drawings.values():
+        (image,) = drawing.iter(f"{svg}image")
+        assert image.get("href", "").startswith("data:image/")
+        assert float(image.get("width", 0)) > 100
+
+
+@pytest.mark.slow
+def test_a_logarithmic_axis_has_some_powers_of_ten(browser: str, tmp_path: Path) -> None:
+    x = np.geomspace(1.0, 50.0, 30)
+    chart = Chart("logs", "L", "t / s", "error / mm", (Series("a", x, 1e-7 * x**4),), log="xy")
+    page = of(replace(small_result(), exhibits=(Exhibit("l", "L", charts=(chart,)),)))(
+        tmp_path / "r"
+    )
+    action = """const figure = document.getElementById("figure-chart_logs");
+      URL.createObjectURL = blob => { found.blob = blob; return "#"; };
+      HTMLAnchorElement.prototype.click = () => {};
+      figure.querySelector("button").click();
+      found.text = await found.blob.text(); delete found.blob;"""
+    found, _ = look(browser, page, tmp_path, 1280, action)
+    words = [one.text for one in ElementTree.fromstring(found["text"]).iter() if one.text]
+    assert {"1e\u22126", "1e\u22124", "0.01", "1", "10"} <= set(words)
+    assert "2e\u22127" not in words
 
 
 @pytest.mark.slow

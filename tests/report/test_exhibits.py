@@ -25,7 +25,7 @@ from validate.recording.mcap.read import read_recording
 from validate.report.charts.encode import encoded
 from validate.report.exhibits import DrawnExhibit, draw_all, drawing
 from validate.report.export.fields import open_fields, write_fields
-from validate.report.export.tables import caption, word_columns
+from validate.report.export.tables import across, caption, under, word_columns
 from validate.report.export.tables import shown as read
 from validate.report.page.html import page
 from validate.report.scenes import gl
@@ -166,6 +166,17 @@ def test_number_table_rounds_and_names_what_is_missing(made: dict[str, DrawnExhi
     assert word_columns(found) == (0, 1)
     assert [read(c) for c in found.rows[0][2:]] == ["0.0123", "166\u202f667", "1\u202f200"]
     assert [read(c) for c in found.rows[1][2:]] == ["–", "–", "0"]
+
+
+def test_long_texts_stand_below_their_row() -> None:
+    long = "the largest displacement there, rms over all of the time"
+    rows = (("first of all, a name that is longer than others", 1.0, long, "near"),
+            ("b", 2.0, None, "far"))  # fmt: skip
+    found = NumberTable("t", "T", ("name", "E / mm", "limit from", "why"), rows, below="why")
+    assert across(found) == (0, 1)
+    assert under(found, rows[0]) == f"near; limit from: {long}"
+    assert across(replace(found, below="")) == (0, 1, 2, 3)
+    assert across(replace(found, rows=())) == (0, 1, 2)
 
 
 def test_frames_are_told_from_loads(result: Result) -> None:

@@ -74,6 +74,27 @@ def test_no_peak_is_lost() -> None:
     assert (max(series["y"]), min(series["y"])) == (5.0, -3.0)
 
 
+def test_of_many_lines_the_checked_ones_and_the_first_are_shown() -> None:
+    x = np.arange(3.0)
+    lines = tuple(Series(f"rival {i}", x, x + i) for i in range(7))
+    band = Series("rival 6: noise", x, x, style="band", upper=x + 1)
+    checked = next(m.label for m in small_result().methods if m.accepted)
+    measured = Series("measured", x, x, style="points")
+    shown = (*lines, band, measured, Series(checked, x, x))
+    found = plot(small_result(), Chart("c", "C", "t / s", "u / mm", shown))["series"]
+    hidden = [s["label"] for s in found if s["hidden"]]
+    assert hidden == ["rival 4", "rival 5", "rival 6", "rival 6: noise"]
+
+
+def test_rounding_is_left_out_as_in_the_figure() -> None:
+    x = np.arange(3.0)
+    lines = (Series("a", x, x + 1), Series("exact", x, 1e-14 * (x + 1)))
+    chart = Chart("c", "C", "t / s", "e / mm", lines, log="y")
+    assert [s["label"] for s in plot(small_result(), chart)["series"]] == ["a"]
+    linear = replace(chart, log="")
+    assert len(plot(small_result(), linear)["series"]) == 2
+
+
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=60))
 def test_x_always_rises(x: list[float]) -> None:
     found = plotted(np.array(x), np.arange(float(len(x))))

@@ -47,12 +47,12 @@ def panel_labels(chart: Chart) -> tuple[str, ...]:
 
 def panel_series(chart: Chart, label: str, labels: Sequence[str]) -> list[Series]:
     """What a label's own axes show: its lines and bands, and what belongs to no label."""
-    own = [s for s in chart.series if s.label == label or _band_of(s, labels) == label]
-    common = [s for s in chart.series if s.label not in labels and not _band_of(s, labels)]
+    own = [s for s in chart.series if s.label == label or band_of(s, labels) == label]
+    common = [s for s in chart.series if s.label not in labels and not band_of(s, labels)]
     return [*common, *own]
 
 
-def _band_of(series: Series, labels: Sequence[str]) -> str:
+def band_of(series: Series, labels: Sequence[str]) -> str:
     """The label whose band it is: the longest that its own begins with."""
     own = [name for name in labels if series.style == "band" and series.label.startswith(name)]
     return max(own, key=len, default="")
@@ -78,7 +78,7 @@ def alone(result: HasMethods, series: Sequence[Series], label: str) -> list[Draw
     others = {id(d.series): d for d in styled(result, [s for s in series if id(s) not in own])}
     return [
         Drawn(s, own[id(s)], one_of=len(own) > 1) if id(s) in own
-        else Drawn(s, first) if _band_of(s, (label,)) else others[id(s)]
+        else Drawn(s, first) if band_of(s, (label,)) else others[id(s)]
         for s in series
     ]  # fmt: skip
 
@@ -139,7 +139,7 @@ def is_given(one: Series) -> bool:
 
 
 def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
-    own = _band_of(band, tuple(lines))
+    own = band_of(band, tuple(lines))
     return lines[own] if own else Style(NOISE, "-", "o", 0.0)
 
 

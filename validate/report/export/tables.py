@@ -1,7 +1,7 @@
 """Tables of numbers: format of entries on the page, and tables and charts as CSV files."""
 
 import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
@@ -9,6 +9,7 @@ from validate.files import safe_name
 from validate.report.views.numbers import MISSING, shown_unit, significant, text
 
 Row = Iterable[Entry | TableCell]
+_LONG = 40  # letters of a text that goes below its row, in a table that has a line there
 _SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
 
 
@@ -40,8 +41,24 @@ def word_columns(table: NumberTable) -> tuple[int, ...]:
 
 
 def across(table: NumberTable) -> tuple[int, ...]:
-    """Return the columns beside each other: all but the one whose texts stand below the rows."""
-    return tuple(i for i, h in enumerate(table.headings) if not table.below or h != table.below)
+    """Return the columns beside each other: all but those whose texts stand below the rows.
+
+    These are the one that is declared so and, beside it, columns of long texts but the first.
+    """
+    columns = list(zip(*table.rows, strict=True)) or [()] * len(table.headings)
+    long = [any(isinstance(plain(c), str) and len(shown(c)) > _LONG for c in cs) for cs in columns]
+    return tuple(
+        i for i, heading in enumerate(table.headings)
+        if not table.below or not (heading == table.below or (i and long[i]))
+    )  # fmt: skip
+
+
+def under(table: NumberTable, row: Sequence[Entry | TableCell]) -> str:
+    """Return the words below a row: the declared text first, others after their headings."""
+    beside, own = across(table), table.headings.index(table.below)
+    others = [i for i in range(len(row)) if i not in beside and i != own and shown(row[i])]
+    said = [shown(row[own]), *(f"{table.headings[i]}: {shown(row[i])}" for i in others)]
+    return "; ".join(filter(None, said))
 
 
 def caption(table: NumberTable) -> str:

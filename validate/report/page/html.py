@@ -26,7 +26,7 @@ from validate.report.charts.encode import uri
 from validate.report.charts.intervals import shares
 from validate.report.charts.style import DPI
 from validate.report.exhibits import DrawnExhibit
-from validate.report.export.tables import across, caption, shown, word_columns
+from validate.report.export.tables import across, caption, shown, under, word_columns
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
 from validate.report.views.numbers import duration, with_unit
@@ -126,7 +126,7 @@ def cost(result: Result) -> str:
     """The rate of each checked method and its slow steps, which the rate hides where most steps are
     read from a table; "" where none finished a step."""
     found = [
-        f"{m.called}: {with_unit(times.rate_hz, 'Hz')}, p99 of a step {duration(times.p99)}"
+        f"{m.label}: {with_unit(times.rate_hz, 'Hz')}, p99 of a step {duration(times.p99)}"
         for m in result.methods
         if m.checks and (times := timed(m.run)) is not None
     ]
@@ -223,6 +223,7 @@ def _environment() -> Environment:
         least_width=least_width,
         json=_json,
         sort_key=_sort_key,
+        under=under,
     )
     return environment
 

@@ -21,7 +21,11 @@
     link.click();
     URL.revokeObjectURL(link.href);
   };
-  const shown = value => value == null ? "–" : String(Number(value.toPrecision(4)));
+  const shown = value => {
+    if (value == null) return "–";
+    const near = Number(value.toPrecision(4)), size = Math.abs(near);
+    return (near && (size < 1e-3 || size >= 1e6) ? near.toExponential() : String(near)).replaceAll("-", "−").replace("e+", "e");
+  };
 
   // --- sections: a link opens what it leads to --------------------------------------------------
 
@@ -79,6 +83,7 @@
   // --- curves: uPlot ----------------------------------------------------------------------------
 
   const HEIGHT = 300;
+  const read = (u, value) => value == null ? "" : shown(value); // at the pointer
 
   function curves(figure, script) {
     const found = JSON.parse(script.textContent);
@@ -87,31 +92,32 @@
     const positive = (values, axis) =>
       found.log.includes(axis) && !found.linear ? values.map(v => v > 0 ? v : null) : values;
     for (const s of found.series) s.x = found.xs[s.x];
-    const tables = [], series = [{ label: found.x, value: (u, v) => shown(v) }], bands = [];
-    const seen = new Set();
+    const tables = [], series = [{ label: found.x, value: read }], bands = [];
+    const seen = new Set(), solid = new Set(found.series.filter(s => s.style !== "band").map(s => s.label));
     for (const s of found.series) {
       const number = series.length;
       const look = { label: s.label, stroke: colour(s.colour), width: s.width, dash: s.dash,
-        value: (u, v) => shown(v), points: { show: false } };
+        show: !s.hidden, mark: s.style, value: read, points: { show: false } };
       if (s.style === "points") {
         Object.assign(look, { paths: () => null, points: { show: true, size: 5, fill: colour(s.colour) } });
       }
       if (s.style === "band") {
+        if (solid.has(s.label)) look.class = "branch"; // its line or points stand for it
         series.push({ ...look, width: 0 }, { ...look, width: 0, class: "branch" });
         tables.push([s.x, positive(s.y, "y"), positive(s.upper, "y")]);
         bands.push({ series: [number + 1, number], fill: `${s.colour}40` });
       } else {
         if (seen.has(s.label)) look.class = "branch";
+        seen.add(s.label);
         series.push(look);
         tables.push([s.x, positive(s.y, "y")]);
       }
-      seen.add(s.label);
     }
     const ends = found.series.flatMap(s => s.x.length ? [s.x[0], s.x.at(-1)] : []);
     const [low, high] = ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
     for (const level of found.levels) {
-      series.push({ label: level.label, stroke: ink, width: 1, dash: [6, 4],
-        value: (u, v) => shown(v), points: { show: false } });
+      series.push({ label: level.label, stroke: ink, width: 1, dash: [6, 4], mark: "line",
+        value: read, points: { show: false } });
       tables.push([low < high ? [low, high] : [low], low < high ? [level.y, level.y] : [level.y]]);
     }
     const padded = (u, from, to) => [from - 0.05 * (to - from || 1), to + 0.05 * (to - from || 1)];
@@ -119,17 +125,24 @@
       if (axis === "y" && found.linear) return { distr: 4, asinh: found.linear, range: padded };
       return found.log.includes(axis) ? { distr: 3 } : {};
     };
-    const axis = label => ({ label, stroke: ink, grid: { stroke: style("--line"), width: 1 },
-      ticks: { stroke: style("--line"), width: 1 }, labelSize: 22,
-      values: (u, ticks) => ticks.map(v => v == null ? "" : shown(v)) });
+    const decades = (u, ticks) => { // of a logarithmic axis: powers of ten, at most some 7
+      const powers = ticks.map(v => v > 0 ? Math.log10(v) : NaN).map(p => Math.abs(p - Math.round(p)) < 1e-9 ? Math.round(p) : NaN);
+      const there = powers.filter(Number.isFinite), span = there.at(-1) - there[0];
+      if (there.length < 2) return ticks;
+      return ticks.map((v, i) => powers[i] % Math.ceil((span + 1) / 7) === 0 ? v : null);
+    };
+    const axis = (label, name) => {
+      const filter = found.log.includes(name) && !(name === "y" && found.linear) ? { filter: decades } : {};
+      return { label, stroke: ink, labelSize: 22, ...filter, grid: { stroke: style("--line"), width: 1, ...filter },
+        ticks: { stroke: style("--line"), width: 1, ...filter }, values: (u, ticks) => ticks.map(v => v == null ? "" : shown(v)) };
+    };
     const box = make("div", { class: "plotted" });
     figure.prepend(box);
     let together = false; // branches of one curve are shown and hidden as one
     const drawn = new uPlot({
       width: Math.max(280, figure.clientWidth), height: HEIGHT, series, bands,
       scales: { x: { time: false, ...scale("x") }, y: scale("y") },
-      axes: [axis(found.x), { ...axis(found.y), size: 62 }],
-      legend: { markers: { dash: (u, i) => (u.series[i].dash || []).length ? "dashed" : "solid" } },
+      axes: [axis(found.x, "x"), { ...axis(found.y, "y"), size: 62 }],
       cursor: { drag: { x: true, y: true, uni: 20 } },
       hooks: { setSeries: [(u, number, options) => {
         if (together || number == null || options.show == null) return;
@@ -140,15 +153,28 @@
         together = false;
       }] },
     }, uPlot.join(tables), box);
-    for (const row of box.querySelectorAll(".u-series.branch")) row.hidden = true;
+    box.querySelectorAll(".u-series").forEach((row, i) => {
+      row.hidden = row.classList.contains("branch");
+      if (i) row.querySelector(".u-marker").outerHTML = sample(drawn.series[i], series[i].stroke);
+    });
     const save = make("button", { type: "button" }, "Save SVG");
     save.addEventListener("click", () => saved(figure.id, vector(drawn)));
     box.append(make("p", { class: "note" },
-      "Drag to zoom, double-click to see all; a click on a name hides its curve. ", save));
+      "Drag to zoom, double-click to see all, click a name to hide or show it. ", save));
     figure.classList.add("live");
     new ResizeObserver(() => {
       if (figure.clientWidth) drawn.setSize({ width: figure.clientWidth, height: HEIGHT });
     }).observe(figure);
+  }
+
+  // What stands for a curve in a legend: as it is drawn, so that dashes are told apart.
+  function sample(s, colour, at = "") {
+    const marks = {
+      band: `<rect y="2" width="28" height="8" fill="${colour}" fill-opacity="0.25"/>`,
+      points: `<circle cx="14" cy="6" r="3" fill="${colour}"/>`,
+      line: `<line y1="6" x2="28" y2="6" stroke="${colour}" stroke-width="2" stroke-dasharray="${(s.dash || []).join(" ")}"/>`,
+    };
+    return `<svg class="u-marker" ${at} width="28" height="12" aria-hidden="true">${marks[s.mark]}</svg>`;
   }
 
   // The curves of a plot as it is shown, black on white: for a document.
@@ -164,9 +190,9 @@
     plot.series.forEach((s, i) => {
       if (!i || !s.show) return;
       const colour = print(s._stroke || s.stroke());
-      names.set(s.label, colour);
+      if (!names.has(s.label)) names.set(s.label, [s, colour]);
       if (ends.includes(i)) return;
-      if (s.points.show && s.points.size === 5) {
+      if (s.mark === "points") {
         for (const point of points(i)) {
           const [x, y] = point.split(",");
           lines.push(`<circle cx="${x}" cy="${y}" r="2.5" fill="${colour}"/>`);
@@ -188,10 +214,49 @@
       written(left + wide / 2, top + high + 34, plot.axes[0].label, 'text-anchor="middle"'),
       written(0, 0, plot.axes[1].label, `text-anchor="middle" transform="translate(14 ${top + high / 2}) rotate(-90)"`),
     ];
-    const legend = [...names].map(([name, colour], i) =>
-      written(left, top + high + 54 + 16 * i, `\u2014 ${name}`, `fill="${colour}"`));
+    const legend = [...names].map(([name, [s, colour]], i) =>
+      sample(s, colour, `x="${left}" y="${top + high + 44 + 16 * i}"`) + written(left + 34, top + high + 54 + 16 * i, name));
     const size = [plot.width, top + high + 60 + 16 * names.size];
     return `<svg xmlns="http://www.w3.org/2000/svg" width="${size[0]}" height="${size[1]}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/><clipPath id="inside"><rect x="${left}" y="${top}" width="${wide}" height="${high}"/></clipPath><g clip-path="url(#inside)">${lines.join("")}</g>${frame}${ticks.join("")}${legend.join("")}</svg>`;
+  }
+
+  // --- other figures: saved as they are, black on white ------------------------------------------
+
+  const paper = { good: "#00543c", bad: "#8e0015", open: "#5f4500" };
+
+  function forest(figure) { // its lines, with the words of each beside it
+    const rows = [...figure.querySelectorAll("tbody tr")];
+    const text = (row, of) => row.querySelector(of).textContent.replaceAll("\u200b", "").trim();
+    const most = of => 7 * Math.max(...rows.map(row => text(row, of).length));
+    const [left, wide, high] = [most("th") + 12, 320, 22];
+    const at = (span, side) => wide * parseFloat(span.style[side]) / 100;
+    const lines = rows.map((row, i) => {
+      const [within, zero, whisker, dot] = row.querySelectorAll(".track span"), y = 30 + high * i;
+      const colour = paper[row.className] || "#000000";
+      return written(left - 8, y + 4, text(row, "th"), 'text-anchor="end"')
+        + `<g transform="translate(${left} ${y})"><rect x="${at(within, "left")}" y="${-high / 2}" width="${at(within, "width")}" height="${high}" fill="#dfe5ea"/>`
+        + `<path d="M${at(zero, "left")} ${-high / 2}v${high}" stroke="#565f66"/>`
+        + `<path d="M${at(whisker, "left")} 0h${at(whisker, "width")}" stroke="${colour}" stroke-width="3"/>`
+        + `<circle cx="${at(dot, "left")}" r="4.5" fill="${colour}"/></g>`
+        + written(left + wide + 10, y + 4, `${text(row, ".numbers")}: ${text(row, ".answer")}`, `fill="${colour}"`);
+    });
+    const size = [left + wide + 24 + most(".numbers") + most(".answer"), 30 + high * rows.length];
+    return `<svg xmlns="http://www.w3.org/2000/svg" width="${size[0]}" height="${size[1]}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/>${written(left, 14, text(figure, "thead .track"))}${lines.join("")}</svg>`;
+  }
+
+  function picture(image) {
+    const [wide, high] = [image.naturalWidth, image.naturalHeight];
+    return `<svg xmlns="http://www.w3.org/2000/svg" width="${wide}" height="${high}"><title>${make("span", {}, image.alt).innerHTML}</title><image width="${wide}" height="${high}" href="${image.src}"/></svg>`;
+  }
+
+  function saver(figure) {
+    const image = () => [...figure.querySelectorAll("img")].find(one => one.clientWidth);
+    const button = make("button", { type: "button" }, "Save SVG");
+    button.addEventListener("click", () =>
+      saved(figure.id, figure.matches(".forest-figure") ? forest(figure) : picture(image())));
+    const note = make("p", { class: "note" }, button);
+    const caption = figure.querySelector("figcaption");
+    if (caption) caption.before(note); else figure.append(note);
   }
 
   // --- images: one at a time ---------------------------------------------------------------------
@@ -620,6 +685,9 @@
 
   for (const one of document.querySelectorAll("table.sortable")) table(one);
   for (const one of document.querySelectorAll(".series")) series(one);
+  for (const one of document.querySelectorAll("figure")) {
+    if (!one.querySelector("script.plot, script.view")) saver(one);
+  }
   const builders = { plot: curves, view: body };
   const waiting = new Set(document.querySelectorAll("script.plot, script.view"));
   const build = () => {

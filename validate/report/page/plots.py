@@ -8,11 +8,10 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Chart, Series
-from validate.report.charts.axes import levels
-from validate.report.charts.line_styles import styled
+from validate.report.charts.axes import beneath, floor_of, levels
+from validate.report.charts.line_styles import TOGETHER, band_of, is_given, is_jagged, styled
 from validate.report.charts.style import HasMethods
 
-_NOTHING = 1e-20  # of the largest value
 _MOST = 800  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
@@ -24,17 +23,24 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
 
     A line that goes to and fro along x is one series for each way: uPlot needs x to rise. A series
     of more than `_MOST` points keeps the lowest and the highest of equal parts, so that no peak is
-    lost; a line that turns more than `_WAYS` times is shown by its points.
+    lost; a line that turns more than `_WAYS` times is shown by its points. Of more than `TOGETHER`
+    lines those of the checked methods and the first others are shown, the rest at a click. What is
+    rounding on a logarithmic axis is left out, as in the figure.
     """
-    least = 0.0  # what is less on a logarithmic axis counts as nothing: uPlot fails on 60 decades
-    if "y" in chart.log and not chart.linear:
-        tops = [np.nanmax(s.y, initial=0.0) for s in chart.series]
-        least = _NOTHING * max([*tops, *(y for _, y in levels(chart))])
+    least, lost = (0.0, ()) if chart.linear else (floor_of(chart), beneath(chart))
     xs: list[list[float | None]] = []  # each once: most series of a chart have the same
-    series = []
-    for drawn in styled(run, chart.series):
+    series: list[dict[str, Any]] = []
+    drawable = [d for d in styled(run, chart.series) if d.series.name not in lost]
+    checked = {name for m in run.methods if m.accepted for name in (m.name, m.label)}
+    lines = [d.series for d in drawable if d.series.style == "line" and not is_given(d.series)]
+    labels = sorted(dict.fromkeys(s.label for s in lines), key=lambda label: label not in checked)
+    later = tuple(labels[TOGETHER:])
+    for drawn in drawable:
+        of, jagged = drawn.series.label, is_jagged(drawn.series) and not drawn.one_of
         look = {"label": drawn.series.name, "colour": drawn.look.colour,
-                "dash": _dash(drawn.look.dash), "width": drawn.look.width or 1.0}  # fmt: skip
+                "dash": [] if jagged else _dash(drawn.look.dash),
+                "width": 0.9 if jagged else drawn.look.width or 1.0,
+                "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
         style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
         if style == "line" and len(found := _ways(drawn.series.x)) > 1:
             style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)

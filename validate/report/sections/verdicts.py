@@ -35,7 +35,7 @@ def verdicts(result: Result) -> Exhibit | None:
     None where there is no check."""
     if not result.checks:
         return None
-    checked = "; ".join(f"{m.name} ({m.called})" for m in result.methods if m.checks)
+    checked = "; ".join(f"{m.name}: {m.called}" for m in result.methods if m.checks)
     found = result.overall
     words = (
         f"Checked: {checked}. The other methods are candidates, listed for comparison.",

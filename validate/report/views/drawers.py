@@ -13,7 +13,7 @@ import plotille
 
 from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
 from validate.errors import UsageError
-from validate.report.export.tables import across, shown, write_csv
+from validate.report.export.tables import across, shown, under, write_csv
 from validate.report.views.bars import bar, legend
 from validate.report.views.layout import laid, wrapped
 from validate.report.views.numbers import significant
@@ -152,8 +152,13 @@ def terminal(found: Exhibit, width: int) -> list[str]:
         lines += wrapped(text, width, "  ")
     for part in found.tables:
         lines += ["", *wrapped(part.title, width)] if part.title != found.title else []
-        heads = [part.headings[i] for i in across(part)]
-        lines += laid(heads, [[shown(row[i]) for i in across(part)] for row in part.rows], width)
+        beside = across(part)
+        heads = [part.headings[i] for i in beside]
+        rows = [[shown(row[i]) for i in beside] for row in part.rows]
+        if part.below and part.rows:
+            heads.append(part.below)
+            rows = [[*line, under(part, row)] for line, row in zip(rows, part.rows, strict=True)]
+        lines += laid(heads, rows, width)
     for chart in found.charts:
         title = [chart.title] if chart.title != found.title else []
         lines += ["", *title, *plotted(chart, width)]
