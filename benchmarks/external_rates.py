@@ -25,8 +25,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.convergence import richardson
 from validate.fem.system import build
+from validate.numbers import significant
 from validate.pipeline import load
-from validate.report.views.numbers import significant
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic

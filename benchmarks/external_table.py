@@ -14,8 +14,8 @@ from pathlib import Path
 from validate.compare.exhibit import Entry, TableCell, plain
 from validate.compare.result import Result
 from validate.datasets.home import data_path
+from validate.numbers import significant, with_unit
 from validate.pipeline import load, run_in_memory
-from validate.report.views.numbers import significant, with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- external simulators: begin -->", "<!-- external simulators: end -->"

@@ -15,8 +15,8 @@ from pathlib import Path
 from time import perf_counter
 
 from validate.engine.cell import Where
+from validate.numbers import significant
 from validate.pipeline.experiment.find import load_file
-from validate.report.views.numbers import significant
 from validate.study.identify.study import IdentifyStudy, identification
 
 BLOCK = Path(__file__).with_name("identified_block.py")

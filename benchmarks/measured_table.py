@@ -12,8 +12,8 @@ from pathlib import Path
 from validate.compare.result import Result
 from validate.compare.verdict import Check
 from validate.datasets.home import data_path
+from validate.numbers import with_unit
 from validate.pipeline import load, run_in_memory
-from validate.report.views.numbers import with_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"

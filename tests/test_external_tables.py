@@ -12,8 +12,8 @@ from command_line import here
 from script_modules import module_of
 
 from validate.compare.result import Result
+from validate.numbers import significant
 from validate.pipeline import load
-from validate.report.views.numbers import significant
 
 
 def script(root: Path, name: str) -> ModuleType:

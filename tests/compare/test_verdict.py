@@ -117,7 +117,7 @@ def test_undecided_names_what_would_decide() -> None:
     ):
         why = judged(scalar(0.1), 0.5, **parts).why
         assert f"better measurement of '{name}' reduces it" in why
-        assert "straddles the limit 0.5 Pa: a u_val below 0.2 Pa would decide" in why
+        assert "straddles the limit 0.500 Pa: a u_val below 0.200 Pa would decide" in why
     for name, better in (("mesh", "a finer mesh"), ("time step", "a shorter time step")):
         check = judge(scalar(0.0), required(0.5), Numerical({name: 10.0}), [])
         assert f"{better} reduces it" in check.why

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from validate.report.views.numbers import (
+from validate.numbers import (
     at_load,
     duration,
     rate,

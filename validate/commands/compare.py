@@ -13,9 +13,9 @@ from validate.commands.display import relative, say
 from validate.commands.screen import LINES, sentences
 from validate.errors import UsageError
 from validate.library.comparison import scores_of_runs
+from validate.numbers import shown_unit, significant, text
 from validate.report.stored.folder import try_results
 from validate.report.views.layout import laid, width, wrapped
-from validate.report.views.numbers import shown_unit, significant, text
 from validate.study.stored_runs.score_comparison import (
     Pair,
     Row,

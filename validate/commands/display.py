@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from validate.numbers import duration, significant, with_unit
 from validate.report.views.layout import laid, width, wrapped
-from validate.report.views.numbers import duration, significant, with_unit
 
 if TYPE_CHECKING:
     from validate.report.long_table import LongTable

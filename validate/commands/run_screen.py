@@ -20,11 +20,11 @@ from validate.commands.screen import (
     worst_first,
 )
 from validate.compare.result import KINDS, Result
+from validate.numbers import at_load, duration, rate, with_unit
 from validate.pipeline.calibration.fitted_moduli import sentence
 from validate.pipeline.experiment.experiment import Experiment
 from validate.report.sections.observations import timed
 from validate.report.stored.store import check_members, document, figure_members
-from validate.report.views.numbers import at_load, duration, rate, with_unit
 from validate.report.write import table_of
 from validate.solve.types import Run
 

@@ -15,10 +15,10 @@ from validate.compare.exhibit import Entry, TableCell, plain
 from validate.engine.cell import Where
 from validate.engine.execution import Finished
 from validate.library import studies
+from validate.numbers import MISSING, significant
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.report.stored.folder import MARK
-from validate.report.views.numbers import MISSING, significant
 from validate.study.choose.exhibits import words
 from validate.study.choose.study import Choice, error_of
 from validate.study.coverage import page as coverage_page

@@ -38,6 +38,7 @@ from validate.compare.bias import Size, kind_of, size_of
 from validate.compare.convergence import Numerical
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError
+from validate.numbers import text, with_unit
 
 NO_EVIDENCE = ("fitted", "same model")
 Validation = Literal[
@@ -386,13 +387,13 @@ class _Interval:
         low, high = abs(self.E) - 2 * self.u_val, abs(self.E) + 2 * self.u_val
         room = abs(limit - abs(self.E)) / 2
         return "undecided", (
-            f"{max(low, 0.0):.3g} to {self._shown(high)} straddles the limit "
+            f"{text(max(low, 0.0), self.unit)} to {self._shown(high)} straddles the limit "
             f"{self._shown(limit)}: a u_val below {self._shown(room)} would decide; "
             f"{self._better} reduces it"
         )
 
     def _shown(self, value: float) -> str:
-        return f"{value:.3g} {self.unit}" if self.unit != "1" else f"{value:.3g}"
+        return with_unit(value, self.unit)
 
     @property
     def _largest(self) -> str:

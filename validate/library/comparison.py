@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from validate.display import Screen
 from validate.library.run_result import RunResult
+from validate.numbers import shown_unit, significant, text
 from validate.report.long_table import frame
-from validate.report.views.numbers import shown_unit, significant, text
 from validate.study.stored_runs.score_comparison import (
     SideBySide,
     narrowed,

@@ -11,11 +11,11 @@ from validate.display import Screen, listed
 from validate.errors import UsageError
 from validate.library.plots import Plots
 from validate.library.view_result import ShownView
+from validate.numbers import text, with_unit
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
-from validate.report.views.numbers import text, with_unit
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
 from validate.study.stored_runs.score_comparison import read_table

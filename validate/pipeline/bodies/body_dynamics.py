@@ -32,6 +32,7 @@ from validate.identify.recorded_motion import (
     recorded_motion,
     spectrum,
 )
+from validate.numbers import scale, shown_unit
 from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.dynamics_registration import (
     FIRST,
@@ -63,7 +64,6 @@ from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.report.sections.motion_words import motion_words, rests
-from validate.report.views.numbers import scale, shown_unit
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene
 from validate.solve.dynamic.implicit import FromEquilibrium

@@ -18,6 +18,7 @@ from validate.identify.budget import NOISE, IdentifiedValue
 from validate.identify.identification import Identification, InTurn, best_of
 from validate.identify.identification import identify as identify_in
 from validate.identify.least_squares import STEP, fit
+from validate.numbers import with_unit
 from validate.parameters import describe, with_values
 from validate.pipeline.calibration.calibration import Calibrates, Calibration, Free
 from validate.pipeline.calibration.fitted_moduli import on_meshes
@@ -42,7 +43,6 @@ from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.variation import Change
 from validate.pipeline.run.twin_record import made_by
 from validate.recording.types import Recording
-from validate.report.views.numbers import with_unit
 
 # --- Uncertainty budgets of calibrated parameters: noise from the profile, inputs and mesh
 # besides.

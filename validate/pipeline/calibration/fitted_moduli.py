@@ -16,8 +16,8 @@ from validate.arrays import Floats, rms
 from validate.compare.convergence import convergence
 from validate.errors import ComparisonError, SceneError
 from validate.identify.budget import MATERIAL, IdentifiedValue, Pattern
+from validate.numbers import with_unit
 from validate.pipeline.experiment.experiment import Input, MeshLadder
-from validate.report.views.numbers import with_unit
 
 Entry = tuple[str, float, float]  # name of a model, modulus Pa, toe m
 COMMON = "each uncertain input is varied, the modulus identified again and used for the prediction"

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from validate.compare.result import MethodResult
 from validate.compare.score import Score
 from validate.identify.identification import Profiled
+from validate.numbers import with_unit
 from validate.parameters import describe
 from validate.pipeline.calibration.calibration import Free
 from validate.pipeline.calibration.problem import Calibrated
-from validate.report.views.numbers import with_unit
 
 _AGAINST = "what calibrates"
 _DIGITS = 4

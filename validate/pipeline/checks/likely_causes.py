@@ -19,10 +19,10 @@ from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.result import MethodResult
 from validate.errors import ValidateError
 from validate.identify.recorded_motion import RecordedMotion, Ringing, recorded_motion
+from validate.numbers import with_unit
 from validate.pipeline.bodies.first_modes import first_frequencies
 from validate.pipeline.run.method_run import MethodRun
 from validate.register.observation import History
-from validate.report.views.numbers import with_unit
 
 Failed = Collection[str]  # quantities of checks, as force.rms
 

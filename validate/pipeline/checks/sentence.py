@@ -7,7 +7,7 @@ from validate.compare.overall_verdict import Overall, judge_all
 from validate.compare.published import Published
 from validate.compare.result import Kind, MethodResult
 from validate.compare.verdict import Check
-from validate.report.views.numbers import with_unit
+from validate.numbers import with_unit
 
 _AGAINST: dict[Kind, str] = {
     "measured": "the measurement",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
+from validate.numbers import with_unit
 from validate.pipeline.experiment.experiment import Experiment, Input
 from validate.pipeline.experiment.method import Method
 from validate.recording.types import Recording
@@ -60,7 +61,9 @@ def drive_inputs(scene: AnyScene, seen: Registered) -> tuple[Input, ...]:
             off = np.zeros(count)
             off[first : first + wide] = row
             which = f", {k} of {len(rows)}" if len(rows) > 1 else ""
-            words = f"{drive.name} shifted by its standard deviation of {drive.sd:.3g} {drive.unit}"
+            words = (
+                f"{drive.name} shifted by its standard deviation, {with_unit(drive.sd, drive.unit)}"
+            )
             name = f"sd of {drive.name}{which}"
             found.append(Input(name, _as_it_is, words, "recorded", off=tuple(off.tolist())))
         first += wide

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from validate.compare.exhibit import Picture
+from validate.numbers import significant
 from validate.report.charts.style import ACCEPTED, MEASURED, draw
-from validate.report.views.numbers import significant
 
 _WIDTH, _ROW, _EDGES = 8.6, 0.24, 1.0  # inches; of a score, and of axis and title
 _LINEAR = 1.0  # per cent: the axis is logarithmic beyond

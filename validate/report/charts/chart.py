@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from validate.compare.exhibit import Chart, Picture, Series
+from validate.numbers import significant
 from validate.report.charts.axes import (
     beneath,
     cut_dips,
@@ -33,7 +34,6 @@ from validate.report.charts.style import (
     legend_height,
     panels,
 )
-from validate.report.views.numbers import significant
 
 _HEIGHT = 3.3  # inches of one axes without the legend
 _PANEL = 1.45  # inches of one of several

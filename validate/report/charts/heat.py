@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Heat, Picture
+from validate.numbers import significant
 from validate.report.charts.style import Drawing, draw
-from validate.report.views.numbers import significant
 
 _CELL = (0.6, 0.36)  # inches of a square that holds its number
 _LARGEST = (6.2, 6.5)  # inches of all squares

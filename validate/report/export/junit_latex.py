@@ -5,9 +5,9 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 from validate.compare.exhibit import Entry, NumberTable, TableCell
+from validate.numbers import MISSING, significant
 from validate.report.export.tables import shown, word_columns
 from validate.report.stored.json_values import Json
-from validate.report.views.numbers import MISSING, significant
 
 _FAILS = ("not good enough", "undecided", "differs", "no answer", "nothing compared")
 _NO_EVIDENCE = ("fitted", "same model")

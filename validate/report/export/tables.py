@@ -6,10 +6,10 @@ from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
 from validate.files import safe_name
-from validate.report.views.numbers import MISSING, shown_unit, significant, text
+from validate.numbers import MISSING, shown_unit, significant, text
 
 Row = Iterable[Entry | TableCell]
-_LONG = 40  # letters of a text that goes below its row, in a table that has a line there
+_LONG, _WIDE = 30, 6  # letters of a text that goes below its row, columns of a wide table
 _SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
 
 
@@ -41,24 +41,28 @@ def word_columns(table: NumberTable) -> tuple[int, ...]:
 
 
 def across(table: NumberTable) -> tuple[int, ...]:
-    """Return the columns beside each other: all but those whose texts stand below the rows.
+    """Return the columns beside each other; the texts of the others stand below the rows.
 
-    These are the one that is declared so and, beside it, columns of long texts but the first.
+    These are the one that is declared so, and in a table that has one, or is wide, columns of long
+    texts but the first.
     """
     columns = list(zip(*table.rows, strict=True)) or [()] * len(table.headings)
     long = [any(isinstance(plain(c), str) and len(shown(c)) > _LONG for c in cs) for cs in columns]
+    shared = table.below or len(columns) >= _WIDE
     return tuple(
         i for i, heading in enumerate(table.headings)
-        if not table.below or not (heading == table.below or (i and long[i]))
+        if not (shared and ((heading and heading == table.below) or (i and long[i])))
     )  # fmt: skip
 
 
 def under(table: NumberTable, row: Sequence[Entry | TableCell]) -> str:
     """Return the words below a row: the declared text first, others after their headings."""
-    beside, own = across(table), table.headings.index(table.below)
-    others = [i for i in range(len(row)) if i not in beside and i != own and shown(row[i])]
-    said = [shown(row[own]), *(f"{table.headings[i]}: {shown(row[i])}" for i in others)]
-    return "; ".join(filter(None, said))
+    beside = across(table)
+    others = [i for i in range(len(row)) if i not in beside]
+    said = {table.headings[i]: shown(row[i]) for i in others}
+    first = said.pop(table.below, "")
+    named = (f"{name}: {words}" for name, words in said.items() if words not in ("", MISSING))
+    return "; ".join(filter(None, (first.removeprefix(MISSING), *named)))
 
 
 def caption(table: NumberTable) -> str:

@@ -22,6 +22,7 @@ from validate.compare.exhibit import (
 )
 from validate.compare.result import Result
 from validate.files import safe_name
+from validate.numbers import duration, with_unit
 from validate.report.charts.encode import uri
 from validate.report.charts.intervals import shares
 from validate.report.charts.style import DPI
@@ -29,7 +30,6 @@ from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import across, caption, shown, under, word_columns
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
-from validate.report.views.numbers import duration, with_unit
 from validate.report.views.view_filling import WORDS
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then

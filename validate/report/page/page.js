@@ -125,14 +125,15 @@
       if (axis === "y" && found.linear) return { distr: 4, asinh: found.linear, range: padded };
       return found.log.includes(axis) ? { distr: 3 } : {};
     };
-    const decades = (u, ticks) => { // of a logarithmic axis: powers of ten, at most some 7
-      const powers = ticks.map(v => v > 0 ? Math.log10(v) : NaN).map(p => Math.abs(p - Math.round(p)) < 1e-9 ? Math.round(p) : NaN);
-      const there = powers.filter(Number.isFinite), span = there.at(-1) - there[0];
+    const decades = (u, ticks) => { // of a logarithmic axis: zero and powers of ten, at most some 7
+      const powers = ticks.map(v => Math.log10(Math.abs(v))).map(p => Math.abs(p - Math.round(p)) < 1e-9 ? Math.round(p) : NaN);
+      const there = powers.filter(Number.isFinite), count = Math.max(...there) - Math.min(...there) + 1;
       if (there.length < 2) return ticks;
-      return ticks.map((v, i) => powers[i] % Math.ceil((span + 1) / 7) === 0 ? v : null);
+      const every = Math.ceil((ticks.some(v => v < 0) ? 2 : 1) * count / 7);
+      return ticks.map((v, i) => v === 0 || powers[i] % every === 0 ? v : null);
     };
     const axis = (label, name) => {
-      const filter = found.log.includes(name) && !(name === "y" && found.linear) ? { filter: decades } : {};
+      const filter = found.log.includes(name) || (name === "y" && found.linear) ? { filter: decades } : {};
       return { label, stroke: ink, labelSize: 22, ...filter, grid: { stroke: style("--line"), width: 1, ...filter },
         ticks: { stroke: style("--line"), width: 1, ...filter }, values: (u, ticks) => ticks.map(v => v == null ? "" : shown(v)) };
     };

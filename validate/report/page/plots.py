@@ -12,7 +12,7 @@ from validate.report.charts.axes import beneath, floor_of, levels
 from validate.report.charts.line_styles import TOGETHER, band_of, is_given, is_jagged, styled
 from validate.report.charts.style import HasMethods
 
-_MOST = 800  # points of a series; of more, the lowest and the highest of equal parts
+_MOST = 600  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
 _SHOWN = 4  # digits of y: as many as the page shows

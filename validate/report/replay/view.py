@@ -7,13 +7,13 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult
+from validate.numbers import fixed_with_unit, significant, spaced
 from validate.recording.mcap.schemas import POSE, POSE_KEY
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.report.scenes.loads import HOW, Instant, at_times, held
 from validate.report.sections.observations import drive, holds, outline
-from validate.report.views.numbers import fixed_with_unit, significant, spaced
 from validate.solve.types import Run
 
 Records = tuple[tuple[str, dict[str, str]], ...]

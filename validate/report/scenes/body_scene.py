@@ -12,6 +12,7 @@ from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
 from validate.fem.assembly.cell_fields import cell_fields
 from validate.fem.assembly.locate import probe_rows
+from validate.numbers import significant, spaced, with_unit
 from validate.register.clocks import interpolated
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.outlines.plane import from_image
@@ -31,7 +32,6 @@ from validate.report.sections.observations import (
     markers_seen,
     outline_seen,
 )
-from validate.report.views.numbers import significant, spaced, with_unit
 from validate.scene.scene import Scene
 
 _MM = 1e3

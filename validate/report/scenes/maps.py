@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import NodeMap, Picture
+from validate.numbers import scale, shown_unit
 from validate.report.charts.style import WIDTH, draw
-from validate.report.views.numbers import scale, shown_unit
 from validate.scene.mesh import Mesh, boundary_facets
 
 Range = tuple[float, float]

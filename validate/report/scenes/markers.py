@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit, Picture
 from validate.compare.result import MethodResult, Result
+from validate.numbers import spaced, with_unit
 from validate.register.markers.markers import MarkerObservation
 from validate.register.observation import nearest_sample
 from validate.report.charts.style import (
@@ -35,7 +36,6 @@ from validate.report.sections.observations import (
     shown_loads,
     shown_method,
 )
-from validate.report.views.numbers import spaced, with_unit
 
 _MM = 1e3
 # Wide and pale under thin and black: they are told apart on grey paper too.

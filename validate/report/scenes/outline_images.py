@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from validate.arrays import Floats
 from validate.compare.exhibit import ImageSeries, Picture, Pixels
 from validate.errors import RegistrationError
+from validate.numbers import spaced, with_unit
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
 from validate.register.outlines.round_outlines import Circle, fit_circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.sections.observations import Held
-from validate.report.views.numbers import spaced, with_unit
 
 _MM = 1e3
 _COLUMNS = 2

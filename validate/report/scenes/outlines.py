@@ -12,6 +12,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Picture, Series, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
+from validate.numbers import shown_unit, spaced
 from validate.register.outlines.outlines import (
     Corner,
     OutlineObservation,
@@ -38,7 +39,6 @@ from validate.report.sections.observations import (
     shown_loads,
     shown_method,
 )
-from validate.report.views.numbers import shown_unit, spaced
 
 _MM = 1e3
 _GREY = "#9A9A9A"

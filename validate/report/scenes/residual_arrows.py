@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Picture
+from validate.numbers import with_unit
 from validate.register.markers.quality import Registration
 from validate.report.charts.style import MEASURED, WIDTH, draw
 from validate.report.scenes.body import flattest
-from validate.report.views.numbers import with_unit
 
 _MM = 1e3
 _NAMED = 60  # markers; the names of more would hide each other

@@ -18,6 +18,7 @@ from PIL import Image
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Picture, Pixels
+from validate.numbers import significant
 from validate.report.charts.style import draw
 from validate.report.scenes.body_scene import BodyScene, fields
 from validate.report.scenes.maps import Range
@@ -33,7 +34,6 @@ from validate.report.scenes.panels import (
     triangulated,
 )
 from validate.report.scenes.residual_arrows import rounded_down
-from validate.report.views.numbers import significant
 
 ONE_COLUMN, TWO_COLUMNS = 85.0, 175.0  # mm of a journal's page
 DPI = 300

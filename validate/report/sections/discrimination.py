@@ -15,9 +15,9 @@ from validate.compare.effects import TELLS_APART, Effect
 from validate.compare.exhibit import Exhibit, Picture
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
+from validate.numbers import at_load, with_unit
 from validate.report.charts.style import ACCEPTED, MEASURED, NOISE, WIDTH, draw, panels
 from validate.report.sections.observations import finished, last_residual
-from validate.report.views.numbers import at_load, with_unit
 
 _LOWEST = 0.02  # ratios below lie there, as a sign that points on
 _LINE, _ROOM = 0.145, 0.62  # inches of a line of a model's name; of title and ticks

@@ -2,8 +2,8 @@
 
 from validate.errors import ComparisonError
 from validate.identify.recorded_motion import RecordedMotion, motion_in
+from validate.numbers import with_unit
 from validate.recording.types import Recording
-from validate.report.views.numbers import with_unit
 
 _LINES = 6
 

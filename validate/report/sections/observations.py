@@ -11,11 +11,11 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result
+from validate.numbers import significant
 from validate.register.markers.markers import MarkerObservation
 from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.report.views.numbers import significant
 from validate.scene.meshless import AnyScene
 from validate.solve.types import Run, StepTimes
 

@@ -9,11 +9,11 @@ from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
 from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
+from validate.numbers import shown_unit, with_unit
 from validate.register.markers.markers import MarkerObservation
 from validate.register.markers.quality import AsDeclared, Registration
 from validate.report.scenes.residual_arrows import residual_arrows
 from validate.report.sections.observations import markers
-from validate.report.views.numbers import shown_unit, with_unit
 from validate.report.views.records import Shown, sized, table
 
 _DECLARED = ("Nothing was fitted: the markers were recorded in the body's frame, as declared.",)

@@ -55,7 +55,8 @@ def found_besides(result: Result) -> Exhibit:
 def _as_declared(result: Result) -> Iterator[str]:
     """What the experiment declares of its verdicts, and which moved."""
     for e in result.expected:
-        yield f"Expected: {e.check} of {e.method} is {e.verdict}, because of {e.why}."
+        check = "every check" if e.check == "*" else e.check
+        yield f"Expected: {check} of {e.method} is {e.verdict}: {e.why}."
     yield from (f"Moved: {m.words}." for m in result.moved if result.expected)
 
 

@@ -13,10 +13,10 @@ import plotille
 
 from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
 from validate.errors import UsageError
+from validate.numbers import significant
 from validate.report.export.tables import across, shown, under, write_csv
 from validate.report.views.bars import bar, legend
 from validate.report.views.layout import laid, wrapped
-from validate.report.views.numbers import significant
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -155,8 +155,8 @@ def terminal(found: Exhibit, width: int) -> list[str]:
         beside = across(part)
         heads = [part.headings[i] for i in beside]
         rows = [[shown(row[i]) for i in beside] for row in part.rows]
-        if part.below and part.rows:
-            heads.append(part.below)
+        if len(beside) < len(part.headings) and part.rows:
+            heads.append("")
             rows = [[*line, under(part, row)] for line, row in zip(rows, part.rows, strict=True)]
         lines += laid(heads, rows, width)
     for chart in found.charts:

@@ -24,9 +24,7 @@ from validate.compare.exhibit import (
 from validate.compare.row import MEASURED, VALUE, LongRow
 from validate.compare.view import View, texts
 from validate.errors import ComparisonError, UsageError
-from validate.parameters import nearest_names
-from validate.report.long_table import LongTable
-from validate.report.views.numbers import (
+from validate.numbers import (
     MISSING,
     scale,
     shown_unit,
@@ -35,6 +33,8 @@ from validate.report.views.numbers import (
     to_decimal_of,
     with_unit,
 )
+from validate.parameters import nearest_names
+from validate.report.long_table import LongTable
 from validate.report.views.standard import VIEWS
 from validate.units import in_si, si_of, split
 
@@ -170,9 +170,9 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
             *(_written(view, own[j], in_cell=not (in_heads or in_lines)) for j in kept),
             *(_also(line, name, first) for name in view.also),
         ))  # fmt: skip
-    also = ["values" if name == "n" else name for name in view.also]
+    heads += ["values" if name == "n" else name for name in view.also]
     return NumberTable(
-        "", view.title, (*heads, *also), tuple(lines), view.caption, view.folded, view.below
+        "", view.title, tuple(heads), tuple(lines), view.caption, view.folded, view.below
     )
 
 

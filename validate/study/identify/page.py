@@ -9,11 +9,11 @@ import numpy as np
 from validate.compare.exhibit import Chart, Exhibit, Heat, NumberTable, Series, TableCell
 from validate.identify.identification import Profiled
 from validate.identify.profile import RISE
+from validate.numbers import scale, shown_unit
 from validate.parameters import describe
 from validate.pipeline.calibration.problem import Calibrated
 from validate.pipeline.calibration.sentences import headline, helping, lines, not_identified
 from validate.report.stored.json_values import members
-from validate.report.views.numbers import scale, shown_unit
 from validate.report.views.records import Shown, sized, table
 from validate.study.identify.study import IdentifyStudy
 from validate.study.study_page import Findings

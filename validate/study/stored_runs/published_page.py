@@ -12,9 +12,9 @@ import numpy as np
 from validate.checksums import read_sealed
 from validate.compare.exhibit import Exhibit, Intervals, NumberTable, TableCell
 from validate.errors import RecordingError
+from validate.numbers import with_unit
 from validate.report.long_table import long_table
 from validate.report.stored.folder import MARK
-from validate.report.views.numbers import with_unit
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
 from validate.study.loose_page import write_loose

@@ -12,8 +12,8 @@ from validate.arrays import Floats
 from validate.compare.bias import Estimated, Predicted, Statement, area_metric, statement
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
 from validate.errors import UsageError
+from validate.numbers import scale, shown_unit, significant, text, with_unit
 from validate.report.stored.json_values import Json
-from validate.report.views.numbers import scale, shown_unit, significant, text, with_unit
 from validate.report.views.records import Shown, chart, grouped, table, value
 from validate.study.loose_page import write_loose
 from validate.study.stored_runs.predictions import Foretold, Seen, predictions, stored_runs
