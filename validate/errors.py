@@ -4,12 +4,16 @@ The command line prints a `ValidateError` as one line and exits with 2. Messages
 that were found and a next step.
 """
 
+import re
+
+_SPACES = "\u00a0\u202f"  # of numbers and units
+
 
 def one_line(text: str) -> str:
     """The text with line ends and tabs as spaces, other signs that cannot be shown escaped: what a
     file or its name holds reaches a terminal through errors."""
-    spaced = " ".join(text.split()) if any(c in text for c in "\n\r\t\v\f") else text
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in spaced)
+    spaced = re.sub(r" *[\n\r\t\v\f][ \n\r\t\v\f]*", " ", text).strip()
+    return "".join(c if c.isprintable() or c in _SPACES else repr(c)[1:-1] for c in spaced)
 
 
 class ValidateError(Exception):

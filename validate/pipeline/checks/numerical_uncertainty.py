@@ -10,6 +10,7 @@ from validate.arrays import Floats, rms
 from validate.compare.convergence import GridConvergence, Numerical, convergence
 from validate.compare.residual import Residual
 from validate.errors import ComparisonError, SceneError
+from validate.numbers import text
 from validate.pipeline.experiment.experiment import Uncertainty, Variant
 from validate.pipeline.run.runs import ExperimentRuns, Varied
 
@@ -117,8 +118,8 @@ class Refined:
         if part != "mesh":
             return f"a step of {1e3 * size:.2g} ms"
         own = self._nominal(part)
-        unknowns = own.nodes * own.dimension / share**own.dimension
-        return f"cells of {1e3 * size:.2g} mm ({unknowns:.1g} unknowns)"
+        unknowns = float(f"{own.nodes * own.dimension / share**own.dimension:.1g}")
+        return f"cells of {1e3 * size:.2g} mm (about {text(unknowns)} unknowns)"
 
 
 def _solved(runs: ExperimentRuns, variant: Variant) -> Varied | None:

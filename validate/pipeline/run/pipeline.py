@@ -207,7 +207,7 @@ def _compared(
         effects=effects,
         published=published,
         identified=identified.scores if identified else (),
-        notes=_notes(remade, identified, main, locking),
+        notes=_notes(remade, identified, main, {n: methods[n].settings for n in main}, locking),
         locking=locking,
         warnings=warnings,
         quick=options.quick,
@@ -332,14 +332,19 @@ def _notes(
     remade: tuple[str, ...],
     identified: Identified | None,
     main: Mapping[str, MethodRun],
+    settings: Mapping[str, Any],
     locking: tuple[str, ...],
 ) -> tuple[str, ...]:
-    """What was made anew, identified, noticed by registration or schemes, not compared; locks."""
+    """What was made anew, identified, noticed by registration or schemes, not compared; locks.
+
+    What external simulators say stands in a table of their own.
+    """
     first = next(iter(main.values()))
     found = [f for r in first.registered for f in r.findings]
     markers = [m for r in first.registered for m in r.of(MarkerObservation)]
     found += [f for m in markers for f in m.registration.findings]
-    found += [f"{f.label}: {w}" for f in main.values() for run in f.runs for w in run.said]
+    own = [f for n, f in main.items() if not isinstance(settings[n], ExternalSimulator)]
+    found += [f"{f.label}: {w}" for f in own for run in f.runs for w in run.said]
     found += [
         f for pair in zip(first.registered, first.runs, strict=True) for f in unanswered(*pair)
     ]
