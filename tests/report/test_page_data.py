@@ -17,9 +17,10 @@ from report_samples import PRESS, SIDE, bare_result, small_result
 from tracking_samples import tracking_result
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Chart, Intervals, Series
+from validate.compare.exhibit import Chart, Exhibit, Intervals, Series
+from validate.report.exhibits import draw_all
 from validate.report.page.body_view import body_view
-from validate.report.page.html import forest
+from validate.report.page.html import first_pictures, forest
 from validate.report.page.plots import plot
 from validate.report.scenes.body_scene import body_scene
 from validate.report.sections.observations import markers_seen
@@ -86,6 +87,16 @@ def test_of_many_lines_the_checked_ones_and_the_first_are_shown() -> None:
     assert hidden == ["rival 4", "rival 5", "rival 6", "rival 6: noise"]
 
 
+def test_curves_of_many_recordings_have_the_name_of_their_method() -> None:
+    x = np.arange(3.0)
+    lines = tuple(Series(label, x, x, of=f"log {i}") for i in range(7) for label in ("a", "b"))
+    chart = Chart("c", "C", "t / s", "u / mm", lines)
+    assert {s["label"] for s in plot(small_result(), chart)["series"]} == {"a", "b"}
+    few = replace(chart, series=lines[:4])
+    names = [s["label"] for s in plot(small_result(), few)["series"]]
+    assert names == ["a, log 0", "b, log 0", "a, log 1", "b, log 1"]
+
+
 def test_rounding_is_left_out_as_in_the_figure() -> None:
     x = np.arange(3.0)
     lines = (Series("a", x, x + 1), Series("exact", x, 1e-14 * (x + 1)))
@@ -101,6 +112,17 @@ def test_x_always_rises(x: list[float]) -> None:
     assert all(np.all(np.diff(column) >= 0) for column in found["xs"])
     assert sum(len(s["y"]) for s in found["series"]) >= len(x)
     json.dumps(found, allow_nan=False)
+
+
+def test_without_a_body_the_first_picture_stands_on_the_first_screen() -> None:
+    x = np.arange(3.0)
+    chart = Chart("curve", "C", "t / s", "u / mm", (Series("a", x, x),))
+    limits = Intervals("limits", "L", ("a",), x[:1], x[:1], x[1:2], ("",), ("good enough",))
+    own = Exhibit("own", "Own", charts=(chart,))
+    checks = Exhibit("checks", "Checks", intervals=(limits,))
+    drawn = draw_all(bare_result(), (checks, own))
+    assert [p.name for p in first_pictures(drawn)] == ["chart_curve", "intervals_limits"]
+    assert [p.name for p in first_pictures(drawn[:1])] == ["intervals_limits"]
 
 
 # --- checks against limits ------------------------------------------------------------------------

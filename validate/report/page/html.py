@@ -116,9 +116,11 @@ def page(
 
 
 def first_pictures(exhibits: Iterable[DrawnExhibit]) -> list[Picture | ImageSeries]:
-    """The body as simulated and measured, and every check against its limit; what is there."""
+    """The body as simulated and measured, without one the first other picture, and every check
+    against its limit; what is there."""
     by_name = {picture.name: picture for e in exhibits for picture in e.pictures}
-    body = next((by_name[name] for name in _BODY if name in by_name), None)
+    names = (*_BODY, *(name for name in by_name if name != _CHECKS))
+    body = next((by_name[name] for name in names if name in by_name), None)
     return [p for p in (body, by_name.get(_CHECKS)) if p is not None]
 
 

@@ -15,6 +15,7 @@ from validate.report.charts.style import HasMethods
 _MOST = 600  # points of a series; of more, the lowest and the highest of equal parts
 _WAYS = 24  # of a line to and fro
 _DIGITS = 5
+_NAMES = 12  # of a legend; of more, the curves of one label have one name
 _SHOWN = 4  # digits of y: as many as the page shows
 
 
@@ -35,9 +36,10 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     lines = [d.series for d in drawable if d.series.style == "line" and not is_given(d.series)]
     labels = sorted(dict.fromkeys(s.label for s in lines), key=lambda label: label not in checked)
     later = tuple(labels[TOGETHER:])
+    apart = len({d.series.name for d in drawable}) <= _NAMES
     for drawn in drawable:
         of, jagged = drawn.series.label, is_jagged(drawn.series) and not drawn.one_of
-        look = {"label": drawn.series.name, "colour": drawn.look.colour,
+        look = {"label": drawn.series.name if apart else of, "colour": drawn.look.colour,
                 "dash": [] if jagged else _dash(drawn.look.dash),
                 "width": 0.9 if jagged else drawn.look.width or 1.0,
                 "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
