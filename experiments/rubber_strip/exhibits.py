@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
@@ -28,8 +29,27 @@ def exhibits(tree: Tree, cases: Cases, tell: Progress) -> ReportAdditions:
     own: Strip = tree.settings
     path = recorded(tree, Path(__file__).parent)
     tracker = stage_exhibit(path.parent, own.stage)
-    shown = (_contraction(cases), _parts(own, path))
+    x = read_points(path, own.unit).marker("points").x
+    shown = (_places(cases, x), _contraction(cases), _parts(own, x))
     return ReportAdditions((*shown, *((tracker,) if tracker else ())))
+
+
+def _places(cases: Cases, x: Floats) -> Exhibit:
+    """Points x (nt, n, 3) m at the last state, in its plane: along the strip and across it."""
+    seen = np.isfinite(x[[0, -1]]).all(axis=(0, 2))
+    rest, last = (1e3 * (one[seen] - one[seen].mean(axis=0)) for one in (x[0], x[-1]))
+    plane, moved = (np.linalg.svd(one, full_matrices=False)[2][:2].T for one in (rest, last))
+    places = {"measured": last @ moved * np.sign((plane * moved).sum(axis=0))}
+    for f in (f for f in cases[MAIN].values() if f.run.finished):
+        stretch = [f.run.traces[name].y[-1] for name in ("stretch", "free_stretch")]
+        places[f.label] = rest @ plane * stretch
+    series = tuple(Series(name, at[:, 0], at[:, 1], "points") for name, at in places.items())
+    chart = Chart(
+        "strip", "The strip at the last state", "along it / mm", "across it / mm", series,
+        caption="Each law moves the points at rest by its two stretches. The two axes have scales "
+        "of their own.",
+    )  # fmt: skip
+    return Exhibit("strip", "The strip, measured and simulated", charts=(chart,))
 
 
 def _contraction(cases: Cases) -> Exhibit:
@@ -51,8 +71,8 @@ def _contraction(cases: Cases) -> Exhibit:
     return Exhibit("contraction", "Lateral contraction of the strip", (_UNKNOWN,), charts=(chart,))
 
 
-def _parts(p: Strip, path: Path) -> Exhibit:
-    found = stretches(read_points(path, p.unit).marker("points").x, p.patches)
+def _parts(p: Strip, x: Floats) -> Exhibit:
+    found = stretches(x, p.patches)
     rows = [
         (k + 1, found.axial[-1, k], found.across[-1, k], found.ratio[0, k], found.ratio[-1, k])
         for k in range(p.patches)

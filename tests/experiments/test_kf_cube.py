@@ -6,6 +6,7 @@ the range: noise in NRMSE is 1/1.2 of that study's, the models' own error is not
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options, folder_of
 from validate.pipeline.run.pipeline import compare as compare_with
+from validate.report.write import write_report
 
 # A shipped experiment as it is replayed; its first test waits for the whole run.
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -135,6 +137,13 @@ def test_the_whole_experiment_stands(whole: Callable[[str], Result]) -> None:
     assert wrong_nu["KF-FEM as printed, gains shared"] == "none"  # blind: it sees A alone
     # A node that the plain model has right is made worse by a filter.
     assert nrmse(result, "load_scale", "@nu")[2] > 2 * nrmse(result, "fem", "@nu")[2]
+
+
+def test_the_page_is_one_file_of_less_than_3_mb(
+    whole: Callable[[str], Result], tmp_path: Path
+) -> None:
+    page = write_report(whole("kf_cube"), tmp_path / "kf_cube", created="2026-01-01T00:00:00+00:00")
+    assert page.stat().st_size < 3_000_000
 
 
 def test_a_changed_model_leaves_the_truth_and_a_changed_twin_is_recorded_anew(

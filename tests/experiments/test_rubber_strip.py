@@ -150,6 +150,12 @@ def test_the_strip_of_others(shared_data: Path) -> None:
     assert off["neo_coupled"] == pytest.approx(0.66e-3, abs=0.05e-3)
     assert off["neo_split"] == pytest.approx(2.98e-3, abs=0.05e-3)
     assert off["svk"] == pytest.approx(-28.8e-3, abs=0.5e-3)
+    (drawn,) = next(e for e in result.exhibits if e.anchor == "strip").charts
+    places = {s.label: np.column_stack([s.x, s.y]) for s in drawn.series}
+    measured = places.pop("measured")
+    far = {name: np.sqrt(((at - measured) ** 2).mean()) for name, at in places.items()}  # mm
+    assert far["neo-Hooke, coupled volume"] == pytest.approx(0.12, abs=0.06)
+    assert far["neo-Hooke, coupled volume"] < far["St. Venant-Kirchhoff"]
     tracker = next(e for e in result.exhibits if e.anchor == "tracker").tables[0]
     assert [row[1] for row in tracker.rows] == [3476, 3475]
     assert all(row[4] == pytest.approx(1.5, abs=0.2) for row in tracker.rows)  # um, along
