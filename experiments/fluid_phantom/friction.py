@@ -9,15 +9,16 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
-from validate.identify.profile import SAFETY, Interval, profile_interval
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Identified, SolvesVariants, Variant
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.plates.inclusion import MESHES, rubbing
 
 from .effects import FINEST
+from .friction_profile import Interval, profile_interval
 
 _LINEAR = {"body.element": "linear"}  # of mean dilatation
+_SAFETY = 3.0 / 2  # two meshes: Roache's factor 3 on the difference is a 95 % band, half of it u
 SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
 
 
@@ -57,7 +58,7 @@ def _mesh_share(weighed: Floats, best: int, finer: Floats, refinement: float) ->
     """
     slope = np.gradient(weighed, SHARES, axis=0)[best]
     moved = float(slope @ (finer - weighed[best])) / float(slope @ slope)
-    return SAFETY * abs(moved) / refinement
+    return _SAFETY * abs(moved) / refinement
 
 
 def _scores(fit: Interval) -> tuple[Score, ...]:
