@@ -4,13 +4,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from validate.parameters import with_given
-from validate.pipeline.experiment.experiment import Change, EffectSpec, Input, Variant, vary
-from validate.pipeline.experiment.tree import ScaledBody, Tree
+from validate.pipeline.experiment.experiment import EffectSpec, Input, Variant, vary
+from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.plates.inclusion import FINER
 from validate.pipeline.plates.inclusion import INPUTS as SHARED
 
-FINEST = ScaledBody(FINER)
+_FINER = 1.25  # times the cells along every edge: the finest mesh that is varied
+
+
+def finest(tree: Tree) -> Tree:
+    """The block with the cells of its finest mesh."""
+    return tree.with_scene(body=tree.scene.body.scaled(_FINER))
 
 
 def _rounder(tree: Tree, z: float) -> Tree:
@@ -38,7 +42,7 @@ INPUTS = (
 BASE = Variant("md_fluid")
 
 
-def _base(change: Change | Mapping[str, Any]) -> Variant:
+def _base(change: Mapping[str, Any]) -> Variant:
     return Variant("md_fluid", change_of(change))
 
 
@@ -58,7 +62,7 @@ EFFECTS = (
                Variant("p2_fluid"), Variant("p1_fluid")),
     EffectSpec("element", "P1 mean dilatation instead of P2 on the same mesh",
                Variant("p2_fluid"), BASE),
-    EffectSpec("mesh", "the finest mesh", BASE, _base(FINEST)),
+    EffectSpec("mesh", "the finest mesh", BASE, Variant("md_fluid", finest)),
     EffectSpec("loop", "the paper's loop at 1 % instead of the exact pressure",
                Variant("p1_fluid"), Variant("p1_loop")),
     EffectSpec("nearest node", "nearest node instead of interpolation",

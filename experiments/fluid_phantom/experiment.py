@@ -14,7 +14,6 @@ from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
     IdentifiedByRuns,
-    SolvesVariants,
     Twin,
     Uncertainty,
 )
@@ -27,7 +26,7 @@ from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
 
 from .effects import EFFECTS, INPUTS
-from .friction import friction_from_rise
+from .friction import SolvesVariants, friction_from_rise
 from .ladder import LADDER
 from .phantom import Phantom, load, place, read, record
 from .published import FIGURES, STATED

@@ -13,7 +13,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
-from validate.pipeline.plates.inclusion import POSITION, SWEEP
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
@@ -25,8 +24,10 @@ from validate.solve.march import march
 from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
-from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
+from validate.twin.sensors import signal, streams
 from validate.twin.ultrasound import Scanner, Target, b_mode
+
+from .sensors import OutlineSensor, Pen, StageProfile
 
 FRAME = "phantom"  # x from the probe to the stage, y up, z lateral
 _LAWS = {
@@ -104,14 +105,14 @@ def record_phantom(
             "stage": signal(t, stage, "m", twin.sd_stage, FRAME, rng["stage"]),
             "load_cell": signal(t, force, "N", twin.sd_force, FRAME, rng["load_cell"]),
             "pressure": signal(t, pressure, "Pa", twin.sd_pressure, FRAME, rng["pressure"]),
-            POSITION: position,
+            "sweep_position": position,
         },
         frames={"b_mode": _b_mode(middles, run.u, wall, size, rng["b_mode"])}
         if twin.frames
         else {},
         contours={
             "outline": outline.measure(middles, run.u, wall, rng["outline"]),
-            SWEEP: slices,
+            "sweep": slices,
         },
         metadata={
             "inclusion": _declared(capsule),

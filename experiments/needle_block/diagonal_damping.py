@@ -13,7 +13,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.compare.shapes.pair import Common
 from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
@@ -77,9 +76,8 @@ def _errors(
     ways = {PAPERS: system, MATCHED: build(replace(scene, material=other))}
     truth = _run(system, replace(IMPLICIT, dt=dt), inputs)
     only = replace(IMPLICIT, dt=dt, damping_terms="mass")
-    on = Common(scene.mesh, scene)
     return {
-        name: errors_of(_run(s, only, inputs), scene.mesh, truth.u, on, _METRICS,
+        name: errors_of(_run(s, only, inputs), scene.mesh, truth.u, scene, _METRICS,
                         range(len(INSTANTS)), name)
         for name, s in ways.items()
     }  # fmt: skip

@@ -11,8 +11,9 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
-from validate.solve.haptic.rates import DEVICE_HZ, TickTimes
+from validate.solve.haptic.rates import TickTimes
 
+from .hand import DEVICE_HZ
 from .loops import energy_exhibit, hysteresis_exhibit
 from .pocket import TOOL
 from .scene import POCKET
