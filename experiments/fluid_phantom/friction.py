@@ -12,9 +12,9 @@ from validate.compare.score import Score
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Identified, Variant
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import MESHES, rubbing
+from validate.pipeline.plates.inclusion import rubbing
 
-from .effects import finest
+from .effects import MESHES, finest
 from .friction_profile import Interval, profile_interval
 
 _LINEAR = {"body.element": "linear"}  # of mean dilatation

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from validate.arrays import Floats
 from validate.fem.assembly.locate import barycentric_rows
 from validate.recording.types import Contours, Markers
-from validate.register.outlines.plane import SurfaceSampler, section
+from validate.register.outlines.plane import SurfaceSampler
 from validate.scene.mesh import Mesh
 
 
@@ -47,9 +47,7 @@ class OutlineSensor:
         self, t: Floats, u: Floats, wall: SurfaceSampler, rng: np.random.Generator
     ) -> Contours:
         """One outline per field of u (nt, n, d) m, at times t (nt,) s."""
-        outlines = tuple(
-            self._segmented(section(wall.deformed(ui), wall.triangles, self.pose), rng) for ui in u
-        )
+        outlines = tuple(self._segmented(wall.section(ui, self.pose), rng) for ui in u)
         return Contours(t, outlines, self.sd, self.pose, self.frame)
 
     def _segmented(self, outline: Floats, rng: np.random.Generator) -> Floats:

@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
-from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
+from validate.register.outlines.plane import SurfaceSampler, cavity_sampler
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
@@ -150,7 +150,7 @@ def _b_mode(
     """An image per field of u (nt, n, d) m: fluid 30 dB below speckle, edge shadows, the plate."""
     images = []
     for load, ui in zip(PROFILE.loads, u, strict=True):
-        outline = section(wall.deformed(ui), wall.triangles, IMAGE_POSE)
+        outline = wall.section(ui, IMAGE_POSE)
         target = Target(outline, shadow=4.0, enhancement=3.0, texture=1.0, plate=size.size_x - load)
         images.append(b_mode(SCANNER, target, rng))
     pixel = SCANNER.m_per_px
