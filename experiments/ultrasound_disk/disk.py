@@ -18,10 +18,11 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.outlines.outline import extract_outline
 from validate.recording.readers import recognised
 from validate.recording.types import Contours, Recording
-from validate.register.outlines.round_outlines import ENDS, RoundOutlines
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.meshless import RigidBody
+
+from .round_outlines import ENDS, RoundOutlines
 
 FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
 OUTLINES, FOUND = "disk", "outlines"

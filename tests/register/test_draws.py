@@ -11,6 +11,7 @@ import pytest
 
 from experiments.multimode.stress_observation import StressObservation
 from experiments.stylus_phantom.touched_landmarks import TouchedLandmarks
+from experiments.ultrasound_disk.round_outlines import RoundOutlines
 from validate import register
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
@@ -36,7 +37,7 @@ from validate.register.outlines.outlines import (
     polar_angles,
     ray_points,
 )
-from validate.register.outlines.round_outlines import RoundOutlines
+from validate.register.outlines.plane import section
 from validate.register.signals import SignalObservation
 from validate.register.tools.landmarks import Digitised, Dwell, Match
 from validate.scene.geometries.box import box
@@ -201,6 +202,9 @@ class Wall:
         nodes = _tube()[0].copy()
         nodes[:, :2] = 0.005 + (nodes[:, :2] - 0.005) * (1 + 50 * u[0, 0])
         return nodes
+
+    def section(self, u: Floats, pose: Floats) -> Floats:
+        return section(self.deformed(u), self.triangles, pose)
 
 
 def _tube() -> tuple[Floats, Ints]:
