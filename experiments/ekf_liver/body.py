@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.datasets.home import data_path, sought
+from validate.datasets.home import data_path
 from validate.errors import RecordingError, SceneError
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
@@ -50,7 +50,10 @@ class LiverBody:
         """What stands for the liver on this machine; `folder` is that of the experiment."""
         if self.body != "here":
             return self.body
-        return "data" if self.file or sought(FOLDER, FILE, folder) else "generated"
+        try:
+            return "data" if self.file or data_path(FOLDER, FILE, folder) else "generated"
+        except RecordingError:
+            return "generated"
 
     def resolved(self, folder: Path) -> Mesh:
         """The mesh. Raises `RecordingError` naming the command that brings an absent file,

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.datasets.home import data_path, sought
+from validate.datasets.home import data_path
 from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
@@ -119,7 +119,12 @@ def _results(tree: Tree, folder: Path) -> Path | None:
     own: StylusPhantom = tree.settings
     if own.published:
         return data_path(FOLDER, RESULTS, folder, own.published, "published")
-    return None if tree.recording or own.landmarks else sought(FOLDER, RESULTS, folder)
+    if tree.recording or own.landmarks:
+        return None
+    try:
+        return data_path(FOLDER, RESULTS, folder)
+    except RecordingError:
+        return None
 
 
 def _options(path: Path) -> Mapping[str, str]:
