@@ -44,8 +44,8 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The drop that their hexahedra tend to, its uncertainty as `sd`; and their tetrahedra's."""
     where = data_path(FOLDER, None, folder, tree.settings.data)
     source = source_of(where / "fem_result_hex.npz", "verified (CRC-32)")
-    coarse = drop_of(_arrays(where / "fem_result_hex.npz", _SHAPES))
-    solved = drop_of(_arrays(where / "fem_result.npz", _SHAPES))
+    coarse = drop_of(read_arrays(where / "fem_result_hex.npz", _SHAPES))
+    solved = drop_of(read_arrays(where / "fem_result.npz", _SHAPES))
     low, high = sorted(FINER + (FINER - coarse) / (2**p - 1) for p in _ORDERS)
     value = Signal(_ONCE, np.array([[(low + high) / 2]]), _UNIT, (high - low) / 12**0.5, "bar")
     told = {"kind": "reference", "of": SOURCE, "tetrahedra": f"{1e3 * solved:.4f} mm"}
@@ -69,11 +69,11 @@ def drop_of(solution: Mapping[str, Floats]) -> float:
 @lru_cache(maxsize=2)
 def _tetrahedra(folder: str) -> Mesh:
     shapes: dict[str, tuple[int | None, ...]] = {"rest_q": (None, 3), "tet_indices": (None, 4)}
-    arrays = _arrays(Path(folder) / "mesh.npz", shapes)
+    arrays = read_arrays(Path(folder) / "mesh.npz", shapes)
     return Mesh(arrays["rest_q"], arrays["tet_indices"].astype(np.int64), "tet4")
 
 
-def _arrays(path: Path, shapes: Mapping[str, tuple[int | None, ...]]) -> dict[str, Floats]:
+def read_arrays(path: Path, shapes: Mapping[str, tuple[int | None, ...]]) -> dict[str, Floats]:
     """Arrays of these names and shapes; `RecordingError` for a file without them."""
     arrays = npz_arrays(path, _MOST)
     if missing := sorted(n for n in shapes if n not in arrays or arrays[n].dtype.kind not in "fiu"):
