@@ -30,7 +30,7 @@ from validate.pipeline.live import LiveRun, RecordedPath, live, prepared, realti
 from validate.pipeline.live.clock import quiet
 from validate.scene.tool import Needle
 from validate.solve.haptic.needle import NeedleLoop, NeedleStepper
-from validate.solve.haptic.rates import DEVICE_HZ, QUANTILES, TickTimes
+from validate.solve.haptic.rates import DEVICE_HZ, TickTimes
 
 METHODS = ("p2_exact", "paper")
 CELLS = 18  # along an edge of the cube: its upper side has 361 nodes
@@ -52,7 +52,7 @@ def told(name: str, seconds: Floats, deadline: float) -> None:
 
 
 def head(deadline: float) -> None:
-    names = " ".join(f"{100 * q:7g}%" for q in QUANTILES)
+    names = " ".join(f"{100 * q:7g}%" for q in TickTimes.shares)
     print(f"{'microseconds':44} {'ticks':>7} {names}  longest   met {1e6 * deadline:.0f} us / %")
 
 

@@ -26,9 +26,8 @@ from types import ModuleType
 TYPE_CHECKING = False  # as typing has it, which is not loaded here: every command imports this
 if TYPE_CHECKING:
     from validate.library.comparison import compare
-    from validate.library.experiments import load
+    from validate.library.files import load, open_recording
     from validate.library.named_study import study
-    from validate.library.recordings import open_recording
     from validate.library.run_result import open_run
     from validate.library.single_run import run
 

@@ -1,13 +1,14 @@
 """What paper 004 shows of 2-D and 3-D, beside ours: pictures of regions, and no force or time."""
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from validate.compare.published import Figure
 from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
-from validate.solve.regions.body import layers_from, node_graph, split
 
 _WIDE = 12  # cells of Fig. 2's square: its rows of the list are 13 nodes apart
 _NEAR = 2  # layers of the red region there: 3 by 3 nodes
@@ -26,11 +27,11 @@ def ring_nodes() -> dict[str, float]:
     """Nodes of the one layer around 3 by 3 in the middle of a square of quadrilaterals."""
     scene = Scene(grid((1.0, 1.0), (_WIDE, _WIDE)), Material(1.0, 0.0, rho=1.0),
                   (Support("x0", (0, 1)),))  # fmt: skip
-    K = build(scene).K
-    graph = node_graph(K, np.arange(K.shape[0]) // 2)
+    K = build(scene).K.tocoo()
+    links = csr_array((np.ones(K.nnz), (K.row // 2, K.col // 2)))
     middle = scene.mesh.nearest_node(np.array([0.5, 0.5]))
-    of = split(layers_from(graph, np.array([middle])), (_NEAR, 1), graph).of
-    return {"ring.nodes": float((of == 1).sum())}
+    away = dijkstra(links, indices=np.array([middle]), unweighted=True, min_only=True)
+    return {"ring.nodes": float((away == _NEAR).sum())}
 
 
 BLOCK_FIGURES = (

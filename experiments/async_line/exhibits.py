@@ -22,7 +22,7 @@ from validate.solve.regions.scheme import AsyncRegions
 
 from .methods import LINE
 from .probe import chirp, growing, pad_of
-from .runs import growth, off, peak, pushed
+from .runs import off, peak, pushed
 from .tables import ENERGY, FORCE, energy_table, force_table
 from .twin import bar, impedance, sets, whole_of, with_cells
 
@@ -129,7 +129,7 @@ _BORDERS = (
 def spring_words(tree: Tree) -> tuple[str, ...]:
     """A warning where the probe's spring is too stiff for the whole solve: it oscillates."""
     p = tree.settings
-    grows = growth(bar(tree), whole_of(tree))
+    grows = whole_of(tree).prepare(build(bar(tree))).growth()
     if grows <= 1:
         return ()
     return (
@@ -194,6 +194,7 @@ def _energies(tree: Tree, main: Mapping[str, MethodRun]) -> NumberTable:
 def _stability(tree: Tree) -> Heat:
     """Growth a tick over the step ratio, by border and solvers."""
     dt, scene = tree.settings.dt, with_cells(tree, _SHORT)
+    system = build(scene)
     base = replace(whole_of(tree), layers=(_NEAR,), rates=(50.0,), pad=pad_of(scene))
     near = replace(base, beyond_limit="run")
     kinds = {
@@ -207,7 +208,7 @@ def _stability(tree: Tree) -> Heat:
         "all explicit, interpolated": replace(near, solvers=("explicit",)),
     }
     values = [
-        [growth(scene, replace(s, rates=(1 / (dt * ratio),))) for ratio in _RATIOS]
+        [replace(s, rates=(1 / (dt * ratio),)).prepare(system).growth() for ratio in _RATIOS]
         for s in kinds.values()
     ]
     return Heat(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from time import thread_time
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,7 @@ from validate.arrays import Floats
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
 from validate.solve.regions.krylov import TouchedKrylov
-from validate.solve.regions.march import spectral_radius
-from validate.solve.regions.scheme import AsyncRegions, RegionStepper
-from validate.solve.types import Noticing
+from validate.solve.regions.scheme import AsyncRegions
 
 from .probe import PROBE
 
@@ -39,10 +36,6 @@ class Pushed:
     words: tuple[str, ...]
 
 
-def stepper_of(scene: Scene, settings: AsyncRegions) -> RegionStepper:
-    return cast(RegionStepper, settings.prepare(build(scene)))
-
-
 def pushed(
     scene: Scene, settings: AsyncRegions | TouchedKrylov, path: Floats, account: bool = False
 ) -> Pushed:
@@ -64,7 +57,7 @@ def pushed(
         changed.append(state.numbers.get(f"{PROBE}.changed", 0.0) > 0)
         if ledger:
             ledger = ledger.after(stepper.field(state), x, np.array(forces[-1]))
-    words = stepper.notices(state) if isinstance(stepper, Noticing) else ()
+    words = stepper.notices(state) if hasattr(stepper, "notices") else ()
     ends = (state.failure[1],) if state.failure else ()
     return Pushed(
         np.array(forces).reshape(-1, len(names))[:, 0], np.array(seconds), np.array(layers),
@@ -110,20 +103,6 @@ class Ledger:
             made=max(self.made, held + lost - put), most=max(self.most, put),
             missing=max(self.missing, put - held - lost),
         )  # fmt: skip
-
-
-def growth(scene: Scene, settings: AsyncRegions) -> float:
-    """Spectral radius over a common period, a tick (the period's root), with the probe held."""
-    stepper = stepper_of(scene, settings)
-    state = stepper.step(stepper.rest(), np.zeros(scene.mesh.dimension))
-    held, regions = state.inner.held, state.inner.regions
-    pull = np.stack([stepper.probe.nodal(held, np.array(stepper.tool.tip), u)
-                     for u in np.eye(len(stepper.body.at))], axis=1)  # fmt: skip
-
-    def forces(visible: Floats) -> Floats:
-        return np.asarray(pull @ visible)
-
-    return float(spectral_radius(regions.coupled, forces) ** (1 / regions.coupled.common))
 
 
 def peak(force: Floats, t: Floats, around: float, within: float) -> float:

@@ -14,7 +14,7 @@ from validate.parameters import Ranges, known, quantity
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.plates.scene import pressed_log
-from validate.recording.tables.testing_machine import read_instron
+from validate.recording.readers import recognised
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.scene.scene import Scene
@@ -77,7 +77,7 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     files = sorted(where.glob(p.logs))
     if not files:
         raise RecordingError(f"no logs '{p.logs}' in {where}; pass --set logs=PATTERN")
-    return tuple(read_instron(f) for f in files)
+    return tuple(recognised(f).read(f, {}) for f in files)
 
 
 def size(tree: Tree) -> CylinderSize:

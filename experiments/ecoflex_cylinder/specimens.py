@@ -14,7 +14,7 @@ import numpy as np
 from validate.compare.score import Score
 from validate.errors import RecordingError, UsageError
 from validate.identify.budget import Votes, by_specimen
-from validate.identify.modulus import ModulusFit, ModulusSummary
+from validate.identify.modulus import ModulusFit
 from validate.recording.types import Recording
 
 _NAMES = (re.compile(r"(.+)_([A-Za-z]+)_sample_\d+"), re.compile(r"(.+)_([A-Z]+)\d+"))
@@ -82,6 +82,19 @@ def split(recordings: Sequence[Recording], judged: str | None) -> HeldOut:
         )
     out = chosen[0] if chosen else every[-1]
     return HeldOut(out, tuple(s for s in every if s != out) or every)
+
+
+@dataclass(frozen=True)
+class ModulusSummary:
+    """Mean over repeats, Pa. The scatter of repeats on one specimen understates that of specimens.
+
+    `sd_repeats` is None for a single log; `sd_mean` is then that fit's own standard error.
+    """
+
+    mean: float
+    sd_repeats: float | None
+    sd_mean: float
+    fits: tuple[ModulusFit, ...]
 
 
 def summarised(fits: Sequence[ModulusFit], specimens: Sequence[str]) -> ModulusSummary:

@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.compare.exhibit import Entry, Exhibit, NumberTable, plain
-from validate.pipeline.exhibits.standard import error_at
+from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
@@ -35,13 +34,15 @@ def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     progress("readings of the force")
     readings = readings_table(explicit.body, _PRINTED_FORCE, "z")
     progress("locking")
-    locked = locking_table(explicit.body, _NU)
+    locking = locking_table(explicit.body, _NU)
+    locked = locking.rows[-1][1]
+    assert isinstance(locked, float)
     limits = steps_table(explicit.body, _PRINTED_STEP)
     share = kinetic_share(explicit)
     numbers = {
         "nodes": float(len(explicit.body.mesh.nodes)),
         "cells": float(len(explicit.body.mesh.cells)),
-        "locking": float(plain(locked.rows[-1][1]) or 0.0),
+        "locking": locked,
         "fields_apart": fields_apart(cases.get("small", {}), ("ekf_held", "nfem")),
     }
     if share is not None:
@@ -57,7 +58,7 @@ def tell_cone(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
         "elements",
         "Element, material and force",
         (_inertia_words(tree.settings.clock.scale, share),),
-        (_forces(main), locked, readings, limits, _cards(tree, main)),
+        (_forces(main), locking, readings, limits, _cards(tree, main)),
     )
     return ReportAdditions((signals, elements), numbers)
 
@@ -124,15 +125,19 @@ def _noise_table(cases: Cases) -> NumberTable:
     )
 
 
+def _error_z(followed: MethodRun, probe: str) -> Floats:
+    """Estimate less truth (nt,) m at a probe, along z."""
+    return followed.run.traces[f"{probe}.z"].y - followed.reference(probe)[:, 2]
+
+
 def _ranking(main: Mapping[str, MethodRun], force: float) -> NumberTable:
     """Methods by their error at B, which no filter is given."""
     errors = {
-        f.label: (error_at(f, "node_B", "z"), error_at(f, "node_A", "z"))
+        f.label: [_MM * rms(_error_z(f, probe)) for probe in ("node_B", "node_A")]
         for f in main.values()
         if "node_B" in f.scored
     }
-    off = {k: [_MM * rms(e.values) for e in v] for k, v in errors.items()}
-    ordered = sorted(off.items(), key=lambda item: item[1][0])
+    ordered = sorted(errors.items(), key=lambda item: item[1][0])
     rows: tuple[tuple[Entry, ...], ...] = tuple(
         (i + 1, label, *values) for i, (label, values) in enumerate(ordered)
     )

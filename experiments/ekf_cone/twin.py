@@ -10,7 +10,7 @@ law for its St. Venant-Kirchhoff; a tracked plate, where the paper does not say 
 Its 0.15 N compress this cone by a few hundredths of a millimetre at most: `force` is a setting.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from validate.errors import SceneError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
 from validate.parameters import quantity
-from validate.recording.types import Record, Recording
+from validate.recording.types import Recording
 from validate.scene.geometries.specification import Cone
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
@@ -178,7 +178,7 @@ def crosshead(settings: ConeTwin, compression: Floats, force: Floats) -> Floats:
     return np.asarray(compression + force / settings.machine + seating)
 
 
-def _declared(settings: ConeTwin, mesh: Mesh) -> Record:
+def _declared(settings: ConeTwin, mesh: Mesh) -> Mapping[str, str]:
     material = settings.material
     return {
         "law": "compressible neo-Hookean",
@@ -191,7 +191,7 @@ def _declared(settings: ConeTwin, mesh: Mesh) -> Record:
     }
 
 
-def _records(cone: Cone, settings: ConeTwin) -> dict[str, Record]:
+def _records(cone: Cone, settings: ConeTwin) -> dict[str, Mapping[str, str]]:
     s = settings
     return {
         "specimen": {

@@ -13,10 +13,10 @@ from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.run.method_run import Cases
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
-from validate.solve.haptic.rates import HAPTIC_HZ, VISUAL_HZ
+from validate.solve.haptic.rates import HAPTIC_HZ
 
 from .published import PRINTED_STEP
-from .rates import Integrator, cells_at, measured_rates, rates_exhibit
+from .rates import VISUAL_HZ, Integrator, cells_at, measured_rates, rates_exhibit
 from .tables import (
     fields_apart,
     locking_table,

@@ -8,12 +8,13 @@ import numpy as np
 
 from validate.compare.exhibit import Entry, NumberTable
 from validate.fem.critical import critical_step
-from validate.fem.locking import locking_factor
 from validate.fem.system import build as build_system
 from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Load, Scene
 from validate.solve.march import march
 from validate.solve.static.newton import StaticNewton
+
+from .locking import locking_factor
 
 
 def readings_table(scene: Scene, force: float, axis: str) -> NumberTable:

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.datasets.home import data_path, sought
+from validate.datasets.home import data_path
 from validate.errors import RecordingError, SceneError
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
@@ -22,7 +22,7 @@ from validate.pipeline.experiment.tree import Tree, beside
 from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.scene.geometries.box import box
-from validate.scene.mesh import Mesh, require_positive_cells
+from validate.scene.mesh import Mesh, cell_volumes
 from validate.scene.mesh_files.mesh_file import read_mesh
 
 FOLDER, FILE = "mesh/liver", "Liver_Iso_935n_4408t.inp"
@@ -50,7 +50,10 @@ class LiverBody:
         """What stands for the liver on this machine; `folder` is that of the experiment."""
         if self.body != "here":
             return self.body
-        return "data" if self.file or sought(FOLDER, FILE, folder) else "generated"
+        try:
+            return "data" if self.file or data_path(FOLDER, FILE, folder) else "generated"
+        except RecordingError:
+            return "generated"
 
     def resolved(self, folder: Path) -> Mesh:
         """The mesh. Raises `RecordingError` naming the command that brings an absent file,
@@ -73,7 +76,8 @@ def generated_liver(cells: tuple[int, int, int] = CELLS) -> Mesh:
     """
     grid = box((2.0, 2.0, 2.0), cells)
     mesh = Mesh(_bent(grid.nodes - 1) * np.array(SIZE) / 2, grid.cells, "tet4")
-    require_positive_cells(mesh)
+    if (cell_volumes(mesh) <= 0).any():
+        raise SceneError(f"{cells} cells: the bending turns a cell over; use other numbers")
     return mesh
 
 

@@ -20,7 +20,7 @@ from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import driving, validating
 from validate.scene.scene import Drive, Pin, Scene, Support
-from validate.solve.fluid.cavities import MMHG, ElasticPressure, ExactPressure, PulsePressure
+from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, PulsePressure
 from validate.solve.march import march
 from validate.twin.sensors import signal, streams
 
@@ -57,8 +57,8 @@ class FluidLaws:
     preset: float = quantity(0.0, "Pa", "Pe of a reservoir, P = Pe - B (V/V0 - 1)")
     stiffness: float = quantity(5e3, "Pa", "B of the reservoir")
     bulk_modulus: float = quantity(2.2e9, "Pa", "of a compressible fluid")
-    pulse_low: float = quantity(80 * MMHG, "Pa", "least pressure of the pulse")
-    pulse_high: float = quantity(120 * MMHG, "Pa", "largest pressure of the pulse")
+    pulse_low: float = quantity(PulsePressure.low, "Pa", "least pressure of the pulse")
+    pulse_high: float = quantity(PulsePressure.high, "Pa", "largest pressure of the pulse")
     pulse_rate: float = quantity(70 / 60, "1/s", "pulses a second")
 
     def __post_init__(self) -> None:

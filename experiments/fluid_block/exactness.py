@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.fem.linear_solvers.condense import Condensed, Swapped, condense
+from validate.fem.linear_solvers.condense import Condensed, condense
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress
@@ -12,6 +12,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.scene.places import nodes_of
 
 from .block import slab
+from .boundary_swap import Swapped
 
 _SWAPS = 10_000
 _NU = 0.485  # the phantom's

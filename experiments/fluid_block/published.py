@@ -1,10 +1,10 @@
 """Figures of paper 000, section 3.3, for the planar block."""
 
 from validate.compare.published import Figure, setting
-from validate.solve.fluid.pressure_curve import RATIOS
 from validate.solve.fluid.pressure_loop import PressureLoop
 
 from .block import PressedBlock
+from .curves import RATIOS
 from .scene import SCENE
 
 _ASSUMED = "cavity, boundary, plane state and tool are not printed: ours"

@@ -20,23 +20,23 @@ from validate.pipeline.experiment.tree import Tree
 from validate.scene.geometries.hollow_block import HollowBlock
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.fluid.pressure_curve import tuned_gain
-from validate.solve.fluid.pressure_loop import (
-    PressureLoop,
-    UpdateName,
-    gain_matrix,
-    spectral_radius,
-)
+from validate.solve.fluid.pressure_loop import PressureLoop
 from validate.solve.types import Scheme, State
 
 from .block import ToolName, slab
 
 TOLERANCES = (1e-2, 1e-3, 1e-12)
 TOOLS: tuple[ToolName, ...] = ("needle", "patch", "plate")
-_ONE: tuple[UpdateName, ...] = (
-    "proportional", "retuned", "piecewise", "secant", "newton", "golden",
-)  # fmt: skip
-_SEVERAL: tuple[UpdateName, ...] = ("proportional", "retuned", "secant", "newton")
 _MOST = 500
+_ONE = (
+    PressureLoop(update="proportional", max_updates=_MOST),
+    PressureLoop(update="retuned", max_updates=_MOST),
+    PressureLoop(update="piecewise", max_updates=_MOST),
+    PressureLoop(update="secant", max_updates=_MOST),
+    PressureLoop(update="newton", max_updates=_MOST),
+    PressureLoop(update="golden", max_updates=_MOST),
+)
+_OF_ONE_CAVITY = ("piecewise", "golden")
 _SEPTA = (0.25, 0.5, 1.0, 2.0)  # of the septum as set
 
 
@@ -78,18 +78,18 @@ def updates_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, flo
     return Exhibit("updates", "Updates of the pressure", words, tuple(tables), (chart,)), numbers
 
 
-def _laws(p: Tree) -> tuple[UpdateName, ...]:
-    return _ONE if p.scene.body.cavities.count == 1 else _SEVERAL
+def _laws(p: Tree) -> tuple[PressureLoop, ...]:
+    several = p.scene.body.cavities.count > 1
+    return tuple(law for law in _ONE if not (several and law.update in _OF_ONE_CAVITY))
 
 
 def _cold(r: Responses, p: Tree) -> dict[tuple[str, float], list[State]]:
     """States by law and tolerance at every strain, each from rest."""
     found: dict[tuple[str, float], list[State]] = {}
-    for name in _laws(p):
+    for law in _laws(p):
         for tolerance in TOLERANCES:
-            loop = PressureLoop(update=name, tolerance=tolerance, max_updates=_MOST,
-                                warm_start=False)  # fmt: skip
-            found[name, tolerance] = _states(loop, r, p)
+            loop = replace(law, tolerance=tolerance, warm_start=False)
+            found[law.update, tolerance] = _states(loop, r, p)
     found["exact", 1e-12] = _states(ExactPressure(), r, p)
     return found
 
@@ -132,8 +132,8 @@ def _warm(scheme: Scheme, r: Responses, p: Tree) -> list[State]:
 
 def _warm_table(tool: str, r: Responses, p: Tree) -> NumberTable:
     loops: list[tuple[str, float, Scheme]] = [
-        (name, tolerance, PressureLoop(update=name, tolerance=tolerance, max_updates=_MOST))
-        for name in _laws(p)
+        (law.update, tolerance, replace(law, tolerance=tolerance))
+        for law in _laws(p)
         for tolerance in TOLERANCES
     ]
     rows: list[tuple[Entry, ...]] = []
@@ -193,7 +193,7 @@ def _row(r: Responses, p: Tree, gains: str, loop: PressureLoop) -> tuple[tuple[E
     exact = ExactPressure().on(r)
     solved = exact.step(exact.rest(), drive)
     z = np.concatenate([[1.0], solved.inner.z])
-    radius = spectral_radius(r, z, gain_matrix(r, loop))
+    radius = loop.spectral_radius(r, z)
     stepper = loop.on(r)
     state = stepper.step(stepper.rest(), drive)
     ends = "settled" if state.failure is None else f"{state.failure[0]}: {state.failure[1]}"

@@ -14,20 +14,18 @@ from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
     IdentifiedByRuns,
-    SolvesVariants,
     Twin,
     Uncertainty,
 )
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import MESHES
 from validate.recording.types import Recording
 from validate.solve.external.scheme import ExternalSimulator
 from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.fluid.pressure_loop import PressureLoop
 
-from .effects import EFFECTS, INPUTS
-from .friction import friction_from_rise
+from .effects import EFFECTS, INPUTS, MESHES
+from .friction import SolvesVariants, friction_from_rise
 from .ladder import LADDER
 from .phantom import Phantom, load, place, read, record
 from .published import FIGURES, STATED

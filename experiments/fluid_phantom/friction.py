@@ -1,6 +1,6 @@
 """How much the plates of paper 000's phantom rub, from how far its markers rise."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,15 +9,18 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.residual import Residual
 from validate.compare.score import Score
-from validate.identify.profile import SAFETY, Interval, profile_interval
 from validate.parameters import with_given
-from validate.pipeline.experiment.experiment import Identified, SolvesVariants, Variant
+from validate.pipeline.experiment.experiment import Identified, Variant
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import MESHES, rubbing
+from validate.pipeline.plates.inclusion import rubbing
 
-from .effects import FINEST
+from .effects import MESHES, finest
+from .friction_profile import Interval, profile_interval
 
 _LINEAR = {"body.element": "linear"}  # of mean dilatation
+_SAFETY = 3.0 / 2  # two meshes: Roache's factor 3 on the difference is a 95 % band, half of it u
+#: Solves variants side by side and returns the residuals of each by name.
+SolvesVariants = Callable[[Sequence[Variant]], Sequence[Mapping[str, Residual]]]
 SHARES = np.array([0.0, 0.03, 0.08, 0.15, 0.3, 0.5, 0.75, 1.0])
 
 
@@ -32,7 +35,7 @@ def friction_from_rise(parameters: Tree, method: str, solves: SolvesVariants) ->
     weighed = np.array([_weighed(found) for found in risen])
     chi_square = (weighed**2).sum(axis=1)
     best = int(np.argmin(chi_square))
-    refined = FINEST(parameters)
+    refined = finest(parameters)
     finer = _weighed(rises(SHARES[best : best + 1], refined)[0])
     ratio = parameters.scene.body.cell_size / refined.scene.body.cell_size
     mesh = _mesh_share(weighed, best, finer, ratio**MESHES.order - 1)
@@ -57,7 +60,7 @@ def _mesh_share(weighed: Floats, best: int, finer: Floats, refinement: float) ->
     """
     slope = np.gradient(weighed, SHARES, axis=0)[best]
     moved = float(slope @ (finer - weighed[best])) / float(slope @ slope)
-    return SAFETY * abs(moved) / refinement
+    return _SAFETY * abs(moved) / refinement
 
 
 def _scores(fit: Interval) -> tuple[Score, ...]:

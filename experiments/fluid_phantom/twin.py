@@ -13,9 +13,8 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
-from validate.pipeline.plates.inclusion import POSITION, SWEEP
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
-from validate.register.outlines.plane import SurfaceSampler, cavity_sampler, section
+from validate.register.outlines.plane import SurfaceSampler, cavity_sampler
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
@@ -25,8 +24,10 @@ from validate.solve.march import march
 from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
-from validate.twin.sensors import OutlineSensor, Pen, StageProfile, signal, streams
+from validate.twin.sensors import signal, streams
 from validate.twin.ultrasound import Scanner, Target, b_mode
+
+from .sensors import OutlineSensor, Pen, StageProfile
 
 FRAME = "phantom"  # x from the probe to the stage, y up, z lateral
 _LAWS = {
@@ -104,14 +105,14 @@ def record_phantom(
             "stage": signal(t, stage, "m", twin.sd_stage, FRAME, rng["stage"]),
             "load_cell": signal(t, force, "N", twin.sd_force, FRAME, rng["load_cell"]),
             "pressure": signal(t, pressure, "Pa", twin.sd_pressure, FRAME, rng["pressure"]),
-            POSITION: position,
+            "sweep_position": position,
         },
         frames={"b_mode": _b_mode(middles, run.u, wall, size, rng["b_mode"])}
         if twin.frames
         else {},
         contours={
             "outline": outline.measure(middles, run.u, wall, rng["outline"]),
-            SWEEP: slices,
+            "sweep": slices,
         },
         metadata={
             "inclusion": _declared(capsule),
@@ -149,7 +150,7 @@ def _b_mode(
     """An image per field of u (nt, n, d) m: fluid 30 dB below speckle, edge shadows, the plate."""
     images = []
     for load, ui in zip(PROFILE.loads, u, strict=True):
-        outline = section(wall.deformed(ui), wall.triangles, IMAGE_POSE)
+        outline = wall.section(ui, IMAGE_POSE)
         target = Target(outline, shadow=4.0, enhancement=3.0, texture=1.0, plate=size.size_x - load)
         images.append(b_mode(SCANNER, target, rng))
     pixel = SCANNER.m_per_px

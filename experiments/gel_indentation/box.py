@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, reduce
-from operator import or_
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,21 +16,21 @@ from validate.parameters import known, quantity
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
 from validate.register.markers.displacements import DisplacementObservation
-from validate.register.markers.link import best_neighbours, local_fit, noise
 from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import grid, member
 from validate.scene.mesh import Kind, Mesh, quadratic
-from validate.scene.places import Chosen, Labelled, Site, nodes_of
+from validate.scene.places import Labelled, nodes_of
 from validate.scene.scene import DriveShape, Scene
 
+from .particle_linking import best_neighbours, local_fit, noise
 from .particles import files, linked_pair, motion, side_of
 
 Which = Literal["lower", "upper"]
 
-_SIDES: list[Site] = [Labelled(f"{axis}{end}") for axis in "xyz" for end in (0, 1)]
-FACES: Chosen = reduce(or_, _SIDES).faces
+_X, _Y, _Z = (Labelled(f"{axis}0") | Labelled(f"{axis}1") for axis in "xyz")
+FACES = (_X | _Y | _Z).faces
 _SIZES = ("x", "y", "side", "bottom", "middle", "top")
 _FEWEST = 50  # particles to compare
 _SMALL, _LARGE = 0.06, 0.2  # strain norms a spacing below the tops of the boxes

@@ -17,10 +17,10 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.register.markers.displacements import DisplacementObservation
-from validate.register.markers.link import local_fit, noise
 from validate.solve.march import run_scheme
 
 from .box import GelBoxes, Same, build, place, strain_norms
+from .particle_linking import local_fit, noise
 from .particles import motion
 from .poisson_ratio import GelRatio, between, scatter
 

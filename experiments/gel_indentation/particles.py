@@ -19,10 +19,12 @@ from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Entry, NumberTable
 from validate.datasets.home import data_path, named
 from validate.errors import RecordingError, UsageError
-from validate.files import read_bytes, read_text
+from validate.files import read_text
+from validate.recording.reader import source_of
 from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording, Source
-from validate.register.markers.link import Linked, link, local_fit, noise
+
+from .particle_linking import Linked, link, local_fit, noise
 
 FOLDER = "field/gel-indentation"
 STREAM = "particles"
@@ -57,7 +59,7 @@ def side_of(voxel: float | None, before: Path) -> float:
     said = _SAYS.search(read_text(text)) if text.is_file() else None
     if said:
         return float(said[1]) * _UNITS[said[2].lower()]
-    mark = sha256(read_bytes(before)).hexdigest()
+    mark = source_of(before, "").sha256
     if any(mark == f.sha256 for f in named(FOLDER).files):
         return _KNOWN
     raise UsageError(

@@ -16,14 +16,12 @@ from scipy.interpolate import CubicSpline
 
 from validate.arrays import Floats, rms
 from validate.errors import RegistrationError
-from validate.fem.assembly.assemble import stiffness
-from validate.fem.linear_solvers.factor import factorise
+from validate.fem.system import build
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Tree
-from validate.register.markers.link import noise
 from validate.scene.material import Material
 from validate.scene.places import nodes_of
-from validate.scene.scene import Scene
+from validate.scene.scene import Scene, Support
 
 from .box import (
     FACES,
@@ -34,6 +32,7 @@ from .box import (
     inside_of,
     neighbours_of,
 )
+from .particle_linking import noise
 from .particles import motion
 
 SMOOTHINGS = (0.5, 1.0, 2.0)
@@ -100,7 +99,9 @@ def _fitted(whose: Same, name: str, box: GelBoxes) -> list[GelRatio]:
     moved = [faces_of(whose, box, GelFaces(count, times)) for times in SMOOTHINGS]
     mesh = box.resolved(Path())
     held = nodes_of(mesh, FACES)
-    fields = np.stack([solved(Scene(mesh, Material(1.0, nu)), held, moved) for nu in RATIOS])
+    faces = (Support(FACES),)
+    scenes = (Scene(mesh, Material(1.0, nu), supports=faces) for nu in RATIOS)
+    fields = np.stack([solved(scene, held, moved) for scene in scenes])
     floor, sd = noise(seen.points, seen.u)
     rows = []
     for k, times in enumerate(SMOOTHINGS):
@@ -111,15 +112,11 @@ def _fitted(whose: Same, name: str, box: GelBoxes) -> list[GelRatio]:
 
 
 def solved(scene: Scene, held: np.ndarray, moved: list[Floats]) -> Floats:
-    """Fields (c, n, 3) m of a body whose nodes `held` are moved in c ways."""
-    n = scene.mesh.nodes.size
-    dofs = (3 * held[:, None] + np.arange(3)).ravel()
-    free = np.setdiff1d(np.arange(n), dofs)
-    u = np.zeros((n, len(moved)))
-    u[dofs] = np.stack([m.ravel() for m in moved], axis=1)
-    K = stiffness(scene)
-    factor = factorise(K[free][:, free].tocsr(), free // 3, scene.mesh.nodes)
-    u[free] = -factor.solve(np.asarray((K @ u)[free]))
+    """Fields (c, n, 3) m of a body whose supported nodes `held` are moved in c ways."""
+    system = build(scene)
+    u = np.zeros((scene.mesh.nodes.size, len(moved)))
+    u[(3 * held[:, None] + np.arange(3)).ravel()] = np.stack([m.ravel() for m in moved], axis=1)
+    u[system.free] = -system.factor().solve(np.asarray((system.K @ u)[system.free]))
     return u.T.reshape(len(moved), -1, 3)
 
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from validate.compare.convergence import Richardson, richardson
+from validate.compare.convergence import richardson
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.compare.published import Claim, Figure
+from validate.compare.published import Figure
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Built, Tree
@@ -30,14 +30,14 @@ def tell(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     main = cases[MAIN]
     progress("the converged value")
     found = {g: _converged(tree, g) for g in _GRADINGS}
-    limits = [float(at.extrapolated[0, 0]) for _, at in found.values()]
+    limits = [limit for _, limit, _ in found.values()]
     value = sum(limits) / len(limits)
-    half = max(at.index for _, at in found.values())
+    half = max(index for _, _, index in found.values())
     numbers = {"drop.converged": value, "drop.converged.half_interval": half}
     numbers |= {f"drop.hexahedra.{n}": _drop(hexahedra(tree, n)) for n in _HEXAHEDRA}
     own = (("tetrahedra", "drop.tetrahedra"), ("hexahedra", "drop.hexahedra.9"))
     numbers |= {name: sunk(main[m].run) for m, name in own if main[m].run.finished}
-    rows = [(g, str(n), _MM * d) for g, (drops, _) in found.items() for n, d in drops.items()]
+    rows = [(g, str(n), _MM * d) for g, (drops, _, _) in found.items() for n, d in drops.items()]
     rows += [(g, "infinitely many", _MM * x) for g, x in zip(found, limits, strict=True)]
     words = (
         f"The drop converges to {_MM * value:.4f} mm, within {_MM * half:.4f} mm: the mean of what "
@@ -51,13 +51,14 @@ def tell(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
     )
 
 
-def _converged(tree: Tree, grading: float) -> tuple[dict[int, float], Richardson]:
-    """Drops m by cells across, and where they tend to."""
+def _converged(tree: Tree, grading: float) -> tuple[dict[int, float], float, float]:
+    """Drops m by cells across, the drop m they tend to, and its grid convergence index m."""
     body = replace(tree.scene.body, grading=grading)
     graded = {n: replace(body, cells=(n, n, 3 * n)) for n in _MESHES}
     drops = {n: _drop(BUILT(None, tree.with_scene(body=one))) for n, one in graded.items()}
     answers = [np.array([[d]]) for d in drops.values()]
-    return drops, richardson([1 / n for n in drops], answers, _ORDER)
+    found = richardson([1 / n for n in drops], answers, _ORDER)
+    return drops, float(found.extrapolated[0, 0]), found.index
 
 
 def hexahedra(tree: Tree, across: int) -> Scene:
@@ -78,8 +79,9 @@ def _ours(name: str, of: str, theirs: float, expected: float) -> Figure:
                   expected, 1e-8)  # fmt: skip
 
 
-def _other(name: str, theirs: float, reason: str, claim: Claim = "not reproduced") -> Figure:
-    return Figure(name, "told:drop.converged", theirs, 1e-3 * theirs, "m", claim, reason, SOURCE)
+def _other(name: str, theirs: float, reason: str) -> Figure:
+    return Figure(name, "told:drop.converged", theirs, 1e-3 * theirs, "m", "not reproduced", reason,
+                  SOURCE)  # fmt: skip
 
 
 _ENGINE = "NVIDIA Newton's solver: no mesh of the same law agrees with it"

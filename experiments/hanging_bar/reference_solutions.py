@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
+from validate.arrays import Floats, checked
 from validate.datasets.home import data_path
+from validate.errors import RecordingError
+from validate.files import npz_arrays
 from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.tables.npz_points import read_arrays
+from validate.recording.reader import source_of
 from validate.recording.types import Recording, Signal
 from validate.register.observation import Deviation, Role, Selection, Simulated
 from validate.register.registration import Registered
@@ -30,6 +32,7 @@ FINER = 43.82e-3  # m: its 12 x 12 x 32 hexahedra, as printed; the file has the 
 _ORDERS = (1.0, 2.0)
 _UP, _UNIT = 2, "m"
 _ONCE = np.ones(1)
+_MOST = 200_000_000  # bytes of one file, unpacked
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,9 @@ class SolvedByOthers:
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     """The drop that their hexahedra tend to, its uncertainty as `sd`; and their tetrahedra's."""
     where = data_path(FOLDER, None, folder, tree.settings.data)
-    source, hexa = read_arrays(where / "fem_result_hex.npz", _SHAPES)
-    _, tets = read_arrays(where / "fem_result.npz", _SHAPES)
-    coarse, solved = drop_of(hexa), drop_of(tets)
+    source = source_of(where / "fem_result_hex.npz", "verified (CRC-32)")
+    coarse = drop_of(read_arrays(where / "fem_result_hex.npz", _SHAPES))
+    solved = drop_of(read_arrays(where / "fem_result.npz", _SHAPES))
     low, high = sorted(FINER + (FINER - coarse) / (2**p - 1) for p in _ORDERS)
     value = Signal(_ONCE, np.array([[(low + high) / 2]]), _UNIT, (high - low) / 12**0.5, "bar")
     told = {"kind": "reference", "of": SOURCE, "tetrahedra": f"{1e3 * solved:.4f} mm"}
@@ -66,8 +69,19 @@ def drop_of(solution: Mapping[str, Floats]) -> float:
 @lru_cache(maxsize=2)
 def _tetrahedra(folder: str) -> Mesh:
     shapes: dict[str, tuple[int | None, ...]] = {"rest_q": (None, 3), "tet_indices": (None, 4)}
-    _, arrays = read_arrays(Path(folder) / "mesh.npz", shapes)
+    arrays = read_arrays(Path(folder) / "mesh.npz", shapes)
     return Mesh(arrays["rest_q"], arrays["tet_indices"].astype(np.int64), "tet4")
+
+
+def read_arrays(path: Path, shapes: Mapping[str, tuple[int | None, ...]]) -> dict[str, Floats]:
+    """Arrays of these names and shapes; `RecordingError` for a file without them."""
+    arrays = npz_arrays(path, _MOST)
+    if missing := sorted(n for n in shapes if n not in arrays or arrays[n].dtype.kind not in "fiu"):
+        raise RecordingError(f"{path.name}: no numbers {missing}; it has {sorted(arrays)}")
+    return {
+        name: checked(arrays[name], f"{path.name}: {name}", shape, error=RecordingError)
+        for name, shape in shapes.items()
+    }
 
 
 @dataclass(frozen=True)

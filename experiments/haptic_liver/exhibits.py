@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.compare.force_error import HeldForce
 from validate.fem.critical import critical_step
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.live import LiveRun, RecordedPath, live
+from validate.pipeline.live import RecordedPath, live
 from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.haptic.loop import NAMES, HapticLoop, HapticStepper, between_answers
-from validate.solve.haptic.rates import QUANTILES, RealTime, TickTimes
+from validate.solve.haptic.loop import HapticLoop
+from validate.solve.haptic.rates import RealTime, TickTimes
 
+from .held_force import HeldForce
 from .twin import AXES, EACH_TICK, TOOL, sets
 
 REFERENCE, JUDGED = "every_tick", "linear"
@@ -33,7 +33,11 @@ _LIVE_SECONDS = 1.2
 _MILLI, _MICRO, _PERCENT = 1e3, 1e6, 100.0
 _ZOOM = 0.06  # s on each side
 _TRUE = "reference: simulated at every tick"
-_NAMES = {"hold": "held", "linear": "linear", "quadratic": "second order"}
+_EXTRAPOLATIONS = {
+    "held": HapticLoop(extrapolation="hold"),
+    "linear": HapticLoop(extrapolation="linear"),
+    "second order": HapticLoop(extrapolation="quadratic"),
+}
 
 
 @dataclass(frozen=True)
@@ -216,22 +220,21 @@ def _periods_exhibit(reference: Felt) -> Exhibit:
     rows: list[tuple[Entry, ...]] = []
     lines: list[Series] = []
     within: list[Series] = []
-    for name in NAMES:
+    for name, loop in _EXTRAPOLATIONS.items():
         found, apart = [], []
         for every in PERIODS:
+            loops = (replace(loop, every=every, late=wait) for wait in (0, every))
             at_once, late = (
-                HeldForce(reference.held.x, between_answers(true, every, wait, name), true, dt)
-                for wait in (0, every)
+                HeldForce(reference.held.x, one.between_answers(true), true, dt) for one in loops
             )
             found.append(late.rms)
             inside = float(np.sqrt(np.mean(late.off[smooth] ** 2))) if smooth.any() else None
             apart.append(inside or 0.0)
-            rows.append((_NAMES[name], _MILLI * every * dt, *_counted(at_once), *_counted(late),
-                         inside))  # fmt: skip
+            rows.append((name, _MILLI * every * dt, *_counted(at_once), *_counted(late), inside))
         periods = _MILLI * dt * np.array(PERIODS, dtype=np.float64)
-        lines.append(Series(_NAMES[name], periods, np.array(found)))
+        lines.append(Series(name, periods, np.array(found)))
         if smooth.any():
-            within.append(Series(_NAMES[name], periods, np.array(apart)))
+            within.append(Series(name, periods, np.array(apart)))
     table = NumberTable(
         "periods", "Forces of every tick, sampled less often: answered at once, or a period late.",
         ("extrapolation", "period / ms", "at once: peak / N", "rms / N", "created / mJ",
@@ -278,10 +281,9 @@ def _ticks_exhibit(tree: Tree, reference: MethodRun) -> Exhibit:
     path = RecordedPath(seen.t, seen.inputs + np.array(scene.tools[0].tip))
     rows: list[tuple[Entry, ...]] = []
     for name, loop in _LIVE.items():
-        stepper = replace(loop, **given).prepare(system)
-        assert isinstance(stepper, HapticStepper)
-        rows.append(_lived_row(name, live(stepper, path, _LIVE_SECONDS), given["dt"]))
-    quantiles = tuple(f"{_PERCENT * q:g} %" for q in QUANTILES)
+        done = live(replace(loop, **given).prepare(system), path, _LIVE_SECONDS)
+        rows.append(_lived_row(name, TickTimes(done.late), TickTimes(done.work), given["dt"]))
+    quantiles = tuple(f"{_PERCENT * q:g} %" for q in TickTimes.shares)
     table = NumberTable(
         "live", f"Ticks of the live loop along the path, paced at {1 / given['dt']:.4g} Hz.",
         ("loop", "ticks", "missed / %", *(f"late {q} / us" for q in quantiles), "latest / us",
@@ -296,10 +298,10 @@ def _ticks_exhibit(tree: Tree, reference: MethodRun) -> Exhibit:
     )
 
 
-def _lived_row(name: str, done: LiveRun, dt: float) -> tuple[Entry, ...]:
-    late, work = TickTimes(done.late), TickTimes(done.work)
+def _lived_row(name: str, late: TickTimes, work: TickTimes, dt: float) -> tuple[Entry, ...]:
     times = (_MICRO * q for q in (*late.quantiles, *work.quantiles))
-    return (name, len(done.late), _PERCENT * late.missed(dt) / len(done.late), *times)
+    count = len(late.seconds)
+    return (name, count, _PERCENT * late.missed(dt) / count, *times)
 
 
 def _pace(scene: Scene, reference: MethodRun, dt: float) -> str:

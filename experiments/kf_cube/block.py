@@ -20,11 +20,9 @@ from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
 from validate.register.scene_registration import follow_signal
 from validate.register.sensing import PoseShift
-from validate.scene.geometries.box import centroids
 from validate.scene.material import Region
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Scene
-from validate.solve.dynamic.linear import StartName
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import output_frames
 from validate.twin.time_stepping import SteppedTwin
@@ -41,7 +39,9 @@ def on_springs(stiffness: float | str) -> dict[str, Any]:
 @dataclass(frozen=True)
 class Traction:
     traction: float = quantity(3000.0, "Pa", "on the top face, upward")
-    a0: StartName = quantity("equilibrium", "1", "first acceleration: M^-1 f, or zero")
+    a0: Literal["equilibrium", "zero"] = quantity(
+        "equilibrium", "1", "first acceleration: M^-1 f, or zero"
+    )
     off: float = quantity(0.0, "s", "time at which the traction is released; 0: never")
 
 
@@ -116,7 +116,7 @@ def _true_scene(tree: Tree) -> Scene:
 
 def _stiff_cells(mesh: Mesh, inside: str) -> Ints:
     """The middle two rows of seven, or the upper middle half of the block."""
-    share = centroids(mesh) / mesh.nodes.max(axis=0)
+    share = mesh.nodes[mesh.corners].mean(axis=1) / mesh.nodes.max(axis=0)
     layer = (share[:, 2] > 2.99 / 7) & (share[:, 2] < 5.01 / 7)
     if inside == "layer":
         return np.flatnonzero(layer)

@@ -12,7 +12,6 @@ from validate.compare.exhibit import Exhibit, NumberTable
 from validate.compare.row import LongRow, RowBlock
 from validate.compare.view import View
 from validate.estimate.filterpy.oracle import oracle_table
-from validate.estimate.kalman.displacement_filter import DisplacementStepper
 from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import measurements
 from validate.fem.assembly.locate import barycentric_rows
@@ -65,9 +64,7 @@ def _nrmse(
     return np.asarray(np.sqrt((off**2).mean(axis=1)) / np.ptp(reference))
 
 
-def _printed(
-    parameters: Any, followed: MethodRun, system: System, Q: float, recursion: str
-) -> DisplacementStepper:
+def _printed(parameters: Any, followed: MethodRun, system: System, Q: float, recursion: str) -> Any:
     """The filter as printed, seen at the observed node at every step."""
     settings = ModalKf(
         parameters.settings.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, boundary_facets, cell_volumes
 from validate.scene.mesh_files.mesh_file import write_mesh
 
 SIDE = 100.0  # mm
@@ -151,7 +151,7 @@ def cone_mesh() -> Mesh:
 
 def main() -> None:
     for name, mesh, sizes in (("cube", cube_mesh(), CUBE), ("cone", cone_mesh(), CONE)):
-        require_positive_cells(mesh)
+        assert (cell_volumes(mesh) > 0).all()
         worst = altitude_ratios(mesh).min()
         counts = f"{len(mesh.nodes)} nodes, {len(mesh.cells)} tetrahedra"
         made = f"{name}, {counts}, worst altitude ratio {worst:.3f}; gmsh {_gmsh().__version__}"

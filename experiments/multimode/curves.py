@@ -13,10 +13,10 @@ from validate.datasets.home import data_path
 from validate.errors import RecordingError, UsageError
 from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.tables.stretch import Curve, read_stretch_stress, signals_of
-from validate.recording.types import Recording
+from validate.recording.tables.stretch import read_stretch_stress
+from validate.recording.types import Recording, Signal
 from validate.register.registration import Registered
-from validate.register.signals import StressObservation, driving
+from validate.register.signals import driving
 from validate.scene.meshless import MaterialPoint, StretchMode
 
 from .laws import (
@@ -28,6 +28,7 @@ from .laws import (
     Yeoh,
     material,
 )
+from .stress_observation import StressObservation
 
 FOLDER = "force/multimode"
 MODES: tuple[StretchMode, ...] = get_args(StretchMode)
@@ -150,22 +151,29 @@ def _by_mode(path: Path, name: str, unit: str | None) -> list[Recording]:
     l, P = whole.signal("stretch", "1").y, whole.signal("stress", "Pa").y
     mode = _said_mode(path)
     if l.shape[1] == 1:
-        return [_of_mode(whole, name, "equibiaxial" if mode == "biaxial" else mode, Curve(l, P))]
+        return [_of_mode(whole, name, "equibiaxial" if mode == "biaxial" else mode, l, P)]
     if mode != "biaxial":
         raise RecordingError(f"{path.name}: two stretches in mode {mode}; only a plane has two")
     return [
-        _of_mode(whole, name, line, _line(line, l[rows], P[rows]))
+        _of_mode(whole, name, line, *_line(line, l[rows], P[rows]))
         for line, rows in _lines(l, P).items()
         if rows.any()
     ]
 
 
-def _of_mode(whole: Recording, name: str, mode: StretchMode, curve: Curve) -> Recording:
+def _of_mode(
+    whole: Recording, name: str, mode: StretchMode, stretch: Floats, stress: Floats
+) -> Recording:
+    rows = np.arange(len(stretch), dtype=np.float64)
+    signals = {
+        "stretch": Signal(rows, stretch, "1", 0.0, "specimen"),
+        "stress": Signal(rows, stress, "Pa", 0.0, "specimen"),
+    }
     test = {"mode": mode, "material": name}
     return replace(
         whole,
         name=f"{name}, {mode}",
-        signals=signals_of(curve),
+        signals=signals,
         metadata={**whole.metadata, "test": test},
     )
 
@@ -180,10 +188,10 @@ def _lines(l: Floats, P: Floats) -> dict[StretchMode, Rows]:
     return {**on, "biaxial": ~(free | equal | held)}
 
 
-def _line(mode: StretchMode, l: Floats, P: Floats) -> Curve:
+def _line(mode: StretchMode, l: Floats, P: Floats) -> tuple[Floats, Floats]:
     """The stretches that the mode's inputs are; both stresses but where one is free."""
     driven = l if mode == "biaxial" else l[:, :1]
-    return Curve(driven, P[:, :1] if mode in ("uniaxial", "equibiaxial") else P)
+    return driven, P[:, :1] if mode in ("uniaxial", "equibiaxial") else P
 
 
 def build(recording: Recording, tree: Tree, model: LawCard) -> MaterialPoint:

@@ -6,11 +6,12 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.fem.laws.plane_stress import response
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.register.registration import Registered
+from validate.scene.meshless import MaterialPoint
+from validate.solve.static.stretch_test import StretchTest
 
 from .calibration import words_of
 from .curves import Multimode, point
@@ -76,8 +77,8 @@ def sentences(found: Sequence[RankedLaw]) -> tuple[str, ...]:
         for one, other in better_fit_worse_prediction(found)[:_PAIRS]
     ]
     said += [
-        f"{one.label} as identified loses positive energy at stretch {one.lost.stretch:.3g} "
-        f"({one.lost.mode}), within the measured stretches: do not use it in a simulation."
+        f"{one.label} as identified loses positive energy at stretch {one.lost[1]:.3g} "
+        f"({one.lost[0]}), within the measured stretches: do not use it in a simulation."
         for one in found
         if one.lost
     ]
@@ -119,7 +120,13 @@ def _ranking(found: Sequence[RankedLaw], fitted: str) -> NumberTable:
 
 
 def _stable(one: RankedLaw) -> str:
-    return f"no: {one.lost.mode}, {one.lost.stretch:.3g}" if one.lost else "yes"
+    return f"no: {one.lost[0]}, {one.lost[1]:.3g}" if one.lost else "yes"
+
+
+def _stress(scene: MaterialPoint, stretches: Floats, name: str) -> Floats:
+    """The named stress (n,) Pa of a point under stretches (n, k)."""
+    rows = np.arange(len(stretches), dtype=np.float64)
+    return StretchTest().solve(scene, rows, stretches).traces[name].y
 
 
 def _mode(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str) -> Chart:
@@ -129,7 +136,7 @@ def _mode(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str)
     unit, factor = _shown(stress)
     lines = []
     for one in found:
-        y = response(point(p, as_card(one.method), mode), fine)["nominal_stress"]
+        y = _stress(point(p, as_card(one.method), mode), fine[:, None], "nominal_stress")
         inside = np.abs(y) <= _BEYOND * np.abs(stress).max()
         lines.append(Series(one.label, fine[inside], factor * y[inside]))
     return Chart(
@@ -148,7 +155,7 @@ def _plane(p: Multimode, seen: Registered, found: Sequence[RankedLaw], role: str
     unit, factor = _shown(stress)
     series = [Series("equal", ends := factor * np.array([0.0, stress.max()]), ends)]
     for one in found:
-        y = response(point(p, as_card(one.method), "biaxial"), seen.inputs)["second_stress"]
+        y = _stress(point(p, as_card(one.method), "biaxial"), seen.inputs, "second_stress")
         inside = np.abs(y) <= _BEYOND * np.abs(stress).max()
         series.append(Series(one.label, factor * stress[inside], factor * y[inside], "points"))
     return Chart(

@@ -15,13 +15,13 @@ from validate.arrays import Floats, rms
 from validate.pipeline.run.method_run import MethodRun
 from validate.register.observation import EVERYTHING
 from validate.register.registration import Registered
-from validate.register.signals import StressObservation
-from validate.scene.laws import Lost, law_kind, lost_stability
+from validate.scene.laws import LAWS, lost_stability
 from validate.scene.meshless import StretchMode
 from validate.solve.static.stretch_test import StretchTest
 
 from .curves import Multimode, as_mode, point, principal
 from .laws import LawCard
+from .stress_observation import StressObservation
 
 _DRAWS = 1000
 _SEED = 1
@@ -53,7 +53,7 @@ class LawError:
 class RankedLaw:
     """A law: errors of the mode that calibrated, of each other mode and of all those together.
 
-    `lost`: where it loses positive energy between the principal stretches measured.
+    `lost`: mode and stretch where it loses positive energy, of the principal stretches measured.
     """
 
     method: str
@@ -61,7 +61,7 @@ class RankedLaw:
     fit: LawError
     modes: Mapping[StretchMode, LawError]
     predicted: LawError
-    lost: Lost | None
+    lost: tuple[str, float] | None
     coefficients: Mapping[str, float]
 
 
@@ -163,12 +163,13 @@ def _spread(e: Floats, drawn: Floats, sd: float, free: int = 0) -> LawError:
     return LawError(rms(e[:, None]), np.sqrt(squares))
 
 
-def _lost(p: Multimode, law: LawCard, seen: Sequence[Registered]) -> Lost | None:
+def _lost(p: Multimode, law: LawCard, seen: Sequence[Registered]) -> tuple[str, float] | None:
     """Where the law is unstable between the least and the largest principal stretch measured."""
     made = point(p, law, mode_of(seen[0])).material
-    if not law_kind(made.law).ranged:
+    if not any(kind.ranged for kind in LAWS if kind.name == made.law):
         return None
     ends = [principal(mode_of(s), s.inputs) for s in seen]
     low, high = min(e.min() for e in ends), max(e.max() for e in ends)
     c = replace(made.coefficients, stretches=(float(low), float(high)))
-    return lost_stability(made.law, c, made.shear_modulus)
+    lost = lost_stability(made.law, c, made.shear_modulus)
+    return (lost.mode, lost.stretch) if lost else None

@@ -7,6 +7,7 @@ falls with 1/ln of the mesh size.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from validate.scene.geometries.box import grid
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
-from validate.scene.scene import Drive, Load, PlaneState, Probe, Scene, Support
+from validate.scene.scene import Drive, Load, Probe, Scene, Support
 
+Plane = Literal["strain", "stress"]
 Mesher = Callable[[tuple[float, ...], tuple[int, ...]], Mesh]
 
 MP1 = Material(200.0, 0.47, rho=2000.0, mass_damping=1.0, stiffness_damping=0.1)
@@ -37,7 +39,7 @@ BLOCK = Scene(
 )
 
 
-def needle_block(n: int, material: Material = MP1, plane: PlaneState = "strain") -> Scene:
+def needle_block(n: int, material: Material = MP1, plane: Plane = "strain") -> Scene:
     """n x n quadrilaterals, the drive "needle" at (1, 0.5) m; forces are N per metre.
 
     The drive's input is the depth, 0.08 min(t, 2) m; its `speeds` are that motion's. Probes "side"
@@ -54,7 +56,7 @@ def needle_depth(t: Floats) -> Floats:
     return np.asarray(SPEED * np.minimum(t, STOP))[:, None]
 
 
-def needle_from_above(n: int, material: Material = MP1, plane: PlaneState = "strain") -> Scene:
+def needle_from_above(n: int, material: Material = MP1, plane: Plane = "strain") -> Scene:
     """The same block a quarter turn on, the needle along -y at (0.5, 1) m and no probes.
 
     Node numbers run along y first: sweeps in their order (Gauss-Seidel) see another problem.

@@ -13,8 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.compare.shapes.pair import Common
-from validate.fem.modes import Modes, modes_of
+from validate.fem.modes import modes_of
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
 from validate.solve.dynamic.newmark import Newmark
@@ -35,9 +34,8 @@ def damping_exhibit(
     """Damping ratios of the modes by the form of C, and the motion under alpha M and alpha' M
     against that under the whole C, implicit with consistent mass."""
     system = build(scene)
-    modes = modes_of(system)
-    ratios = damping_ratios(system, modes)
-    errors = _errors(scene, system, float(modes.damping[0]), inputs, dt)
+    omega, ratios = damping_ratios(system)
+    errors = _errors(scene, system, float(2 * omega[0] * ratios[FULL][0]), inputs, dt)
     two = {n: e.at("E_n", 2.0) or 0.0 for n, e in errors.items()}
     numbers = {"damping.papers": two[PAPERS], "damping.matched": two[MATCHED]}
     table = instants_table(
@@ -46,22 +44,23 @@ def damping_exhibit(
     )  # fmt: skip
     chart = Chart(
         "damping_ratios", "Damping of the modes by the form of C", "frequency / (1/s)",
-        "damping ratio / 1", tuple(Series(n, modes.omega, xi) for n, xi in ratios.items()),
+        "damping ratio / 1", tuple(Series(n, omega, xi) for n, xi in ratios.items()),
         levels=(("critical", 1.0),), log="xy",
         caption="βK damps fast modes most and αM slow ones; a diagonal C cannot do both.",
     )  # fmt: skip
-    shown = Exhibit("damping", "A diagonal damping matrix", _words(modes, ratios, two),
-                    (_by_mode(modes, ratios), table), (chart,))  # fmt: skip
+    shown = Exhibit("damping", "A diagonal damping matrix", _words(ratios, two),
+                    (_by_mode(omega, ratios), table), (chart,))  # fmt: skip
     return shown, numbers
 
 
-def damping_ratios(system: System, modes: Modes) -> Mapping[str, Floats]:
-    """phi^T C phi / (2 w) (r,) of every mode by the form of C; the last two are exact on the
-    diagonal, what they couple is left out."""
+def damping_ratios(system: System) -> tuple[Floats, Mapping[str, Floats]]:
+    """Frequencies w (r,) 1/s of all modes, and phi^T C phi / (2 w) (r,) of each by the form of C;
+    the last two are exact on the diagonal, what they couple is left out."""
+    modes = modes_of(system)
     w = modes.omega
     alpha = system.scene.material.mass_damping
     C = system.C.diagonal()[system.free]
-    return {
+    return w, {
         FULL: modes.damping / (2 * w),
         PAPERS: alpha / (2 * w),
         MATCHED: modes.damping[0] / (2 * w),
@@ -77,9 +76,8 @@ def _errors(
     ways = {PAPERS: system, MATCHED: build(replace(scene, material=other))}
     truth = _run(system, replace(IMPLICIT, dt=dt), inputs)
     only = replace(IMPLICIT, dt=dt, damping_terms="mass")
-    on = Common(scene.mesh, scene)
     return {
-        name: errors_of(_run(s, only, inputs), scene.mesh, truth.u, on, _METRICS,
+        name: errors_of(_run(s, only, inputs), scene.mesh, truth.u, scene, _METRICS,
                         range(len(INSTANTS)), name)
         for name, s in ways.items()
     }  # fmt: skip
@@ -91,17 +89,17 @@ def _run(system: System, settings: Newmark, inputs: Callable[[Floats], Floats]) 
     return march("damped", settings.prepare(system), t, inputs(t), at, 0.0)
 
 
-def _by_mode(modes: Modes, ratios: Mapping[str, Floats]) -> NumberTable:
-    shown = [k for k in (*_TABLED, len(modes.omega) - 1) if k < len(modes.omega)]
+def _by_mode(omega: Floats, ratios: Mapping[str, Floats]) -> NumberTable:
+    shown = [k for k in (*_TABLED, len(omega) - 1) if k < len(omega)]
     rows: list[tuple[Entry, ...]] = [
-        (k + 1, float(modes.omega[k]), *(float(xi[k]) for xi in ratios.values())) for k in shown
+        (k + 1, float(omega[k]), *(float(xi[k]) for xi in ratios.values())) for k in shown
     ]
     heads = ("mode", "frequency / (1/s)", *ratios)
     return NumberTable("damping_ratios", "Damping ratio of the modes by the form of C (1: "
                                          "critical damping).", heads, tuple(rows))  # fmt: skip
 
 
-def _words(modes: Modes, ratios: Mapping[str, Floats], two: Mapping[str, float]) -> tuple[str, ...]:
+def _words(ratios: Mapping[str, Floats], two: Mapping[str, float]) -> tuple[str, ...]:
     full, papers, last = ratios[FULL], ratios[PAPERS], ratios[DIAGONAL]
     return (
         f"αM leaves the first mode {papers[0]:.2g} of critical damping instead of "

@@ -12,14 +12,15 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.compare.shapes.pair import Common, Field, pair, same_mesh
+from validate.compare.shapes.pair import Common, Field, pair
 from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compared
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.run.method_run import MethodRun
 from validate.scene.mesh import Mesh
-from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.scene.scene import Scene
+from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.march import march
 from validate.solve.types import Run
 
@@ -63,16 +64,20 @@ def errors_of(
     one: Run,
     mesh: Mesh,
     truth: Floats,
-    on: Common,
+    on: Scene,
     names: Sequence[str] = TABLED,
     frames: Sequence[int] | None = None,
     label: str = "",
 ) -> Errors:
-    """A run with fields on `mesh` against fields `truth` (no, n, d) m of the same frames on `on`.
+    """A run with fields on `mesh` against `truth` (no, n, d) m of the same frames on the mesh of a
+    scene `on`.
 
     Fields of another mesh are read at the nodes of `on`, located once for all frames.
     """
-    rows = None if same_mesh(mesh, on.mesh) else barycentric_rows(mesh, on.mesh.nodes)
+    rows = (
+        None if np.array_equal(mesh.nodes, on.mesh.nodes) else barycentric_rows(mesh, on.mesh.nodes)
+    )
+    common = Common(on.mesh, on)
     chosen = frames_of(one.t, one.at.tolist()) if frames is None else list(frames)
     t = one.t[one.at[chosen]]
     values = {name: np.full(len(chosen), np.nan) for name in names}
@@ -80,13 +85,20 @@ def errors_of(
     for i, k in enumerate(chosen):
         u = one.u[k] if rows is None else rows.apply(one.u[k])
         between = pair(
-            Field(on.mesh, u, label or one.method), Field(on.mesh, truth[k], "truth"), on
+            Field(on.mesh, u, label or one.method), Field(on.mesh, truth[k], "truth"), common
         )
         found = compared(between, tuple(_METRICS[name] for name in names))
         for score in found.scores:
             values[score.name][i] = score.value
         refused += [(float(t[i]), name, why) for name, why in found.refused]
     return Errors(label or one.method, t, values, tuple(refused))
+
+
+def l2_error(mesh: Mesh, u: Floats, on: Scene, truth: Floats) -> float:
+    """Relative L2 norm of u (n, d) m on a mesh against `truth` (no, d) m on the mesh of `on`."""
+    between = pair(Field(mesh, u, "field"), Field(on.mesh, truth, "truth"), on)
+    (score,) = compared(between, (_METRICS["L2.relative"],)).scores
+    return score.value
 
 
 def errors_on(case: Mapping[str, MethodRun], names: Sequence[str], methods: Sequence[str],
@@ -96,7 +108,7 @@ def errors_on(case: Mapping[str, MethodRun], names: Sequence[str], methods: Sequ
     truth, mesh = first.truth.u, first.truth.mesh
     assert truth is not None
     assert mesh is not None
-    on = Common(mesh, replace(first.body, body=mesh))
+    on = replace(first.body, body=mesh)
     return {
         name: errors_of(
             case[name].run, case[name].scene.mesh, truth, on, names, frames, case[name].label
@@ -295,7 +307,7 @@ def stable_of(
     system: System, mass: Literal["consistent", "lumped"], update: Literal["printed", "lagged"]
 ) -> float:
     """The exact critical step s with full C."""
-    return stable_step(system, ExplicitLinear(1.0, mass, "full", update))
+    return ExplicitLinear(1.0, mass, "full", update).stable_step(system)
 
 
 # --- shapes --------------------------------------------------------------------------------------

@@ -15,14 +15,14 @@ from scipy.sparse.linalg import splu
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.compare.shapes.pair import Common, Field, pair
-from validate.compare.shapes.two_fields import relative_l2_norm
 from validate.fem.assembly.assemble import stiffness_points
-from validate.fem.assembly.volume_constraints import Normals, mixed_static, volume_penalty
+from validate.fem.assembly.volume_constraints import mixed_static, volume_penalty
 from validate.fem.critical import lanczos_step
 from validate.fem.system import System, build
 from validate.scene.material import Material
 from validate.scene.scene import Scene
+
+from .errors import l2_error
 
 WEIGHTS = (1.0, 10.0, 100.0, 1e3, 1e4)  # of the penalty, over the shear modulus
 LOWER = 0.3  # the "lower Poisson ratio" of the penalised body
@@ -76,10 +76,10 @@ class KeptVolume:
 
 @dataclass(frozen=True)
 class ExactStatics:
-    """Displacements of the reference on its mesh, their size, and its compliance J."""
+    """Displacements u (n, d) m of the reference on its scene's mesh, and its compliance J."""
 
-    field: Field
-    common: Common
+    scene: Scene
+    u: Floats
     compliance: float
 
 
@@ -118,16 +118,15 @@ def kept(body: Squeezed, exact: ExactStatics, way: str, weight: float) -> KeptVo
         return _judged(build(body.of(ratio / (2 * (ratio + 1)))), None, exact)
     system = build(body.of(LOWER))
     k = weight * system.scene.material.shear_modulus
-    normals: Normals = "area" if way == "area" else "unit"
-    return _judged(system, volume_penalty(system.scene, k, normals), exact)
+    P = volume_penalty(system.scene, k, "area" if way == "area" else "unit")
+    return _judged(system, P, exact)
 
 
 def exactly(body: Squeezed) -> ExactStatics:
     """The body's statics with mixed elements on the finer mesh."""
     scene = body.make(body.finer, replace(body.material, nu=EXACT))
     solved = mixed_static(scene)
-    field = Field(scene.mesh, solved.u[0], "the exact constraint")
-    return ExactStatics(field, Common(scene.mesh, scene), float(solved.compliances[0]))
+    return ExactStatics(scene, solved.u[0], float(solved.compliances[0]))
 
 
 def _judged(system: System, P: sparse.csr_array | None, exact: ExactStatics) -> KeptVolume:
@@ -138,7 +137,7 @@ def _judged(system: System, P: sparse.csr_array | None, exact: ExactStatics) -> 
     u = np.zeros(len(f))
     u[free] = splu(inner).solve(f[free])
     field = u.reshape(mesh.nodes.shape)
-    off = relative_l2_norm(pair(Field(mesh, field, "kept"), exact.field, exact.common))
+    off = l2_error(mesh, field, exact.scene, exact.u)
     pushed = np.zeros_like(field) if P is None else (P @ u).reshape(field.shape)
     load = float(np.linalg.norm(f.reshape(field.shape).sum(axis=0)))
     net = float(np.linalg.norm(pushed.sum(axis=0))) / load

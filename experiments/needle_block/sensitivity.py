@@ -13,7 +13,6 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.compare.shapes.pair import Common
 from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.mesh import Mesh
@@ -125,7 +124,7 @@ class SolvedScene:
         run, on = self.runs[method], truth.scene
         if not run.finished:
             return dict.fromkeys(DRAWN)
-        found = errors_of(run, self.scene.mesh, truth.runs["implicit"].u, Common(on.mesh, on),
+        found = errors_of(run, self.scene.mesh, truth.runs["implicit"].u, on,
                           DRAWN, range(len(AT)))  # fmt: skip
         return {n: None if np.isnan(y).any() else float(y.mean()) for n, y in found.values.items()}
 

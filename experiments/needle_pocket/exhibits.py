@@ -11,8 +11,9 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
-from validate.solve.haptic.rates import DEVICE_HZ, QUANTILES, TickTimes
+from validate.solve.haptic.rates import TickTimes
 
+from .hand import DEVICE_HZ
 from .loops import energy_exhibit, hysteresis_exhibit
 from .pocket import TOOL
 from .scene import POCKET
@@ -107,7 +108,7 @@ def _ticks(main: Mapping[str, MethodRun]) -> tuple[Exhibit, dict[str, float]]:
                              *(1e6 * q for q in times.quantiles), missed,
                              _PERCENT * missed / len(times.seconds)))  # fmt: skip
         numbers[f"median.{name}"] = float(np.median(run.seconds) <= deadline)
-    heads = ("method", "ticks", "number", *(f"{_PERCENT * q:g} % / us" for q in QUANTILES),
+    heads = ("method", "ticks", "number", *(f"{_PERCENT * q:g} % / us" for q in TickTimes.shares),
              "longest / us", "missed", "missed / %")  # fmt: skip
     table = NumberTable("ticks", f"Times of a tick; the deadline is {1e6 * deadline:.0f} us.",
                         heads, tuple(rows))  # fmt: skip

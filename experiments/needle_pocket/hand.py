@@ -27,6 +27,7 @@ STOPS: tuple[tuple[float, float, float], ...] = (
     (3.2, -0.9, -0.2),
     (3.4, -0.5, 0.0),
 )  # fmt: skip
+DEVICE_HZ = 512.0  # of paper 000's haptic device (section 5.2)
 _TREMOR = (8.0, 12.0)  # Hz
 _TONES = 6
 

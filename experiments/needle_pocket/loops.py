@@ -12,11 +12,10 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Scene
 from validate.solve.haptic.needle import NeedleLoop
-from validate.solve.haptic.rates import DEVICE_HZ
 from validate.solve.march import march
 from validate.solve.types import Run
 
-from .hand import closed
+from .hand import DEVICE_HZ, closed
 from .pocket import AXES, TOOL
 
 _TURNS = 2

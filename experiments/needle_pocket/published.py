@@ -1,7 +1,8 @@
 """Figures of paper 000, sections 5.2 and 5.3: results, settings, machines, Fig. 10."""
 
 from validate.compare.published import MACHINE, Figure, setting, uncompared
-from validate.solve.haptic.rates import DEVICE_HZ
+
+from .hand import DEVICE_HZ
 
 STATED = (
     setting("rate of the device", 512.0, float(DEVICE_HZ), "Hz", "section 5.2",

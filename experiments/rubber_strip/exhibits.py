@@ -9,9 +9,9 @@ from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
-from validate.recording.tables.npz_points import read_points
 from validate.register.signals import SignalObservation
 
+from .points_file import read_points
 from .stretches import stretches
 from .strip import FIRST, LAST, Strip, recorded
 from .tracker import stage_exhibit

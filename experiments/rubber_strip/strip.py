@@ -13,12 +13,12 @@ from validate.datasets.home import data_path
 from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.tables.npz_points import read_points
 from validate.recording.types import Recording, Signal
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, driving
 from validate.scene.meshless import MaterialPoint
 
+from .points_file import read_points
 from .stretches import Seen, Stretches, stretches
 
 FOLDER = "markers/rubber-strip"

@@ -9,7 +9,8 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.errors import RecordingError
-from validate.recording.tables.npz_points import StageTest, read_stage
+
+from .points_file import StageTest, read_stage
 
 _UM = 1e6
 

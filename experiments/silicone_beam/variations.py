@@ -1,16 +1,16 @@
 """Changes of the beam that are no single value: finer cells with their steps, the loss as it is
 identified."""
 
+from collections.abc import Callable
 from typing import Any
 
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.experiment.variation import Change
 
 from .settings import hung
 
 
-def finer(share: float) -> Change:
+def finer(share: float) -> Callable[[Tree], Any]:
     """Cells in every direction and steps at once: both errors are of order two."""
 
     def change(tree: Tree) -> Any:

@@ -23,6 +23,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -30,13 +31,12 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.files import buffered, read_bytes, read_text
+from validate.files import read_bytes, read_text
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.units import SYMBOLIC
 
 from .edge_points import Marks, Points, edges, named_points
 
-FORCE = SYMBOLIC[0]
+FORCE = "force unit"  # that of the files is not known
 Follow = Literal["marks", "edges"]
 WINDOW = (
     24e-3  # m between the two marks of a pad, the extensometer's window in the authors' scripts
@@ -143,7 +143,7 @@ def numbers(path: Path) -> Floats:
     if not path.is_file():
         raise RecordingError(f"no {path.name} in {path.parent}; pass --set data=FOLDER with it")
     try:
-        found = np.loadtxt(buffered(path, _LARGEST), ndmin=2)
+        found = np.loadtxt(BytesIO(read_bytes(path, _LARGEST)), ndmin=2)
     except ValueError as error:
         raise RecordingError(f"{path.name}: no matrix of numbers ({error})"[:200]) from error
     if found.size == 0 or not np.isfinite(found).all():

@@ -21,11 +21,12 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.types import Recording
 from validate.register.markers.transform import Similarity
-from validate.register.tools.landmarks import Digitised, Dwell, TouchedLandmarks
-from validate.report.scenes.points import Place, points_picture
+from validate.register.tools.landmarks import Digitised
+from validate.report.scenes.points import points_picture
 
 from .phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of
 from .plus import by_plus
+from .touched_landmarks import TouchedLandmarks
 
 Part = Literal["touch", "whole"]
 PARTS: Mapping[Part, str] = {"touch": "first touch", "whole": "whole dwell"}
@@ -221,8 +222,8 @@ def _matrix(d: Digitised) -> NumberTable:
 def _dwells(d: Digitised) -> NumberTable:
     named = dict(zip(d.match.seen.tolist(), d.touched, strict=True))
     rows = tuple(
-        (named.get(i) or _again(d, part), float(w.t[0]), float(w.t[-1]), len(w.x), _MM * w.wander,
-         len(part.x))
+        (named.get(i) or _again(d, part.centre), float(w.t[0]), float(w.t[-1]), len(w.x),
+         _MM * w.wander, len(part.x))
         for i, (w, part) in enumerate(zip(d.dwells, d.parts, strict=True))
     )  # fmt: skip
     return NumberTable(
@@ -234,25 +235,23 @@ def _dwells(d: Digitised) -> NumberTable:
     )
 
 
-def _again(d: Digitised, part: Dwell) -> str:
-    """What a place is that is no landmark's own."""
-    off = np.linalg.norm(d.pose.apply(d.body) - part.centre, axis=1)
+def _again(d: Digitised, centre: Floats) -> str:
+    """What a place (3,) m is that is no landmark's own."""
+    off = np.linalg.norm(d.pose.apply(d.body) - centre, axis=1)
     near = int(off.argmin())
     return f"{d.touched[near]}, again" if off[near] < _AGAIN else "none: parked"
 
 
 def _picture(d: Digitised) -> Picture:
-    places = [
-        Place(name, _MM * at, _MM * error)
-        for name, at, error in zip(d.touched, d.places, d.left_out, strict=True)
-    ]
     return points_picture(
         "landmarks_in_space",
         "The path of the tip, its dwells, and the landmarks; arrows, 50 times as long, from where "
         "each was touched to where the others put it.",
         _MM * d.x,
         [_MM * w.x for w in d.dwells],
-        places,
+        d.touched,
+        _MM * d.places,
+        _MM * d.left_out,
         50.0,
     )
 

@@ -12,25 +12,24 @@ from typing import Literal
 import numpy as np
 
 from validate.arrays import Floats
-from validate.datasets.home import data_path, sought
+from validate.datasets.home import data_path
 from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.formats.device_set import DeviceSet, read_device_set
-from validate.recording.motion_capture.poses import ROTATION, TRANSLATION
+from validate.recording.formats.device_set import read_device_set
 from validate.recording.readers import recognised
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.register.tools.landmarks import (
     Digitised,
-    TouchedLandmarks,
     dwells,
     match_landmarks,
     sd_of_mean,
-    tip_path,
 )
 from validate.scene.meshless import RigidBody
+
+from .touched_landmarks import TouchedLandmarks, tip_path
 
 FOLDER = "markers/stylus"
 SEQUENCE = "EightLandmarkPointsTrackedForPhantomRegistration.igs.mha"
@@ -106,9 +105,11 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     path = data_path(FOLDER, SEQUENCE, folder, tree.recording or None)
     devices = read_device_set(data_path(FOLDER, DEVICES, folder, p.landmarks, "landmarks"))
     recording = recognised(path).read(path, _options(path))
-    records = {**recording.metadata, LANDMARKS: _landmarks(devices), TIP: _tip(devices, p.tools)}
+    records = {**recording.metadata, LANDMARKS: _landmarks(devices.name, devices.landmarks)}
+    declared = devices.transform(p.tools.tip, p.tools.stylus)
+    records[TIP] = _tip(declared.matrix, declared.error or 0.0)
     if results := _results(tree, folder):
-        records[PUBLISHED] = _published(read_device_set(results), p.tools)
+        records[PUBLISHED] = _published(results, p.tools)
     return (replace(recording, metadata=records),)
 
 
@@ -118,7 +119,12 @@ def _results(tree: Tree, folder: Path) -> Path | None:
     own: StylusPhantom = tree.settings
     if own.published:
         return data_path(FOLDER, RESULTS, folder, own.published, "published")
-    return None if tree.recording or own.landmarks else sought(FOLDER, RESULTS, folder)
+    if tree.recording or own.landmarks:
+        return None
+    try:
+        return data_path(FOLDER, RESULTS, folder)
+    except RecordingError:
+        return None
 
 
 def _options(path: Path) -> Mapping[str, str]:
@@ -126,21 +132,22 @@ def _options(path: Path) -> Mapping[str, str]:
     return {"images": "no"} if recognised(path).name in ("metaimage", "nrrd") else {}
 
 
-def _landmarks(devices: DeviceSet) -> Mapping[str, str]:
-    if not devices.landmarks:
-        raise RecordingError(f"{devices.name}: no landmarks in its PhantomDefinition")
-    return {name: " ".join(map(repr, x.tolist())) for name, x in devices.landmarks.items()}
+def _landmarks(file: str, landmarks: Mapping[str, Floats]) -> Mapping[str, str]:
+    if not landmarks:
+        raise RecordingError(f"{file}: no landmarks in its PhantomDefinition")
+    return {name: " ".join(map(repr, x.tolist())) for name, x in landmarks.items()}
 
 
-def _tip(devices: DeviceSet, tools: Tools) -> Mapping[str, str]:
-    declared = devices.transform(tools.tip, tools.stylus)
-    x, y, z = declared.matrix[:3, 3].tolist()
-    sd = (declared.error or 0.0) / np.sqrt(3)
-    shaft = " ".join(map(repr, (_SHAFT * declared.matrix[:3, 0]).tolist()))
+def _tip(matrix: Floats, error: float) -> Mapping[str, str]:
+    """Of the tip's pose (4, 4) in the stylus' frame and its error m."""
+    x, y, z = matrix[:3, 3].tolist()
+    sd = error / np.sqrt(3)
+    shaft = " ".join(map(repr, (_SHAFT * matrix[:3, 0]).tolist()))
     return {"x": repr(x), "y": repr(y), "z": repr(z), "sd": repr(float(sd)), "shaft": shaft}
 
 
-def _published(results: DeviceSet, tools: Tools) -> Mapping[str, str]:
+def _published(path: Path, tools: Tools) -> Mapping[str, str]:
+    results = read_device_set(path)
     declared = results.transform(tools.body, tools.reference)
     matrix = " ".join(map(repr, declared.matrix.ravel().tolist()))
     return {"file": results.name, "matrix": matrix, "error": repr(declared.error or 0.0)}
@@ -210,7 +217,7 @@ def path_of(recording: Recording, p: StylusPhantom, beyond: Floats) -> tuple[Flo
     reference's frame."""
     tools = p.tools
     direct = f"{tools.stylus}To{tools.reference}"
-    if f"{direct}/{ROTATION}" in recording.signals:
+    if f"{direct}/rotation" in recording.signals:
         return tip_path((direct, ""), _poses(recording, direct), None, p.tip.at + beyond)
     names = (f"{tools.stylus}To{tools.tracker}", f"{tools.reference}To{tools.tracker}")
     stylus, reference = (_poses(recording, name) for name in names)
@@ -224,6 +231,6 @@ def shaft_of(recording: Recording, p: StylusPhantom) -> Floats:
 
 
 def _poses(recording: Recording, name: str) -> tuple[Floats, Floats]:
-    R = recording.signal(f"{name}/{ROTATION}", "1")
-    x = recording.signal(f"{name}/{TRANSLATION}", "m")
+    R = recording.signal(f"{name}/rotation", "1")
+    x = recording.signal(f"{name}/translation", "m")
     return R.t, np.concatenate([R.y.reshape(-1, 3, 3), x.y[:, :, None]], axis=2)

@@ -15,13 +15,14 @@ from validate.datasets.home import data_path
 from validate.errors import RecordingError, UsageError
 from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.recording.outlines.outline import Outline, extract_outline
+from validate.recording.outlines.outline import extract_outline
 from validate.recording.readers import recognised
-from validate.recording.types import Contours, Frames, Recording
-from validate.register.outlines.round_outlines import ENDS, RoundOutlines
+from validate.recording.types import Contours, Recording
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.meshless import RigidBody
+
+from .round_outlines import ENDS, RoundOutlines
 
 FOLDER, FILE = "ultrasound/disk", "bmode_PWI_disk.mat"
 OUTLINES, FOUND = "disk", "outlines"
@@ -79,7 +80,13 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
     recording = _read(path, p.image)
     topic = _topic(recording, p.image.topic)
     frames = recording.frame(topic)
-    outlines, refused = _outlines(frames, p.image.bright)
+    # Outlines by image, and why others have none
+    outlines, refused = {}, {}
+    for i, image in enumerate(frames.images):
+        try:
+            outlines[i] = extract_outline(image, frames.m_per_px, bright=p.image.bright)
+        except RecordingError as error:
+            refused[i] = str(error)
     if len(outlines) < _FEWEST * len(frames.images):
         raise RecordingError(
             f"{recording.name}: the disk is found in {len(outlines)} of {len(frames.images)} "
@@ -127,17 +134,6 @@ def _topic(recording: Recording, wanted: str | None) -> str:
             f"{recording.name}: {len(topics)} streams of images {topics}; --set image.topic=NAME"
         )
     return wanted or topics[0]
-
-
-def _outlines(frames: Frames, bright: bool) -> tuple[dict[int, Outline], dict[int, str]]:
-    """Outlines by image, and why others have none."""
-    outlines, refused = {}, {}
-    for i, image in enumerate(frames.images):
-        try:
-            outlines[i] = extract_outline(image, frames.m_per_px, bright=bright)
-        except RecordingError as error:
-            refused[i] = str(error)
-    return outlines, refused
 
 
 def build(recording: Recording, tree: Tree, model: None) -> RigidBody:

@@ -27,11 +27,11 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.images.image import ellipse_through
 from validate.recording.types import Recording
-from validate.register.outlines.round_outlines import RoundOutlines
 from validate.report.scenes.outline_images import outlines_over
 from validate.report.sections.observations import Held
 
 from .disk import FILE, FOUND, OUTLINES, ImagedDisk, outlined
+from .round_outlines import RoundOutlines
 
 _MM = 1e3
 _SHOWN = 6  # images of the picture

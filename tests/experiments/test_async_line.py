@@ -9,7 +9,7 @@ from touched import AREA, LENGTH, bar, block, block_tree, pad_of
 
 from experiments.async_block.methods import BLOCK
 from experiments.async_line.probe import HapticProbe, HapticTest, chirp, growing, place
-from experiments.async_line.runs import growth, off, peak, pushed
+from experiments.async_line.runs import off, peak, pushed
 from validate.errors import SceneError
 from validate.fem.system import build
 from validate.pipeline.experiment.tree import Built, Tree
@@ -105,13 +105,17 @@ def test_peaks_and_differences_by_hand() -> None:
     assert off(np.array([3.0, 4.0]), np.array([3.0, 3.0])) == pytest.approx(np.sqrt(0.5) / 3)
 
 
+def grows(settings: AsyncRegions) -> float:
+    return settings.prepare(build(bar(E, 10))).growth()
+
+
 def test_growth_is_that_of_the_tick() -> None:
     """A period of one tick and one of ten decay alike where nothing depends on the far region."""
-    one = growth(bar(E, 10), WHOLE)
+    one = grows(WHOLE)
     assert 0.9 < one < 1
     slow = replace(WHOLE, layers=(9,), rates=(100.0,))
-    assert growth(bar(E, 10), slow) == pytest.approx(one, rel=2e-2)
-    assert growth(bar(E, 10), replace(WHOLE, spring=200e3)) > 1.0
+    assert grows(slow) == pytest.approx(one, rel=2e-2)
+    assert grows(replace(WHOLE, spring=200e3)) > 1.0
 
 
 def test_a_spring_that_is_too_stiff_is_warned_of() -> None:

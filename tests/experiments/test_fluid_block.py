@@ -17,7 +17,6 @@ from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Source
 from validate.scene.geometries.hollow_block import Cavities, HollowBlock
 from validate.scene.scene import Cavity
-from validate.solve.fluid.pressure_curve import RATIOS
 
 # private: _MOST: replaced by a small number: a short test.
 # private: _SEPTA: a limit or list of the code, which the test must meet exactly.
@@ -55,7 +54,7 @@ def test_the_curve_of_the_note() -> None:
     assert curve.gain == pytest.approx(9857.3, abs=0.06)
     assert curve.terms[0] == pytest.approx(1.017051e-4, rel=1e-6)
     c1, c2 = curve.terms
-    assert 1 + c1 * curve.fixed + c2 * curve.fixed**2 == pytest.approx(RATIOS, rel=1e-12)
+    assert 1 + c1 * curve.fixed + c2 * curve.fixed**2 == pytest.approx(curves.RATIOS, rel=1e-12)
     assert curve.fixed[[0, -1]] == pytest.approx([-3095.85, 2827.77], abs=0.01)
     assert curve.follower[[0, -1]] == pytest.approx([-3321.5, 2575.1], abs=0.06)
     assert curve.follower[30] == pytest.approx(0.0, abs=1e-9)
@@ -66,7 +65,7 @@ def test_following_normals_are_the_fixed_ones_for_small_changes() -> None:
     curve = curve_of(condensed_block(with_mesh(20), 1))
     near = slice(29, 32)
     assert curve.follower[near] == pytest.approx(curve.fixed[near], rel=0.02, abs=1e-9)
-    shares = np.diff(curve.follower) / np.diff(RATIOS)
+    shares = np.diff(curve.follower) / np.diff(curves.RATIOS)
     assert shares[30] == pytest.approx(curve.slope, rel=0.05)
     assert (shares > 0).all()
 

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from beside import experiment
 
+from experiments.fluid_phantom.sensors import StageProfile
 from experiments.fluid_phantom.twin import IMAGE_POSE, PhantomTwin, record_phantom
 from validate.arrays import Floats
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.twin.sensors import StageProfile, streams
+from validate.twin.sensors import streams
 
 COARSE = PhantomTwin(nodes_x=7, nodes_y=8, nodes_z=11)
 DECLARED = experiment("fluid_phantom").parameters.scene

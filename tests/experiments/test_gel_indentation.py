@@ -25,7 +25,7 @@ from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import quadratic
 from validate.scene.places import nodes_of
-from validate.scene.scene import Scene
+from validate.scene.scene import Scene, Support
 
 # private: _FEWEST: a limit or list of the code, which the test must meet exactly.
 # private: _axis: positions of points that no shipped recording has.
@@ -90,7 +90,9 @@ def test_the_ratio_that_moved_a_box_is_found_in_it(nu: float) -> None:
     rng = np.random.default_rng(5)
     held = nodes_of(mesh, FACES)
     moved = [1e-2 * rng.standard_normal((len(held), 3))]
-    fields = [solved(Scene(mesh, Material(1.0, v)), held, moved)[0] for v in (nu, *RATIOS)]
+    faces = (Support(FACES),)
+    scenes = [Scene(mesh, Material(1.0, v), supports=faces) for v in (nu, *RATIOS)]
+    fields = [solved(scene, held, moved)[0] for scene in scenes]
     seen = fields[0] + 1e-4 * rng.standard_normal(fields[0].shape)
     found, sd, left = best_ratio(np.stack([u - seen for u in fields[1:]]), np.full(3, 1e-4))
     assert found == pytest.approx(nu, abs=0.01)

@@ -18,7 +18,6 @@ from experiments.needle_block.errors import (
 )
 from experiments.needle_block.integration_rules import limit_of, rules_exhibit
 from validate.compare.exhibit import NodeMap
-from validate.compare.shapes.pair import Common
 from validate.fem.system import build
 from validate.report.scenes.maps import ranges, words
 from validate.solve.march import march
@@ -35,7 +34,7 @@ def still(n: int, scale: float = 1.0) -> Run:
 
 def test_a_scaled_field_has_the_scale_as_relative_error() -> None:
     scene, one, truth = needle_block(4), still(4, 1.1), still(4)
-    found = errors_of(one, scene.mesh, truth.u, Common(scene.mesh, scene))
+    found = errors_of(one, scene.mesh, truth.u, scene)
     assert found.t == pytest.approx([1 / 30, 5 / 30])
     for name in ("E_n", "L2.relative", "energy.relative"):
         assert found.values[name] == pytest.approx(0.1, rel=1e-9)
@@ -46,7 +45,7 @@ def test_a_scaled_field_has_the_scale_as_relative_error() -> None:
 
 def test_a_truth_at_rest_has_no_relative_error_and_says_why() -> None:
     scene, one = needle_block(4), still(4)
-    found = errors_of(one, scene.mesh, 0 * one.u, Common(scene.mesh, scene), ("E_n", "E_i"))
+    found = errors_of(one, scene.mesh, 0 * one.u, scene, ("E_n", "E_i"))
     assert len(found.line("E_n").x) == 0
     assert found.at("E_n", 1 / 6) is None
     assert (found.values["E_i"] > 0).all()
@@ -60,7 +59,7 @@ def test_fields_of_another_mesh_are_read_at_the_truths_nodes() -> None:
     linear = np.array([[0.01, 0.002], [-0.003, 0.02]])
     one = replace(run, u=np.stack([coarse.mesh.nodes @ linear] * 5))
     same = np.stack([fine.mesh.nodes @ linear] * len(truth.u))
-    found = errors_of(one, coarse.mesh, same, Common(fine.mesh, fine), ("E_n", "E_i"))
+    found = errors_of(one, coarse.mesh, same, fine, ("E_n", "E_i"))
     assert found.values["E_n"] == pytest.approx(0, abs=1e-12)
 
 

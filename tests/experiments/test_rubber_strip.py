@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from beside import beside, experiment
 
+from experiments.rubber_strip.points_file import StageTest, read_points, read_stage
 from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.fem.laws.plane_stress import response
@@ -15,7 +16,6 @@ from validate.pipeline import load as load_experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.run.pipeline import compare
-from validate.recording.tables.npz_points import StageTest, read_points, read_stage
 
 stretches = beside("rubber_strip", "stretches").stretches
 load = beside("rubber_strip", "strip").load

@@ -153,9 +153,8 @@ def test_bad_input_is_one_line(shared_data: Path, values: dict[str, str], said: 
 def test_landmarks_that_are_not_declared_or_not_found_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    devices = SimpleNamespace(name="d.xml", landmarks={})
     with pytest.raises(RecordingError, match=r"d.xml: no landmarks"):
-        phantom_module._landmarks(devices)  # type: ignore[arg-type]
+        phantom_module._landmarks("d.xml", {})
     t = np.arange(100) / 20
     moving = np.linspace([0.0, 0, 0], [1.0, 0, 0], 100)
     known = np.eye(3)

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.multimode.stress_observation import StressObservation
+from experiments.stylus_phantom.touched_landmarks import TouchedLandmarks
+from experiments.ultrasound_disk.round_outlines import RoundOutlines
 from validate import register
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
@@ -34,9 +37,9 @@ from validate.register.outlines.outlines import (
     polar_angles,
     ray_points,
 )
-from validate.register.outlines.round_outlines import RoundOutlines
-from validate.register.signals import SignalObservation, StressObservation
-from validate.register.tools.landmarks import Digitised, Dwell, Match, TouchedLandmarks
+from validate.register.outlines.plane import section
+from validate.register.signals import SignalObservation
+from validate.register.tools.landmarks import Digitised, Dwell, Match
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
@@ -200,6 +203,9 @@ class Wall:
         nodes[:, :2] = 0.005 + (nodes[:, :2] - 0.005) * (1 + 50 * u[0, 0])
         return nodes
 
+    def section(self, u: Floats, pose: Floats) -> Floats:
+        return section(self.deformed(u), self.triangles, pose)
+
 
 def _tube() -> tuple[Floats, Ints]:
     turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -307,7 +313,7 @@ def test_every_observation_can_be_drawn_anew() -> None:
     found = [c for m in modules for c in vars(m).values()
              if isinstance(c, type) and c.__module__ == m.__name__
              and hasattr(c, "deviations") and c is not Observation]  # fmt: skip
-    assert TouchedLandmarks in found
+    assert MarkerObservation in found
     assert [c.__name__ for c in found if not (hasattr(c, "left") and hasattr(c, "anew"))] == []
 
 

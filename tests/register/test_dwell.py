@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from experiments.stylus_phantom.touched_landmarks import tip_path
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.register.markers.transform import Similarity
-from validate.register.tools.landmarks import _joined, dwells, match_landmarks, sd_of_mean, tip_path
+from validate.register.tools.landmarks import _joined, dwells, match_landmarks, sd_of_mean
 
 # private: _joined: spans of a known gap.
 

@@ -16,7 +16,7 @@ from validate.solve.amplification import amplification
 from validate.solve.dynamic.linear import Moving
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import rule_of
-from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 from validate.solve.types import Stepper
 
@@ -66,7 +66,7 @@ def test_the_critical_step_parts_radii_below_one_from_those_above(
 ) -> None:
     system = build(scene)  # type: ignore[arg-type]
     scheme = ExplicitLinear(0.01, mass, terms, update)  # type: ignore[arg-type]
-    limit = stable_step(system, scheme)
+    limit = scheme.stable_step(system)
     below, above = (amplification(system, replace(scheme, dt=r * limit)) for r in (0.999, 1.001))
     assert below.radius < 1 < above.radius
     assert above.omega == pytest.approx(above.omegas[-1], rel=1e-3)
@@ -76,7 +76,7 @@ def test_heavy_damping_grows_slowly_beyond_its_limit() -> None:
     """MP1 as printed, 2 % above 2/w: a run would look stable for hundreds of steps."""
     system = build(needle_block(20))
     scheme = ExplicitLinear(0.01, "consistent", "full")
-    grown = amplification(system, replace(scheme, dt=1.02 * stable_step(system, scheme)))
+    grown = amplification(system, replace(scheme, dt=1.02 * scheme.stable_step(system)))
     assert 1.0001 < grown.radius < 1.05
 
 

@@ -13,13 +13,11 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.linear_solvers.condense import (
     Condensed,
-    Swapped,
     WorkingSet,
     along,
     between,
     condense,
     displaced,
-    mixed,
 )
 from validate.fem.system import System, build
 
@@ -123,74 +121,6 @@ def test_a_tool_cannot_move_what_is_held(body: System, small: Condensed) -> None
         small.column(held)
     with pytest.raises(SceneError, match="to keep of a mesh of"):
         condense(body, np.array([10**6]))
-
-
-# --- swaps ----------------------------------------------------------------------------------------
-
-
-def test_ten_thousand_swaps_equal_the_whole_system(body: System, small: Condensed) -> None:
-    """At nu .485, forces and displacements given at random, within 1e-9 of the sparse solution."""
-    random = np.random.default_rng(5)
-    swapped = Swapped(small.compliance[np.ix_(small.free, small.free)])
-    for i in random.integers(0, len(small.free), 10_000):
-        swapped.swap(int(i))
-    assert swapped.pivots == 10_000
-    assert 0 < swapped.worst_drift < 1e-9
-    driven = np.flatnonzero(swapped.driven)
-    assert 0.3 < len(driven) / len(small.free) < 0.7
-    given = random.normal(size=len(small.free))
-    given[driven] *= 1e-3
-    u, f = swapped.solve(given)
-    loads = np.zeros(body.K.shape[0])
-    free = [_unknown(body, small, i) for i in small.free]
-    others = np.flatnonzero(~swapped.driven)
-    loads[np.array(free)[others]] = f[others]
-    whole = _whole(body, loads, {free[i]: given[i] for i in driven})
-    assert u == pytest.approx(whole[free], abs=1e-9 * np.abs(whole).max())
-
-
-def test_a_matrix_made_at_once_is_that_of_single_pivots(small: Condensed) -> None:
-    A = small.compliance[np.ix_(small.free, small.free)][:40, :40]
-    swapped = Swapped(A)
-    for i in (3, 17, 5, 3, 30):
-        swapped.swap(i)
-    at_once = mixed(A, np.array([5, 17, 30]))
-    size = np.sqrt(np.diag(A))
-    scale = np.where(swapped.driven, 1 / size, size)
-    assert swapped.T / np.outer(scale, scale) == pytest.approx(
-        at_once / np.outer(scale, scale), abs=1e-11
-    )
-    swapped.refactor()
-    assert pytest.approx(at_once, abs=0) == swapped.T
-    assert swapped.refactorisations == 1
-
-
-def test_a_swap_and_back_leaves_the_matrix(small: Condensed) -> None:
-    A = small.compliance[np.ix_(small.free, small.free)]
-    swapped = Swapped(A)
-    swapped.swap(7)
-    assert swapped.driven.sum() == 1
-    swapped.swap(7)
-    assert not swapped.driven.any()
-    assert pytest.approx(A, abs=1e-13 * np.abs(A).max()) == swapped.T
-
-
-def test_drift_beyond_the_limit_is_measured_and_mended(small: Condensed) -> None:
-    swapped = Swapped(small.compliance[np.ix_(small.free, small.free)][:30, :30])
-    swapped.swap(4)
-    swapped.T[2, 3] *= 1 + 1e-4
-    assert swapped.drift() > 1e-9
-    for _ in range(63):
-        swapped.swap(8)
-    assert swapped.refactorisations == 1
-    assert swapped.drift() < 1e-12
-
-
-def test_what_follows_from_others_cannot_be_driven() -> None:
-    swapped = Swapped(np.array([[1.0, 1.0], [1.0, 1.0]]))
-    swapped.swap(0)
-    with pytest.raises(SceneError, match=r"unknown 1 cannot.*0"):
-        swapped.swap(1)
 
 
 @pytest.mark.parametrize("short", [1e-2, 1e-4, 1e-6, 1e-8, 2e-10])

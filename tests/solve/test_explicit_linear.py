@@ -11,7 +11,7 @@ from validate.errors import SceneError
 from validate.fem.critical import critical_step
 from validate.fem.system import DampingTerms, MassName, System, build, damping_of, mass_of
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.explicit.linear import ExplicitLinear, highest_frequency, stable_step
+from validate.solve.explicit.linear import ExplicitLinear, highest_frequency
 from validate.solve.march import march
 from validate.solve.types import Run, Scheme
 
@@ -115,7 +115,7 @@ def test_critical_steps_of_the_needles_block(mass: MassName, update: str, expect
     """MP1, n = 20, plane strain, C = alpha M + beta K: an independent reconstruction's digits."""
     settings = ExplicitLinear(0.01, mass, "full", update)  # type: ignore[arg-type]
     digits = 7 if update == "printed" else 5
-    found = stable_step(build(needle_block(20)), settings)
+    found = settings.stable_step(build(needle_block(20)))
     assert found == pytest.approx(expected, rel=0.6 * 10 ** (1 - digits))
 
 
@@ -123,9 +123,9 @@ def test_the_papers_microsecond_is_that_of_lagged_damping() -> None:
     """MP2, n = 30: below 1e-6 s lagged; with C in the matrix damping costs nothing."""
     system = build(needle_block(30, MP2))
     lagged = ExplicitLinear(mass="consistent", damping_terms="full", update="lagged")
-    assert stable_step(system, lagged) == pytest.approx(9.27e-7, rel=1e-3)
+    assert lagged.stable_step(system) == pytest.approx(9.27e-7, rel=1e-3)
     printed = replace(lagged, update="printed")
-    assert stable_step(system, printed) == pytest.approx(4.3e-4, rel=5e-3)
+    assert printed.stable_step(system) == pytest.approx(4.3e-4, rel=5e-3)
 
 
 def test_the_highest_frequency_is_that_of_all_modes() -> None:
@@ -140,7 +140,7 @@ def test_the_highest_frequency_is_that_of_all_modes() -> None:
 def test_a_step_above_the_limit_is_refused_and_says_under_which_damping() -> None:
     block = build(needle_block(4))
     lagged = ExplicitLinear(1 / 30, "consistent", "full", "lagged")
-    limit = stable_step(block, lagged)
+    limit = lagged.stable_step(block)
     ending = run(replace(lagged, dt=1.5 * limit), block, np.full((3, 1), 0.01), 1.5 * limit).outcome
     assert (ending.state, ending.step) == ("refused", 0)
     assert "is 1.5 times the critical step" in ending.why
@@ -152,7 +152,7 @@ def test_a_step_above_the_limit_is_refused_and_says_under_which_damping() -> Non
 def test_beyond_the_limit_a_run_goes_on_until_it_has_left_all_bounds() -> None:
     block = build(needle_block(4))
     settings = ExplicitLinear(1.0, beyond_limit="run")
-    dt = 1.5 * stable_step(block, settings)
+    dt = 1.5 * settings.stable_step(block)
     got = run(replace(settings, dt=dt), block, np.full((400, 1), 0.01), dt)
     assert got.outcome.state == "diverged"
     assert 3 < got.outcome.step < 399

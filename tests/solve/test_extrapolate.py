@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from validate.errors import UsageError
-from validate.solve.haptic.loop import NAMES, answers_of, between_answers, extrapolated
+from validate.solve.haptic.loop import NAMES, HapticLoop, answers_of, extrapolated
 
 
 @given(
@@ -35,7 +35,7 @@ def test_ticks_between_answers_are_exact_once_enough_answers_are_there(
 ) -> None:
     order, k = NAMES.index(name), np.arange(200.0)  # type: ignore[arg-type]
     y = np.column_stack([k**order, 3 - 2 * k**order])
-    got = between_answers(y, 5, late, name)  # type: ignore[arg-type]
+    got = HapticLoop(every=5, late=late, extrapolation=name).between_answers(y)  # type: ignore[arg-type]
     begun = 5 * order + late
     assert got[begun:] == pytest.approx(y[begun:], rel=1e-9)
     if order:
@@ -50,7 +50,7 @@ def test_the_error_on_a_sine_falls_by_its_order_and_is_the_known_one(name: str, 
     y = np.sin(w * h * np.arange(20_000))[:, None]
     errors = {}
     for every in (20, 40):
-        got = between_answers(y, every, late, name)  # type: ignore[arg-type]
+        got = HapticLoop(every=every, late=late, extrapolation=name).between_answers(y)  # type: ignore[arg-type]
         errors[every] = np.abs(got - y)[5 * every :].max()
         T, a = every * h, (every - 1) * h
         known = w**order * np.prod([a + i * T for i in range(order)]) / np.prod(range(1, order + 1))
@@ -60,12 +60,20 @@ def test_the_error_on_a_sine_falls_by_its_order_and_is_the_known_one(name: str, 
 
 def test_no_answer_stands_before_its_time_and_the_first_is_held() -> None:
     y = np.arange(12.0)[:, None]
-    assert between_answers(y, 4, 4, "hold")[:, 0].tolist() == [0] * 8 + [4] * 4
-    assert between_answers(y, 4, 1, "hold")[:, 0].tolist() == [0] * 5 + [4] * 4 + [8] * 3
-    assert between_answers(y, 1, 0, "quadratic") == pytest.approx(y)
+    assert (
+        HapticLoop(every=4, late=4, extrapolation="hold").between_answers(y)[:, 0].tolist()
+        == [0] * 8 + [4] * 4
+    )
+    assert (
+        HapticLoop(every=4, late=1, extrapolation="hold").between_answers(y)[:, 0].tolist()
+        == [0] * 5 + [4] * 4 + [8] * 3
+    )
+    assert HapticLoop(every=1, late=0, extrapolation="quadratic").between_answers(
+        y
+    ) == pytest.approx(y)
 
 
 @pytest.mark.parametrize(("every", "late"), [(0, 0), (4, 5), (4, -1)])
 def test_a_schedule_that_cannot_be_kept_is_refused(every: int, late: int) -> None:
     with pytest.raises(UsageError, match="no later than the next reading"):
-        between_answers(np.zeros((3, 1)), every, late, "hold")
+        HapticLoop(every=every, late=late, extrapolation="hold").between_answers(np.zeros((3, 1)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import UsageError
-from validate.solve.haptic.rates import QUANTILES, RealTime, TickTimes
+from validate.solve.haptic.rates import RealTime, TickTimes
 
 
 def test_a_rate_means_something_beside_its_step() -> None:
@@ -25,7 +25,7 @@ def test_rates_and_steps_are_positive(numbers: tuple[float, float, float]) -> No
 def test_ticks_are_missed_beyond_the_deadline_alone() -> None:
     times = TickTimes(np.array([1.0, 2.0, 3.0, 4.0]) * 1e-3)
     assert [times.missed(d) for d in (0.5e-3, 2e-3, 3.9e-3, 4e-3)] == [4, 2, 1, 0]
-    assert len(times.quantiles) == len(QUANTILES) + 1
+    assert len(times.quantiles) == len(TickTimes.shares) + 1
     assert times.quantiles[0] == pytest.approx(2.5e-3)
     assert times.quantiles[-1] == 4e-3
 

@@ -15,7 +15,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.scene.tool import Needle
 from validate.solve.explicit.central import CentralDifference
-from validate.solve.haptic.loop import HapticLoop, HapticStepper, between_answers
+from validate.solve.haptic.loop import HapticLoop, HapticStepper
 from validate.solve.haptic.spring_probe import Hold
 from validate.solve.types import State
 
@@ -139,7 +139,7 @@ def test_what_is_given_is_the_polynomial_of_the_answers(name: Any, late: int) ->
     read = np.zeros((161, 3))
     for k, force in answers.items():
         read[k] = force
-    wanted = between_answers(read, 10, late, name)[1:, 2]
+    wanted = HapticLoop(every=10, late=late, extrapolation=name).between_answers(read)[1:, 2]
     assert up(states) == pytest.approx(wanted, abs=1e-12)
     jumps = np.array([s.numbers["tool.jump"] for s in states])
     answered = np.array([s.numbers["tool.answered"] for s in states])

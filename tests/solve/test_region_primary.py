@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 from touched import AREA, LENGTH, bar, block, pad_of
 
-from experiments.async_line.runs import growth, pushed
+from experiments.async_line.runs import pushed
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.large_strain.hyperelastic import Body
@@ -243,7 +243,7 @@ def test_a_region_without_a_whole_cell_stays_linear_and_says_so() -> None:
 
 def test_a_law_of_its_own_has_no_spectral_radius() -> None:
     with pytest.raises(SceneError, match="has no spectral radius"):
-        growth(block(E, 2, 2), replace(NEAR, law="neo_hooke"))
+        replace(NEAR, law="neo_hooke").prepare(build(block(E, 2, 2))).growth()
 
 
 @pytest.mark.parametrize(("slope", "moved"), [(0.0, 1e-3), (1.0, 0.0), (-1.0, 1e-3)])

@@ -11,10 +11,9 @@ from validate.engine.cell import Record, Where
 from validate.pipeline.experiment.find import load_file
 from validate.study.filters import page as filter_page
 from validate.study.filters.blocks import Blocks, cut
-from validate.study.filters.predictive import predictive_likelihood, with_likelihood
 from validate.study.filters.ranking import rankings
 from validate.study.filters.score import LOG_LOSS, FilterScores
-from validate.study.filters.study import study
+from validate.study.filters.study import predictive_likelihood, study, with_likelihood
 from validate.study.filters.withheld_errors import PredictionErrors, Segments, prediction_errors
 
 SAMPLES, SEGMENTS = 40_000, 100

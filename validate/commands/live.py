@@ -21,7 +21,7 @@ from validate.pipeline.live import realtime as scheduled
 from validate.pipeline.live.listener import RESYNC
 from validate.places import try_file
 from validate.recording.mcap.write import write_recording
-from validate.solve.haptic.rates import QUANTILES, TickTimes
+from validate.solve.haptic.rates import TickTimes
 
 
 def run(
@@ -60,7 +60,7 @@ def run(
     }  # fmt: skip
     groups = {"due to force": done.late, "work": done.work,
               "work, changes of contact": done.work[done.changed > 0]}  # fmt: skip
-    names = (*(f"p{100 * q:g}" for q in QUANTILES), "max")
+    names = (*(f"p{100 * q:g}" for q in TickTimes.shares), "max")
     said["times"] = {
         what: dict(zip(names, TickTimes(v).quantiles, strict=True)) | {"n": len(v)}
         for what, v in groups.items() if len(v)
@@ -96,7 +96,7 @@ def _told(done: LiveRun, said: dict[str, Any]) -> None:
         f"{done.missed} missed ({share:.3g} %), {said['answered']} answered")  # fmt: skip
     rows = [[k, str(int(v["n"])), *(f"{1e6 * v[q]:.0f}" for q in v if q != "n")]
             for k, v in said["times"].items()]  # fmt: skip
-    heads = ["microseconds", "n", *(f"{100 * q:g} %" for q in QUANTILES), "longest"]
+    heads = ["microseconds", "n", *(f"{100 * q:g} %" for q in TickTimes.shares), "longest"]
     table("Times of a tick", heads, rows)
     if jumps := said["findings"].get("resynchronised"):
         complain(

@@ -1,20 +1,12 @@
-"""Locking of linear elements: warnings, and the measured factor.
-
-Locking factor of linear cells: small displacement relative to quadratic cells.
-"""
+"""Locking of linear elements: warnings."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from validate.arrays import Floats
-from validate.errors import SceneError
-from validate.fem.assembly.locate import barycentric_rows
-from validate.fem.system import build
-from validate.scene.mesh import quadratic
 from validate.scene.meshless import AnyScene, Meshless
-from validate.scene.scene import Load, Pressure, Scene
+from validate.scene.scene import Pressure, Scene
 
 # P1 / P2 displacement of a held cube that is pulled, 4 boxes an edge: .98 at nu .3, .96 at .4, .92
 # at .45, .82 at .49, .67 at .4999.
@@ -104,50 +96,3 @@ def _bends(scene: Scene, along: int) -> bool:
     acting = [np.asarray(one.direction) for one in (*scene.drives, *scene.loads)
               if not isinstance(one, Pressure)]  # fmt: skip
     return not acting or any(np.abs(np.delete(d, along)).max(initial=0.0) > 1e-9 for d in acting)
-
-
-def locking_factor(scene: Scene, probe: str) -> float:
-    """Displacement at a probe under the scene's one load, linear over quadratic cells (same mesh).
-
-    Small strain, static, the load as a uniform traction; along the quadratic displacement, of
-    hexahedra that of mixed ones. 1 says that the scene's cells do as well as quadratic ones, 0.6
-    that they show 60 % of the motion. A scene with nodal mean or mixed dilatation is judged as it
-    is. Raises `SceneError` without that probe, for other than one load, for quadratic cells, and
-    for a probe that does not move.
-    """
-    points = [p.point for p in scene.probes if p.name == probe]
-    if len(points) != 1 or len(scene.loads) != 1 or scene.mesh.order != 1:
-        raise SceneError(
-            f"locking at '{probe}': needs linear cells, one load and that probe; the scene has "
-            f"order {scene.mesh.order}, {len(scene.loads)} loads, probes "
-            f"{[p.name for p in scene.probes]}"
-        )
-    small = replace(
-        scene,
-        material=replace(scene.material, law="linear"),
-        regions=tuple(
-            replace(r, material=replace(r.material, law="linear")) for r in scene.regions
-        ),
-        loads=tuple(
-            replace(load, spread="consistent") if isinstance(load, Load) else load
-            for load in scene.loads
-        ),
-    )
-    # Quadratic hexahedra lock near nu = .5, too; those of linear pressure do not.
-    finer = replace(
-        small, body=quadratic(scene.mesh), dilatation="mixed" if scene.mesh.bricks else "pointwise"
-    )
-    ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
-    length = float(reference @ reference)
-    if length == 0:
-        raise SceneError(f"locking at '{probe}': the probe does not move under the load")
-    return float(ours @ reference) / length
-
-
-def _moved(scene: Scene, points: Floats) -> Floats:
-    """Displacement (d,) m of the one point under a unit of the one load."""
-    system = build(scene)
-    u = np.zeros(scene.mesh.nodes.size)
-    u[system.free] = system.factor().solve(system.loads[system.free, 0])
-    moved: Floats = barycentric_rows(scene.mesh, points).apply(u.reshape(scene.mesh.nodes.shape))[0]
-    return moved

@@ -5,10 +5,10 @@ from validate.exports import lazily, names
 _HOMES = {
     "identification": ("Identification", "InTurn", "Profiled", "identify"),
     "least_squares": ("Fit", "fit", "Range", "Space", "whitened"),
-    "profile": ("Side", "side", "Interval", "mesh_share", "profile_interval"),
-    "scaled_curve": ("LawFit", "fit_scale", "ScaledFit", "UnitCurve", "fit_scaled"),
+    "profile": ("Side", "side"),
+    "scaled_curve": ("ScaledFit", "UnitCurve", "fit_scaled"),
     "budget": ("IdentifiedValue", "Pattern", "pattern"),
-    "modulus": ("ModulusFit", "gent_correction", "identify_modulus"),
+    "modulus": ("ModulusFit", "fit_modulus"),
 }
 
 __all__ = names(_HOMES)

@@ -13,7 +13,6 @@ E_apparent = E * correction. Whether plates slip is seldom recorded.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -72,19 +71,6 @@ class ModulusFit:
     r_squared: float
 
 
-@dataclass(frozen=True)
-class ModulusSummary:
-    """Mean over repeats, Pa. The scatter of repeats on one specimen understates that of specimens.
-
-    `sd_repeats` is None for a single log; `sd_mean` is then that fit's own standard error.
-    """
-
-    mean: float
-    sd_repeats: float | None
-    sd_mean: float
-    fits: tuple[ModulusFit, ...]
-
-
 def cylinder_of(recording: Recording) -> CylinderSize:
     """Return the cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
 
@@ -141,39 +127,6 @@ def fit_modulus(
             "another"
         )
     return _fit(recording.name, strain[used], force[used], cylinder.area, offset, contact, window)
-
-
-def summarise(fits: Sequence[ModulusFit]) -> ModulusSummary:
-    """Mean, scatter over repeats (n - 1) and sd of the mean; raises `UsageError` without fits."""
-    if not fits:
-        raise UsageError("no fits to summarise; give at least one force-displacement log")
-    values = np.array([fit.E_apparent for fit in fits])
-    windows = {fit.window for fit in fits}
-    if len(windows) > 1:
-        raise UsageError(f"fits over different strain windows {sorted(windows)}: use one")
-    scatter = float(values.std(ddof=1)) if len(fits) > 1 else None
-    sd_mean = fits[0].sd if scatter is None else scatter / math.sqrt(len(fits))
-    return ModulusSummary(float(values.mean()), scatter, sd_mean, tuple(fits))
-
-
-def identify_modulus(
-    recordings: Sequence[Recording],
-    cylinder: CylinderSize | None = None,
-    window: tuple[float, float] = WINDOW,
-    test: TestKind = "compression",
-) -> ModulusSummary:
-    """`fit_modulus` of each recording, summarised."""
-    return summarise([fit_modulus(recording, cylinder, window, test) for recording in recordings])
-
-
-def gent_correction(diameter: float, height: float) -> float:
-    """E_apparent / E = 1 + 2 S^2 of a bonded incompressible disc, shape factor S = D / 4h.
-
-    Gent and Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111-122. Sizes in m; small strains, nu 0.5.
-    For a squat cylinder (S below about 1) it is low: a finite-element factor is the better one.
-    """
-    cylinder = CylinderSize(diameter, height)
-    return 1 + 2 * (cylinder.diameter / (4 * cylinder.height)) ** 2
 
 
 def load_noise(force: Floats) -> float:

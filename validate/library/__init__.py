@@ -8,13 +8,12 @@ promised.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "experiments": ("load",),
+    "files": ("load", "open_recording"),
     "single_run": ("run",),
     "run_result": ("RunCheck", "RunResult", "open_run"),
     "named_study": ("study",),
     "study_result": ("StudyResult",),
     "comparison": ("RunComparison", "compare"),
-    "recordings": ("open_recording",),
 }
 
 __all__ = names(_HOMES)

@@ -5,24 +5,54 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from validate.compare.exhibit import Exhibit
 from validate.compare.row import Wanted
 from validate.compare.view import View
 from validate.display import Screen, listed
 from validate.errors import UsageError
 from validate.library.plots import Plots
-from validate.library.view_result import ShownView
 from validate.numbers import text, with_unit
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
+from validate.report.views.drawers import figures, part, save, terminal
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
 from validate.study.stored_runs.score_comparison import read_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
     from xarray import Dataset
+
+
+_WIDTH = 100  # letters of a line of text
+
+
+@dataclass(frozen=True, repr=False)
+class ShownView:
+    """A filled view: `print` gives its text, a notebook shows it as on the report's page."""
+
+    exhibit: Exhibit
+    table: LongTable
+
+    def figures(self) -> "list[Figure]":
+        """Return its charts as matplotlib figures; none for a table or sentences."""
+        return figures(self.exhibit, self.table)
+
+    def save(self, path: str | Path) -> None:
+        """Write it as the suffix says: .svg, .pdf, .png, .csv, .tex or .html.
+
+        Raises `UsageError` for another suffix, and for several charts or tables in one file.
+        """
+        save(self.exhibit, self.table, Path(path))
+
+    def __repr__(self) -> str:
+        return "\n".join(terminal(self.exhibit, _WIDTH))
+
+    def _repr_html_(self) -> str:
+        return part(self.exhibit, self.table)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from validate.engine.cell import Where
 from validate.engine.pool import Pool
 from validate.errors import UsageError
-from validate.library.experiments import load
+from validate.library.files import load
 from validate.library.run_report import reported_run
 from validate.library.run_result import RunResult, open_run
 from validate.pipeline.experiment.experiment import Experiment

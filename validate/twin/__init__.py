@@ -3,7 +3,7 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "sensors": ("OutlineSensor", "Pen", "StageProfile"),
+    "sensors": ("LoadCell", "signal", "streams"),
     "time_stepping": ("SteppedTwin",),
     "tracker": ("Camera", "Origin", "Reading"),
     "ultrasound": ("Scanner",),

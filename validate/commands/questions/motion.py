@@ -36,7 +36,7 @@ from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.places import axis_of
 from validate.scene.scene import Scene
-from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.solve.explicit.linear import ExplicitLinear
 
 DYNAMIC, STATIC = "dynamic", "static"
 _ACROSS = 2  # cells across the shortest side: a bending body with one is too stiff
@@ -328,7 +328,7 @@ def _line(
     parts += [f"markers={given!r}"] if isinstance(settings, tuple(FILTERS)) else []
     if explicit:  # steps in one of the recording's
         system = build(_scene(recording, p, Path(), 1))
-        limit = _MARGIN * stable_step(system, ExplicitLinear(damping_terms="full"))
+        limit = _MARGIN * ExplicitLinear(damping_terms="full").stable_step(system)
         cut = started(recording, p).recording
         dt = float(steps_of(without_rest(p), cut)[0])
         parts.append(f"split={max(1, ceil(dt / limit))}")

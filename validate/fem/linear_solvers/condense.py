@@ -1,4 +1,4 @@
-"""Condensed linear systems: static condensation, imposed displacements, boundary swap.
+"""Condensed linear systems: static condensation, imposed displacements.
 
 Condensation is exact (paper 000, eqs 17-20). Forces act on kept nodes only, so that only their rows
 and columns of the inverse are needed. Two forms: `dense` holds all of them (the paper's explicit
@@ -12,23 +12,17 @@ A tool that touches the body gives the displacement of a few combinations c . u 
 their forces follow from a system as small as their number (paper 000, section 5.2: a contact adds
 a node to the working matrix). Nothing is inverted or updated in size, so nothing drifts: what was
 removed has left no trace.
-
-Boundary swap (paper 000): force and displacement change places. For forces on all kept unknowns u =
-A f. An unknown whose displacement is given instead changes places with its force by a principal
-pivot, a rank-one update of the dense matrix. Rounding adds up over many pivots: it is measured on
-random states and, beyond a limit, the matrix is made afresh."""
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.cavity import CavitySurface
-from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.factor import Factor, Fronts
 from validate.fem.system import Responses, System
 from validate.fem.system import responses as responses_of
@@ -270,100 +264,3 @@ def displaced(system: WorkingSet, z: Floats, targets: Sequence[float]) -> tuple[
     """Displacements (W,) m and the rows' forces (c,) N at once."""
     forces = system.forces(z, np.asarray(targets, dtype=np.float64))
     return system.displacement(z, forces), forces
-
-
-_EVERY = 64  # pivots between two measurements of the drift
-_DRIFT = 1e-11  # of the largest displacement: beyond it the matrix is made afresh
-_VANISHES = 1e-13  # of the unknown's own compliance: the others hold it already
-
-
-class Swapped:
-    """The mixed matrix T (m, m) of a compliance A (m, m) m/N: y = T x, where x is the force of an
-    unknown that is free and the displacement of one that is `driven`, and y the other of the two.
-
-    It changes in place: a tick has no time for copies. `pivots`, `refactorisations` and
-    `worst_drift` say what was done.
-    """
-
-    def __init__(self, A: Floats, seed: int = 0) -> None:
-        self.A, self.T = A, A.copy()
-        self.driven: NDArray[np.bool_] = np.zeros(len(A), dtype=bool)
-        self.pivots = self.refactorisations = 0
-        self.worst_drift = 0.0
-        self._random = np.random.default_rng(seed)
-
-    def swap(self, unknown: int) -> None:
-        """Give the unknown's displacement instead of its force, or its force again.
-
-        Raises `SceneError` where the unknowns driven already hold it, or nothing moves it.
-        """
-        pivot = float(self.T[unknown, unknown])
-        own = float(self.A[unknown, unknown])
-        least = _VANISHES * (own if not self.driven[unknown] else 1 / own if own else np.inf)
-        if not pivot > least:
-            raise SceneError(
-                f"unknown {unknown} cannot be driven: its compliance is {pivot:.1e} m/N "
-                f"together with the driven unknowns, {own:.1e} m/N alone"
-            )
-        _pivot(self.T, unknown)
-        self.driven[unknown] = not self.driven[unknown]
-        self.pivots += 1
-        if self.pivots % _EVERY == 0 and self.drift() > _DRIFT:
-            self.refactor()
-
-    def solve(self, given: Floats) -> tuple[Floats, Floats]:
-        """Displacements (m,) m and forces (m,) N, from `given` (m,): m where driven, N else."""
-        found = self.T @ given
-        u = np.where(self.driven, given, found)
-        return u, np.where(self.driven, found, given)
-
-    def drift(self) -> float:
-        """Return the largest |u - A f| over the largest |u| of a random state: what rounding has
-        left."""
-        given = self._random.standard_normal(len(self.A))
-        size = np.sqrt(np.diag(self.A))
-        given *= np.where(self.driven, size, np.divide(1, size, out=np.zeros_like(size),
-                                                       where=size > 0))  # fmt: skip
-        u, f = self.solve(given)
-        scale = float(np.abs(u).max(initial=0.0))
-        found = float(np.abs(u - self.A @ f).max(initial=0.0)) / scale if scale else 0.0
-        self.worst_drift = max(self.worst_drift, found)
-        return found
-
-    def refactor(self) -> None:
-        """T from A by one factorisation over what is driven."""
-        self.T = mixed(self.A, np.flatnonzero(self.driven))
-        self.refactorisations += 1
-
-
-def mixed(A: Floats, driven: Ints) -> Floats:
-    """Return the matrix of `Swapped` at once: [[A_ff - A_fd X, X^T], [-X, A_dd^-1]], X = A_dd^-1
-    A_df."""
-    T = A.copy()
-    if not len(driven):
-        return T
-    rest = np.setdiff1d(np.arange(len(A)), driven)
-    inverse = np.linalg.inv(A[np.ix_(driven, driven)])
-    X = inverse @ A[np.ix_(driven, rest)]
-    T[np.ix_(driven, driven)] = (inverse + inverse.T) / 2
-    T[np.ix_(driven, rest)] = -X
-    T[np.ix_(rest, driven)] = X.T
-    T[np.ix_(rest, rest)] -= A[np.ix_(rest, driven)] @ X
-    return T
-
-
-@compiled()
-def _pivot(T: Floats, i: int) -> None:
-    """The principal pivot of T (m, m) at i, in place."""
-    m = len(T)
-    p = 1 / T[i, i]
-    row = T[i].copy()
-    for j in range(m):
-        if j != i:
-            factor = T[j, i] * p
-            for k in range(m):
-                T[j, k] -= factor * row[k]
-            T[j, i] = factor
-    for k in range(m):
-        T[i, k] = -row[k] * p
-    T[i, i] = p

@@ -306,11 +306,10 @@ def rubbed(tree: Tree, z: float) -> Tree:
     return rubbing(tree, min(share, 2 - share))
 
 
-FINER = 1.25  # times the cells along every edge: the finest mesh of `MESHES`
 #: More than three meshes: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells
 #: have no common factor: within 5 % the grids are similar. Order 2: corners at the plates and
 #: facets on the wall limit that of quadratic elements.
-MESHES = vary("body.cells", f"x 0.625 0.75 0.875 {FINER}, order 2")
+MESHES = vary("body.cells", "x 0.625 0.75 0.875 1.25, order 2")
 #: The inputs that every such experiment has, with the fields of `InclusionRanges`.
 INPUTS = (
     vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),

@@ -1,7 +1,6 @@
 """Reader of nominal stress against stretch: one curve, or a plane of two stretches."""
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +18,6 @@ _LONGEST = 20.0  # no rubber reaches it
 _ROUNDING = 1e-9  # of the largest stress
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Stretches (n, k) and nominal stresses (n, k) Pa, tension positive; k directions."""
-
-    stretch: Floats
-    stress: Floats
-
-
 def read_stretch_stress(path: Path, unit: str | None = None) -> Recording:
     """Columns named "stretch" and "stress", one of each or two, in the file's order.
 
@@ -40,29 +31,24 @@ def read_stretch_stress(path: Path, unit: str | None = None) -> Recording:
         tables = parse_tables(data)
         if len(tables) != 1:
             raise RecordingError(f"{len(tables)} tables; export one curve per file")
-        curve, said = _curve(tables[0], unit)
+        stretch, stress, said = _curve(tables[0], unit)
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error}") from error
-    digest = hashlib.sha256(data).hexdigest()
+    digest, rows = hashlib.sha256(data).hexdigest(), np.arange(len(stretch), dtype=np.float64)
     return Recording(
         path.stem,
         Source(path.name, digest, len(data), "text file: integrity not provable"),
         0,
-        signals=signals_of(curve),
+        signals={
+            "stretch": Signal(rows, stretch, "1", 0.0, "specimen"),
+            "stress": Signal(rows, stress, "Pa", 0.0, "specimen"),
+        },
         metadata={"provenance": {"file": path.name, "sha256": digest, "stress unit": said}},
     )
 
 
-def signals_of(curve: Curve) -> dict[str, Signal]:
-    """Return the curve as signals; row numbers for times."""
-    t = np.arange(len(curve.stretch), dtype=np.float64)
-    return {
-        "stretch": Signal(t, curve.stretch, "1", 0.0, "specimen"),
-        "stress": Signal(t, curve.stress, "Pa", 0.0, "specimen"),
-    }
-
-
-def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
+def _curve(table: Table, unit: str | None) -> tuple[Floats, Floats, str]:
+    """Stretches and nominal stresses Pa (n, k), tension positive, and where their unit is from."""
     stretches, stresses = (
         [c for c in table.columns if word in words(c.name)] for word in ("stretch", "stress")
     )
@@ -96,4 +82,4 @@ def _curve(table: Table, unit: str | None) -> tuple[Curve, str]:
             f"stress and stretch - 1 differ in sign in {turned} of {len(stress)} rows; "
             "in tension stress is positive and stretch above 1; correct the signs"
         )
-    return Curve(stretch, stress), said if unit else f"{said}, from the header"
+    return stretch, stress, said if unit else f"{said}, from the header"

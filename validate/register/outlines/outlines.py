@@ -24,7 +24,7 @@ from validate.register.observation import (
     frame_at,
     nearest_sample,
 )
-from validate.register.outlines.plane import SurfaceSampler, from_image, require_rigid, section
+from validate.register.outlines.plane import SurfaceSampler, from_image, require_rigid
 
 _TURN = 2 * np.pi
 EVERY_TEN = np.deg2rad(np.arange(0.0, 360.0, 10.0))  # rad
@@ -182,7 +182,7 @@ class OutlineObservation:
 
     def simulated(self, u: Floats) -> Floats:
         """Return the section (k, 2) m of the deformed wall with the image plane."""
-        return section(self.wall.deformed(u), self.wall.triangles, self.pose)
+        return self.wall.section(u, self.pose)
 
     def measured(self, t: float) -> Floats:
         """Return the outline (k, 2) m nearest in time."""

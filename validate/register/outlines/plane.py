@@ -28,6 +28,10 @@ class SurfaceSampler:
         """Positions (v, 3) m under nodal displacements u (n, 3) m."""
         return self.rest + self.rows.apply(u)
 
+    def section(self, u: Floats, pose: Floats) -> Floats:
+        """Outline (k, 2) m in the plane of `pose` (4, 4) under displacements u; as `section`."""
+        return section(self.deformed(u), self.triangles, pose)
+
     def rows_at(self, points: Floats) -> sparse.csr_array:
         """Rows (m, n) of the places on the wall that are nearest to points (m, 3) m."""
         middles = self.rest[self.triangles].mean(axis=1)

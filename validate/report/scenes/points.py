@@ -1,7 +1,6 @@
 """Figures of points, a path and small errors in space."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,35 +14,28 @@ _PATH = "#9E9E9E"
 _ROOM = 0.3  # of the places' extent: what of the path lies further off is not drawn
 
 
-@dataclass(frozen=True)
-class Place:
-    """A named point (3,) mm, and the error (3,) mm that is drawn from it."""
-
-    label: str
-    at: Floats
-    error: Floats
-
-
 def points_picture(
     name: str,
     caption: str,
     path: Floats,
     parts: Sequence[Floats],
-    places: Sequence[Place],
+    labels: Sequence[str],
+    at: Floats,
+    errors: Floats,
     longer: float,
 ) -> Picture:
-    """Return a path (n, 3) mm, its parts, and places with errors `longer` times as long as they
-    are."""
-    pixels = draw(lambda f: _fill(f, path, parts, places, longer), WIDTH + 0.8, WIDTH)
-    alt = f"Path of {len(path)} samples in space with {len(parts)} dwells and {len(places)} points."
+    """Return a path (n, 3) mm, its parts, and named places (k, 3) mm, from which errors (k, 3) mm
+    are drawn `longer` times as long as they are."""
+    pixels = draw(lambda f: _fill(f, path, parts, labels, at, longer * errors), WIDTH + 0.8, WIDTH)
+    alt = f"Path of {len(path)} samples in space with {len(parts)} dwells and {len(at)} points."
     return Picture(name, caption, alt, pixels)
 
 
 def _fill(
-    figure: Figure, path: Floats, parts: Sequence[Floats], places: Sequence[Place], longer: float
-) -> None:
+    figure: Figure, path: Floats, parts: Sequence[Floats], labels: Sequence[str], at: Floats,
+    arrows: Floats,
+) -> None:  # fmt: skip
     ax: Any = figure.add_subplot(projection="3d")
-    at = np.array([p.at for p in places])
     low, high = at.min(axis=0), at.max(axis=0)
     room = _ROOM * float((high - low).max())
     path, *parts = (_inside(x, low - room, high + room) for x in (path, *parts))
@@ -52,16 +44,15 @@ def _fill(
         label = "dwell" if i == 0 else None
         ax.plot(*part.T, ".", color=PALETTE[4], markersize=2.5, label=label)
     ax.plot(*at.T, "o", color=ACCEPTED, markersize=5, label="landmark, touched")
-    error = longer * np.array([p.error for p in places])
     ax.quiver(
         *at.T,
-        *error.T,
+        *arrows.T,
         color=PALETTE[1],
         linewidth=1.5,
         label="to the position predicted by the others",
     )
-    for p in places:
-        ax.text(*p.at, f"  {p.label}", fontsize=9)
+    for label, place in zip(labels, at, strict=True):
+        ax.text(*place, f"  {label}", fontsize=9)
     ax.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
     ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     ax.set(zlim=(low[2] - room, high[2] + room))

@@ -236,15 +236,6 @@ class MovingStepper(InertialStepper):
         return self.nodal(state.inner.u, state.inner.inputs.q)
 
 
-def elastic_forces(system: System, u: Floats) -> Floats:
-    """Share K u of the drives' forces (nt, k) N in fields u (nt, n, d) m, compression positive.
-
-    Where a drive's velocity jumps, damping makes its whole force jump; this share does not.
-    """
-    forces: Floats = u.reshape(len(u), -1) @ (system.K @ system.moves)
-    return system.scene.copies * forces
-
-
 def spread(system: System, free: Floats, driven: Floats) -> Floats:
     """All unknowns (N,) from the free ones (m,) and the drives' (k,)."""
     full = system.moves @ driven if len(driven) else np.zeros(len(system.moves))

@@ -102,6 +102,21 @@ class ExplicitLinear:
         C = "alpha M + beta K" if self.damping_terms == "full" else "alpha M"
         return f"{self.mass} mass, {self.update} C = {C}"
 
+    def stable_step(self, system: System) -> float:
+        """Return the critical step s, exact: 2/w for C in the matrix; (sqrt(c^2 + 4 w^2) - c)/w^2
+        for lagged C with c = alpha + beta w^2; w is the highest frequency with the mass in use.
+
+        Regions that are damped differently get their largest alpha and beta: a safe bound.
+        """
+        w = highest_frequency(system, self.mass)
+        if self.update == "printed":
+            return 2 / w
+        c = float(system.scene.per_cell(lambda m: m.mass_damping).max())
+        if self.damping_terms == "full":
+            c += float(system.scene.per_cell(lambda m: m.stiffness_damping).max()) * w**2
+        # The same as the formula above, without its cancellation under heavy damping.
+        return float(4 / (np.sqrt(c**2 + 4 * w**2) + c))
+
     def prepare(self, system: System) -> Stepper:
         """Raise `SceneError` for a law at large strain, cavities, or missing densities."""
         require_handled(system.scene, self)
@@ -126,25 +141,9 @@ class ExplicitLinear:
             C,
             K,
             solver,
-            stable_step(system, self),
+            self.stable_step(system),
             float(np.ptp(mesh.nodes, axis=0).max()),
         )
-
-
-def stable_step(system: System, settings: ExplicitLinear) -> float:
-    """Return the critical step s, exact: 2/w for C in the matrix; (sqrt(c^2 + 4 w^2) - c)/w^2 for
-    lagged C with c = alpha + beta w^2; w is the highest frequency with the mass in use.
-
-    Regions that are damped differently get their largest alpha and beta: a safe bound.
-    """
-    w = highest_frequency(system, settings.mass)
-    if settings.update == "printed":
-        return 2 / w
-    c = float(system.scene.per_cell(lambda m: m.mass_damping).max())
-    if settings.damping_terms == "full":
-        c += float(system.scene.per_cell(lambda m: m.stiffness_damping).max()) * w**2
-    # The same as the formula above, without its cancellation under heavy damping.
-    return float(4 / (np.sqrt(c**2 + 4 * w**2) + c))
 
 
 def highest_frequency(system: System, mass: MassName) -> float:
@@ -203,7 +202,7 @@ def _stepping(name: str, mass: MassName, terms: DampingTerms, update: UpdateName
         settings.treatment,
         mass,
         lambda r: explicit_maps(1.0, r.c(terms), r.x**2, update),
-        lambda system: stable_step(system, settings),
+        settings.stable_step,
         explicit=True,
         conserves=True,
         order=1.0 if update == "lagged" else 2.0,  # of a damped mode

@@ -85,6 +85,12 @@ class PressureLoop:
         gains = gain_matrix(responses, self)
         return LoopStepper(responses, condensed(responses), gains, self, curve)
 
+    def spectral_radius(self, responses: Responses, z: Floats) -> float:
+        """Return that of I - (dV/dP / V0) G at amounts (1, z) of the columns: what an update leaves
+        of a small volume error. Below 1 the loop converges there."""
+        left = np.eye(len(responses.volumes)) - slopes(responses, z) @ gain_matrix(responses, self)
+        return float(np.abs(np.linalg.eigvals(left)).max(initial=0.0))
+
 
 def gain_matrix(responses: Responses, settings: PressureLoop) -> Floats:
     """G (c, c) Pa: what the pressures change by, per volume error of each cavity."""
@@ -95,13 +101,6 @@ def gain_matrix(responses: Responses, settings: PressureLoop) -> Floats:
            for i in range(count)]  # fmt: skip
     common = settings.gains == "common" and count > 0
     return np.diag(np.full(count, np.mean(own)) if common else np.array(own))
-
-
-def spectral_radius(responses: Responses, z: Floats, gains: Floats) -> float:
-    """Of I - (dV/dP / V0) G at (1, z): what an update leaves of a small volume error; below 1 the
-    law converges there. `gains` (c, c) Pa."""
-    left = np.eye(len(gains)) - slopes(responses, z) @ gains
-    return float(np.abs(np.linalg.eigvals(left)).max(initial=0.0))
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ from validate.scene.tool import Needle
 from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping, Past
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.haptic.spring_probe import Hold, SpringProbe
-from validate.solve.types import State, Stepper
+from validate.solve.types import State
 
 
 @dataclass(frozen=True)
@@ -175,30 +175,6 @@ def extrapolated(t: Floats, y: Floats, at: float) -> Floats:
     return np.asarray((beyond / apart).prod(axis=1) @ y)
 
 
-def between_answers(y: Floats, every: int, late: int, name: Extrapolation) -> Floats:
-    """What ticks 0, 1, .. give of a force y (nt, d) that is read at every so many of them and
-    answered `late` ticks after; the first answer stands before it is there.
-
-    Raises `UsageError` for an answer that is later than the next reading.
-    """
-    require_schedule(every, late)
-    given, most = np.empty_like(y), answers_of(name)
-    for k in range(len(y)):
-        last = max(k - late, 0) // every
-        read = every * np.arange(max(0, last + 1 - most), last + 1)
-        given[k] = extrapolated(read.astype(np.float64), y[read], float(k))
-    return given
-
-
-def require_schedule(every: int, late: int) -> None:
-    """Raise `UsageError` for ticks between readings and of answers that do not fit."""
-    if not (every >= 1 and 0 <= late <= every):
-        raise UsageError(
-            f"a reading every {every} ticks that is answered {late} ticks later: expected at "
-            "least 1, and an answer no later than the next reading"
-        )
-
-
 # -------------------------------------------------------------------------------------------------
 
 _AXES = "xyz"
@@ -240,7 +216,11 @@ class HapticLoop:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.dt) and self.dt > 0):
             raise SceneError(f"tick of {self.dt:g} s: expected a finite number above 0")
-        require_schedule(self.every, self.late)
+        if not (self.every >= 1 and 0 <= self.late <= self.every):
+            raise UsageError(
+                f"a reading every {self.every} ticks that is answered {self.late} ticks later: "
+                "expected at least 1, and an answer no later than the next reading"
+            )
         if not 0 <= self.margin < 1:
             raise SceneError(
                 f"margin {self.margin:g}: expected a share of the critical step, 0 to 1"
@@ -255,7 +235,17 @@ class HapticLoop:
         if not (self.grip is None or self.grip >= 0):
             raise SceneError(f"grip {self.grip:g} N: expected 0 or more, or none")
 
-    def prepare(self, system: System) -> Stepper:
+    def between_answers(self, y: Floats) -> Floats:
+        """Return what ticks 0, 1, .. give of a force y (nt, d) N that every tick has: it is read
+        and answered as set; the first answer stands before it is there."""
+        given, most = np.empty_like(y), answers_of(self.extrapolation)
+        for k in range(len(y)):
+            last = max(k - self.late, 0) // self.every
+            read = self.every * np.arange(max(0, last + 1 - most), last + 1)
+            given[k] = extrapolated(read.astype(np.float64), y[read], float(k))
+        return given
+
+    def prepare(self, system: System) -> "HapticStepper":
         """Raise `SceneError` for a scene without one probe, with drives, or held where it may be
         touched."""
         scene = system.scene

@@ -1,6 +1,7 @@
 """Rates of haptic and visual feedback."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -9,8 +10,6 @@ from validate.errors import UsageError
 
 HAPTIC_HZ = 1000.0  # force updates that a stiff contact needs to feel steady (paper 003, 3.5)
 DEVICE_HZ = 512.0  # of paper 000's haptic device (section 5.2)
-QUANTILES = (0.5, 0.9, 0.99, 0.999)
-VISUAL_HZ = 30.0  # pictures a second (paper 003, 3.3)
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,8 @@ class RealTime:
 class TickTimes:
     """`seconds` (n,) from when a tick was due, or begun, until its force was there."""
 
+    shares: ClassVar[tuple[float, ...]] = (0.5, 0.9, 0.99, 0.999)  # of the ticks, for quantiles
+
     seconds: Floats
 
     def __post_init__(self) -> None:
@@ -61,5 +62,5 @@ class TickTimes:
 
     @property
     def quantiles(self) -> tuple[float, ...]:
-        """Seconds at `QUANTILES`, then the longest."""
-        return (*np.quantile(self.seconds, QUANTILES).tolist(), float(self.seconds.max()))
+        """Seconds within which these `shares` of the ticks were done, then the longest."""
+        return (*np.quantile(self.seconds, self.shares).tolist(), float(self.seconds.max()))

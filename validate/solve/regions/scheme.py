@@ -35,9 +35,9 @@ from validate.solve.regions.body import (
     ratios,
     require_one_probe,
 )
-from validate.solve.regions.march import BorderName, Motion, carried
+from validate.solve.regions.march import BorderName, Motion, carried, spectral_radius
 from validate.solve.regions.primary import EXPLICIT, PrimaryLaw, SolverName, UnsettledError
-from validate.solve.types import Ending, State, Stepper
+from validate.solve.types import Ending, State
 
 _AXES = "xyz"
 _RUNAWAY = 100.0  # body sizes
@@ -138,7 +138,7 @@ class AsyncRegions:
         """Whether the primary region has another law than the rest."""
         return self.law != "linear" or bool(self.prony.g)
 
-    def prepare(self, system: System) -> Stepper:
+    def prepare(self, system: System) -> "RegionStepper":
         """Raise `SceneError` for a scene without one probe, or whose surface is all held."""
         scene = system.scene
         require_handled(scene, self)
@@ -197,6 +197,18 @@ class RegionStepper:
         """What was rounded or left out of the settings, in words."""
         tick: RegionTick = state.inner
         return self.words + (tick.regions.words if tick.regions else ())
+
+    def growth(self) -> float:
+        """Return how much the fastest growing motion grows in a tick while the probe stays at its
+        tip: above 1 it grows without bound. Dense: small bodies."""
+        tick: RegionTick = self.step(self.rest(), np.zeros(len(self.tool.tip))).inner
+        regions = tick.regions
+        if regions is None:
+            raise SceneError(f"the probe '{self.tool.name}' touches nothing; move its tip")
+        tip, units = np.array(self.tool.tip), np.eye(len(self.body.at))
+        pull = np.stack([self.probe.nodal(tick.held, tip, u) for u in units], axis=1)
+        radius = spectral_radius(regions.coupled, lambda visible: np.asarray(pull @ visible))
+        return float(radius ** (1 / regions.coupled.common))
 
     def rest(self) -> State:
         tip = np.array(self.tool.tip)

@@ -21,7 +21,7 @@ from validate.pipeline.ladder.default import body_of
 from validate.pipeline.ladder.ladder import StabilityBody, Turned
 from validate.pipeline.run.job import Job
 from validate.scene.scene import Scene
-from validate.solve.explicit.linear import ExplicitLinear, stable_step
+from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.schemes import steppings_for
 from validate.solve.study_entries import Stepping
 from validate.study.stability.plan import StabilityCell
@@ -91,7 +91,7 @@ def run_cell(bench: StabilityBench, cell: StabilityCell) -> Stepped:
     modes = {mass: frequencies(system, mass) for mass in ("consistent", "lumped")}
     schemes = steppings_for(system.scene.mesh.kind)
     pulled = build(base.pulled(v))
-    limit = stable_step(pulled, ExplicitLinear(1.0, "lumped", "mass"))
+    limit = ExplicitLinear(1.0, "lumped", "mass").stable_step(pulled)
     # Of K, of the consistent M, and of Newmark's J = 4/h^2 M + 2/h C + K at the paper's step
     free = system.free
     K, M, C = (X[free][:, free].toarray() for X in (system.K, system.M, system.C))

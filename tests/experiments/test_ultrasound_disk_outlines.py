@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from experiments.ultrasound_disk.round_outlines import ENDS, RoundOutlines
 from validate.arrays import Floats
 from validate.recording.types import Contours, Frames
 from validate.register.observation import EVERYTHING
-from validate.register.outlines.round_outlines import ENDS, RoundOutlines
 from validate.scene.meshless import RigidBody
 from validate.solve.static.without_mechanics import RigidMotion
 

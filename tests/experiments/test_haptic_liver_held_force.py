@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.haptic_liver.held_force import HeldForce
 from validate.arrays import Floats
-from validate.compare.force_error import HeldForce
 from validate.errors import ComparisonError
-from validate.solve.haptic.loop import between_answers
+from validate.solve.haptic.loop import HapticLoop
 
 K, A, H = 300.0, 0.01, 1e-3
 
@@ -19,7 +19,9 @@ def _swing(ticks: int, turns: int = 3) -> Floats:
 
 def _on_spring(x: Floats, every: int, late: int = 0, name: str = "hold") -> HeldForce:
     true = -K * x
-    return HeldForce(x, between_answers(true, every, late, name), true, H)  # type: ignore[arg-type]
+    return HeldForce(
+        x, HapticLoop(every=every, late=late, extrapolation=name).between_answers(true), true, H
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("ticks", [50, 200, 1000])

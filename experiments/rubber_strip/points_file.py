@@ -1,11 +1,10 @@
-"""Reader of tracked points in NumPy archives: positions over load steps, without times.
+"""Tracked points in NumPy archives: positions over load steps, without times.
 
 The unit stands at the end of the file's name (`points3d_mm.npz`), or is asked for. Archives are
 read without pickles: they hold arrays and nothing else.
 """
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from validate.arrays import Floats, checked
 from validate.errors import RecordingError, UsageError
 from validate.files import npz_arrays
 from validate.recording.reader import source_of
-from validate.recording.types import Markers, Recording, Source
+from validate.recording.types import Markers, Recording
 from validate.units import si_factor
 
 _MOST = 200_000_000  # bytes of one archive, unpacked
@@ -68,15 +67,6 @@ def read_stage(path: Path) -> StageTest:
     x = _array(path, arrays, "points", (None, None, 2))
     stage = 1e-3 * _array(path, arrays, "stage_mm", (len(x),), nan=False)
     return StageTest(path.stem, x, stage)
-
-
-def read_arrays(
-    path: Path, shapes: Mapping[str, tuple[int | None, ...]]
-) -> tuple[Source, dict[str, Floats]]:
-    """Arrays of these names and shapes, and where they came from; raises as `read_points` does."""
-    arrays = npz_arrays(path, _MOST)
-    found = {name: _array(path, arrays, name, shape, nan=False) for name, shape in shapes.items()}
-    return source_of(path, "verified (CRC-32)"), found
 
 
 def _array(

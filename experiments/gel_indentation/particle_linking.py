@@ -1,4 +1,4 @@
-"""Correspondence of two unlinked clouds of the same particles, and interpolation between them.
+"""Linking of two clouds of the same particles, and interpolation between them.
 
 Nobody moves at first by less than half a spacing: where most neighbours agree on their nearest
 partner, links are taken. From there a front walks on: an unlinked particle is predicted by the

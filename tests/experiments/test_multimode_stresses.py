@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from experiments.multimode.stress_observation import StressObservation
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError
 from validate.register.observation import EVERYTHING, Selection
-from validate.register.signals import StressObservation
 from validate.solve.types import Trace
 
 T = np.arange(3.0)

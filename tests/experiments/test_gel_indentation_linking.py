@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from experiments.gel_indentation.particle_linking import link
 from validate.errors import RegistrationError
-from validate.register.markers.link import link
 
 Pair = tuple[np.ndarray, np.ndarray, np.ndarray]
 

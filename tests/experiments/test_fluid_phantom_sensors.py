@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.twin.sensors import OutlineSensor
+from experiments.fluid_phantom.sensors import OutlineSensor
 
 # private: _segmented: called alone, case by case.
 

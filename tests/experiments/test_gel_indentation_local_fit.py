@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.register.markers.link import best_neighbours, local_fit, noise
+from experiments.gel_indentation.particle_linking import best_neighbours, local_fit, noise
 
 X = np.random.default_rng(3).uniform(size=(800, 3))
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from experiments.fluid_phantom.friction_profile import profile_interval
 from validate.compare.result import Result
 from validate.errors import ComparisonError
-from validate.identify.profile import mesh_share, profile_interval
 
 
 def test_a_parabola_gives_its_minimum_and_two_standard_deviations() -> None:
@@ -30,15 +30,6 @@ def test_the_meshs_share_widens_both_sides_within_the_grid() -> None:
     assert (found.low, found.high) == pytest.approx((0.4 - 0.26, 0.4 + 0.26), abs=2e-3)
     wide = profile_interval(grid, chi_square, 30, mesh=2.0)
     assert (wide.low, wide.high) == (0.0, 1.0)
-
-
-def test_the_meshs_share_is_richardsons_with_a_factor() -> None:
-    """u(h) = 10 + 3 h^2 at h = 0.1 is off by 0.03, from either side; 1.5 of it is u."""
-    own, finer, coarser = (10 + 3 * h**2 for h in (0.1, 0.05, 0.15))
-    assert mesh_share(own, finer, 0.5, 2.0) == pytest.approx(1.5 * 0.03)
-    assert mesh_share(own, coarser, 1.5, 2.0) == pytest.approx(1.5 * 0.03)
-    with pytest.raises(ComparisonError, match="two sizes are needed"):
-        mesh_share(own, finer, 1.0, 2.0)
 
 
 def test_nothing_to_profile_is_an_error() -> None:
