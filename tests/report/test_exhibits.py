@@ -25,7 +25,7 @@ from validate.recording.mcap.read import read_recording
 from validate.report.charts.encode import encoded
 from validate.report.exhibits import DrawnExhibit, draw_all, drawing
 from validate.report.export.fields import open_fields, write_fields
-from validate.report.export.tables import across, caption, under, word_columns
+from validate.report.export.tables import caption, sheet, word_columns
 from validate.report.export.tables import shown as read
 from validate.report.page.html import page
 from validate.report.scenes import gl
@@ -173,10 +173,16 @@ def test_long_texts_stand_below_their_row() -> None:
     rows = (("first of all, a name that is longer than others", 1.0, long, "near"),
             ("b", 2.0, None, "far"))  # fmt: skip
     found = NumberTable("t", "T", ("name", "E / mm", "limit from", "why"), rows, below="why")
-    assert across(found) == (0, 1)
-    assert under(found, rows[0]) == f"near; limit from: {long}"
-    assert across(replace(found, below="")) == (0, 1, 2, 3)
-    assert across(replace(found, rows=())) == (0, 1, 2)
+    read_as = sheet(found)
+    assert read_as.columns == (0, 1, 2)
+    assert read_as.texts[0][2] == "the largest displacement ther…"
+    assert read_as.below == (f"near; limit from: {long}", "far")
+    both = sheet(replace(found, rows=(rows[0], (*rows[1][:2], long, None))))
+    assert both.columns == (0, 1)  # a column of long texts goes altogether
+    assert both.below[1] == f"limit from: {long}"
+    assert sheet(replace(found, below="")).columns == (0, 1, 2, 3)
+    assert sheet(replace(found, below="")).below == ()
+    assert sheet(replace(found, rows=())).columns == (0, 1, 2)
 
 
 def test_frames_are_told_from_loads(result: Result) -> None:

@@ -1,7 +1,8 @@
 """Tables of numbers: format of entries on the page, and tables and charts as CSV files."""
 
 import csv
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
@@ -40,29 +41,47 @@ def word_columns(table: NumberTable) -> tuple[int, ...]:
     return tuple(i for i, c in enumerate(columns) if any(isinstance(plain(v), str) for v in c))
 
 
-def across(table: NumberTable) -> tuple[int, ...]:
-    """Return the columns beside each other; the texts of the others stand below the rows.
+@dataclass(frozen=True)
+class Sheet:
+    """A table as it is read: indices of its `columns` beside each other, `texts` of each row there,
+    and the words `below` each row (none: no row has any)."""
 
-    These are the one that is declared so, and in a table that has one, or is wide, columns of long
-    texts but the first.
+    columns: tuple[int, ...]
+    texts: tuple[tuple[str, ...], ...]
+    below: tuple[str, ...]
+
+
+def sheet(table: NumberTable) -> Sheet:
+    """Return the table with the texts that stand below its rows.
+
+    These are the column that is declared so and, in a table that has one or is wide, long texts but
+    those of the first column; a column of mostly long ones goes altogether, of another the first
+    words stay.
     """
-    columns = list(zip(*table.rows, strict=True)) or [()] * len(table.headings)
-    long = [any(isinstance(plain(c), str) and len(shown(c)) > _LONG for c in cs) for cs in columns]
-    shared = table.below or len(columns) >= _WIDE
-    return tuple(
-        i for i, heading in enumerate(table.headings)
-        if not (shared and ((heading and heading == table.below) or (i and long[i])))
-    )  # fmt: skip
-
-
-def under(table: NumberTable, row: Sequence[Entry | TableCell]) -> str:
-    """Return the words below a row: the declared text first, others after their headings."""
-    beside = across(table)
-    others = [i for i in range(len(row)) if i not in beside]
-    said = {table.headings[i]: shown(row[i]) for i in others}
-    first = said.pop(table.below, "")
-    named = (f"{name}: {words}" for name, words in said.items() if words not in ("", MISSING))
-    return "; ".join(filter(None, (first.removeprefix(MISSING), *named)))
+    own = table.headings.index(table.below) if table.below else -1
+    shared = table.below or len(table.headings) >= _WIDE
+    texts = [[shown(entry) for entry in row] for row in table.rows]
+    long = [[bool(shared and i and isinstance(plain(entry), str) and len(text) > _LONG)
+             for i, (entry, text) in enumerate(zip(row, words, strict=True))]
+            for row, words in zip(table.rows, texts, strict=True)]  # fmt: skip
+    mostly = [2 * sum(column) > len(column) for column in zip(*long, strict=True)]
+    columns = tuple(
+        i for i in range(len(table.headings)) if i != own and not any(mostly[i : i + 1])
+    )
+    cut = tuple(
+        tuple(f"{row[i][: _LONG - 1].rstrip()}…" if much[i] else row[i] for i in columns)
+        for row, much in zip(texts, long, strict=True)
+    )
+    below = []
+    for row, much in zip(texts, long, strict=True):
+        first = row[own].removeprefix(MISSING) if table.below else ""
+        named = [
+            f"{table.headings[i]}: {text}"
+            for i, text in enumerate(row)
+            if i != own and (much[i] or (i not in columns and text not in ("", MISSING)))
+        ]
+        below.append("; ".join(filter(None, (first, *named))))
+    return Sheet(columns, cut, tuple(below) if any(below) else ())
 
 
 def caption(table: NumberTable) -> str:

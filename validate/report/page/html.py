@@ -27,7 +27,7 @@ from validate.report.charts.encode import uri
 from validate.report.charts.intervals import shares
 from validate.report.charts.style import DPI
 from validate.report.exhibits import DrawnExhibit
-from validate.report.export.tables import across, caption, shown, under, word_columns
+from validate.report.export.tables import caption, sheet, shown, word_columns
 from validate.report.page.plots import plot
 from validate.report.sections.observations import timed, where_shown
 from validate.report.views.view_filling import WORDS
@@ -217,15 +217,14 @@ def _environment() -> Environment:
     environment.globals["file"] = lambda n: Markup(folder.joinpath(n).read_text("utf-8"))
     environment.filters.update(
         uri=uri,
-        across=across,
         caption=caption,
+        sheet=sheet,
         shown=shown,
         word_columns=word_columns,
         breakable=_breakable,
         least_width=least_width,
         json=_json,
         sort_key=_sort_key,
-        under=under,
     )
     return environment
 

@@ -14,7 +14,7 @@ import plotille
 from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
 from validate.errors import UsageError
 from validate.numbers import significant
-from validate.report.export.tables import across, shown, under, write_csv
+from validate.report.export.tables import sheet, write_csv
 from validate.report.views.bars import bar, legend
 from validate.report.views.layout import laid, wrapped
 
@@ -152,12 +152,14 @@ def terminal(found: Exhibit, width: int) -> list[str]:
         lines += wrapped(text, width, "  ")
     for part in found.tables:
         lines += ["", *wrapped(part.title, width)] if part.title != found.title else []
-        beside = across(part)
-        heads = [part.headings[i] for i in beside]
-        rows = [[shown(row[i]) for i in beside] for row in part.rows]
-        if len(beside) < len(part.headings) and part.rows:
+        laid_out = sheet(part)
+        heads, rows = (
+            [part.headings[i] for i in laid_out.columns],
+            [list(r) for r in laid_out.texts],
+        )
+        if laid_out.below:
             heads.append("")
-            rows = [[*line, under(part, row)] for line, row in zip(rows, part.rows, strict=True)]
+            rows = [[*row, words] for row, words in zip(rows, laid_out.below, strict=True)]
         lines += laid(heads, rows, width)
     for chart in found.charts:
         title = [chart.title] if chart.title != found.title else []
