@@ -4,13 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from validate.commands.display import relative, say
-from validate.commands.show import folder_of, shown_of
+from validate.commands.show import shown_of
 from validate.errors import UsageError
 from validate.files import safe_name
 from validate.places import try_file, try_folder, write_whole
 from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.tables import stored_folder
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
@@ -24,7 +25,7 @@ def export(
 
     Raises `UsageError` where none is requested, or no such run is stored.
     """
-    run = folder_of(name, None)
+    run = stored_folder(name)
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted and figures is None:

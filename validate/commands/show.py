@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from validate.catalogue import experiment_files, reports_of
 from validate.checksums import read_sealed
 from validate.commands.display import console, relative, say
 from validate.commands.screen import rows
@@ -14,6 +13,7 @@ from validate.parameters import nearest_names
 from validate.report.long_table import LongTable
 from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
 from validate.report.stored.folder import MARK
+from validate.report.stored.tables import stored_folder
 from validate.report.views.drawers import drawable, save, terminal
 from validate.report.views.view_filling import filled_views
 from validate.study.stored_runs.score_comparison import read_table
@@ -24,7 +24,7 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
 
     Raises `UsageError` for a run or a name that is not there.
     """
-    folder = folder_of(run, reports)
+    folder = stored_folder(run, reports)
     table = read_table(folder, *NOT_SHOWN)
     found = {name: (form, exhibit) for name, form, exhibit in shown_of(folder, table)}
     for name in names:
@@ -44,13 +44,6 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
     for i, name in enumerate(names):
         for line in (*([""] if i else []), *terminal(found[name][1], screen.width)):
             screen.print(line, markup=False, soft_wrap=True)
-
-
-def folder_of(run: str, reports: Path | None) -> Path:
-    """A report folder: as a path, or below the reports of an experiment."""
-    if (Path(run) / MARK).is_file() or Path(run).is_file():
-        return Path(run)
-    return reports_of(experiment_files(Path.cwd()).get(run), reports) / run
 
 
 def shown_of(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from validate.display import Screen
 from validate.library.run_result import RunResult
 from validate.report.long_table import frame
+from validate.report.stored.tables import stored_folder
 from validate.report.views.numbers import shown_unit, significant, text
 from validate.study.stored_runs.score_comparison import (
     SideBySide,
@@ -90,7 +91,7 @@ def compare(
     Raises `UsageError` for fewer than two runs and for a folder without a run, `ComparisonError`
     where no score is shared.
     """
-    folders = [r.folder if isinstance(r, RunResult) else Path(r) for r in runs]
+    folders = [r.folder if isinstance(r, RunResult) else stored_folder(r) for r in runs]
     return RunComparison(scores_of_runs(folders, methods, scores, sort))
 
 

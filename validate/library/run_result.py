@@ -15,6 +15,7 @@ from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
+from validate.report.stored.tables import stored_folder
 from validate.report.views.numbers import text, with_unit
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
@@ -188,11 +189,11 @@ def _twice(u_val: float | None, unit: str) -> str:
 
 
 def open_run(path: str | Path) -> RunResult:
-    """Return the stored run in a folder of reports, as `reports/fluid_phantom`.
+    """Return a stored run: a folder, as `reports/fluid_phantom`, or a name, as `validate show`.
 
     Raises `UsageError` where no run is stored there, and for the folder of a study.
     """
-    folder = Path(path).resolve()
+    folder = stored_folder(path).resolve()
     table = read_table(folder, "score*", "check*", "published*")
     if not table.head.get("methods"):
         raise UsageError(f"{path}: a study or a comparison, not a run; open its report.html")
