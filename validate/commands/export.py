@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from validate.commands.display import relative, say
-from validate.commands.show import shown_of
 from validate.errors import UsageError
 from validate.files import safe_name
 from validate.places import try_file, try_folder, write_whole
@@ -12,6 +11,7 @@ from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.tables import stored_folder
+from validate.report.stored.views import stored_views
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
@@ -52,7 +52,7 @@ def _figures(run: Path, folder: Path) -> None:
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, _, exhibit in shown_of(run, table):
+    for name, _, exhibit in stored_views(run, table):
         for part in drawable(exhibit):
             for column in COLUMNS:
                 figure = figure_of(part, table, column)

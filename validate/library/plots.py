@@ -1,48 +1,68 @@
-"""Figures of a stored run by name: `result.plot.limits()`."""
+"""Views and figures of a stored run by name: `result.plot.limits()`."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from validate.library.view_result import ShownView
 from validate.parameters import nearest_names
+from validate.report.export.table_file import stored_table
+from validate.report.long_table import LongTable
+from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.folder import MARK
+from validate.report.stored.views import PICTURE, Shown, pictures, shown_by_name
+from validate.report.views.standard import VIEWS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Draw = Callable[[], "Figure"]
+
+def views_of(folder: Path) -> Shown:
+    """Return what a stored run shows, by the names of `validate show`: form and content."""
+    return _stored(folder)[1]
 
 
-def views_of(folder: Path) -> Mapping[str, Draw]:
-    """Return what draws each figure of a stored run, by name: charts of the views that have rows,
-    and what its report shows besides."""
-    from validate.report.stored.figures import stored_figures
+def _stored(folder: Path) -> tuple[LongTable, Shown]:
+    changed = (folder / MARK).stat().st_mtime_ns
+    return _read(folder, changed, tuple(view.name for view in VIEWS))
 
-    return stored_figures(folder)
+
+@lru_cache(maxsize=4)
+def _read(folder: Path, changed: int, views: tuple[str, ...]) -> tuple[LongTable, Shown]:
+    table = stored_table(folder, part=NOT_SHOWN)
+    return table, shown_by_name(folder, table)
 
 
 @dataclass(frozen=True, repr=False)
 class Plots:
-    """The figures of one stored run: each name is a method that returns a matplotlib Figure.
+    """What one stored run shows: each name of `validate show` is a method.
 
-    A notebook shows the figure. `dir()` and `list()` give the names.
+    It returns a matplotlib Figure for a chart or a picture; for a table, sentences and several
+    charts a `ShownView`, which has `figures()` and `save(path)`. A notebook shows both. `dir()` and
+    `list()` give the names.
     """
 
     _folder: Path
 
-    def __getattr__(self, name: str) -> Draw:
-        """Return what draws the figure of that name; raises `AttributeError` with the nearest."""
+    def __getattr__(self, name: str) -> "Callable[[], Figure | ShownView]":
+        """Return what draws the view of that name; raises `AttributeError` with the nearest."""
         if name.startswith("_"):
             raise AttributeError(name)
-        views = views_of(self._folder)
+        table, views = _stored(self._folder)
         if name not in views:
             raise AttributeError(f"no figure '{name}'; {nearest_names(name, set(views))}")
-        draw = views[name]
+        form, exhibit = views[name]
 
-        def shown() -> "Figure":
-            from validate.report.stored.figures import shown_in_notebooks
+        def shown() -> "Figure | ShownView":
+            from validate.report.stored.figures import figure_of_file, shown_in_notebooks
 
-            return shown_in_notebooks(draw())
+            view = ShownView(exhibit, table)
+            if form == PICTURE:
+                return shown_in_notebooks(figure_of_file(pictures(self._folder)[name]))
+            figures = view.figures()
+            return shown_in_notebooks(figures[0]) if len(figures) == 1 else view
 
         return shown
 
@@ -55,4 +75,4 @@ class Plots:
     def __repr__(self) -> str:
         names = [f"  .{name}()" for name in self]
         more = [f"  and {len(names) - 20} more: list(...)"] if len(names) > 20 else []
-        return "\n".join([f"{len(names)} figures", *names[:20], *more])
+        return "\n".join([f"{len(names)} views", *names[:20], *more])

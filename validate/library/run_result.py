@@ -16,9 +16,9 @@ from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
 from validate.report.stored.tables import stored_folder
+from validate.report.stored.views import exhibit_of
 from validate.report.views.numbers import text, with_unit
-from validate.report.views.standard import view_of
-from validate.report.views.view_filling import filled
+from validate.report.views.view_filling import explained
 from validate.study.stored_runs.score_comparison import read_table
 
 if TYPE_CHECKING:
@@ -136,14 +136,13 @@ class RunResult:
     def show(self, view: str | View) -> ShownView:
         """Return a view of the run: "checks", another that `validate show` lists, or one of yours.
 
-        `print` and a notebook show it; it has `.figures()` and `.save(path)`. Raises `UsageError`
-        for an unknown name.
+        `print` and a notebook show it, or which condition leaves no row; it has `.figures()` and
+        `.save(path)`. Raises `UsageError` for an unknown name.
         """
         table = self.table(part=NOT_SHOWN)
         if isinstance(view, str):
-            own = {v.name: v for v in map(View.from_json, table.head.get("views", ()))}
-            view = own[view] if view in own else view_of(view)
-        return ShownView(filled(view, table), table)
+            return ShownView(exhibit_of(view, self.folder, table), table)
+        return ShownView(explained(view, table), table)
 
     def to_pandas(self, **labels: Wanted) -> "DataFrame":
         """Return the long table as a DataFrame: one number a row, SI, with its unit and labels.

@@ -58,8 +58,13 @@ def write_table(table: NumberTable, folder: Path) -> None:
 
 def write_chart(chart: Chart, folder: Path) -> None:
     """Every point of every series as a CSV file."""
+    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", *chart_rows(chart))
+
+
+def chart_rows(chart: Chart) -> tuple[tuple[str, ...], Iterator[Row]]:
+    """Return the head of a chart's file, and a row for each point of a series and each level."""
     head = ("series", "style", f"x: {chart.x}", f"y: {chart.y}", f"upper: {chart.y}")
-    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", head, _points(chart))
+    return head, _points(chart)
 
 
 def write_csv(

@@ -21,7 +21,7 @@ from validate.compare.exhibit import (
     TableCell,
     plain,
 )
-from validate.compare.row import MEASURED, VALUE, LongRow
+from validate.compare.row import MEASURED, VALUE, LongRow, selects
 from validate.compare.view import View, texts
 from validate.errors import ComparisonError, UsageError
 from validate.parameters import nearest_names
@@ -30,8 +30,8 @@ from validate.report.views.numbers import (
     MISSING,
     scale,
     shown_unit,
+    significant,
     spaced,
-    text,
     to_decimal_of,
     with_unit,
 )
@@ -66,6 +66,26 @@ def filled_views(
         yield view, VIEWS.answer(view, lambda v: filled(v, table), Exhibit("", ""))
 
 
+def explained(view: View, table: LongTable) -> Exhibit:
+    """Return the view, or, where it shows nothing, a sentence that names the condition that leaves
+    no row. Raises as `filled`."""
+    found = filled(view, table)
+    if found != Exhibit(view.name, view.title):
+        return found
+    left = table.rows
+    for column, wanted in view.rows.items():
+        fits = selects(wanted)
+        values = {str(getattr(row, column)) for row in left}
+        count, left = len(left), tuple(row for row in left if fits(getattr(row, column)))
+        if not left:
+            hint = nearest_names(" ".join(map(str, texts(wanted))), values)  # type: ignore[arg-type]
+            why = f"Of {count} rows none has {column} = {wanted!r}; {hint}."
+            return replace(found, words=(why,))
+    less = f" and a row of '{view.less}'" if view.less else ""
+    why = f"{len(left)} rows fit; none has numbers for x = {view.x!r} and y = {view.y!r}{less}."
+    return replace(found, words=(why,))
+
+
 def filled(view: View, table: LongTable) -> Exhibit:
     """Return the view as an exhibit of its name and title; empty where no row fits.
 
@@ -83,11 +103,13 @@ def filled(view: View, table: LongTable) -> Exhibit:
             return replace(one, tables=tuple(_table(v, rows, table) for v, rows in parts))
         case "lines" | "points":
             charts = (_chart(v, rows, table) for v, rows in parts)
-            return replace(one, charts=tuple(c for c in charts if c is not None))
+            return replace(one, charts=tuple(c for c in charts if c and (c.series or c.levels)))
         case "heat":
-            return replace(one, heats=tuple(_heat(v, rows, table) for v, rows in parts))
+            heats = (_heat(v, rows, table) for v, rows in parts)
+            return replace(one, heats=tuple(h for h in heats if np.isfinite(h.values).any()))
         case "intervals":
-            return replace(one, intervals=tuple(_intervals(v, rows, table) for v, rows in parts))
+            bars = (_intervals(v, rows, table) for v, rows in parts)
+            return replace(one, intervals=tuple(b for b in bars if b.labels))
         case "sentences":
             return replace(one, words=tuple(_sentence(view, row, table) for row in found))
 
@@ -220,6 +242,13 @@ def _cell(view: View, rows: list[LongRow], column: str) -> TableCell:
     text = str(found or "")
     decides = column != "validation" or row.acceptance in ("", "no requirement")
     return TableCell(text, emphasis=WORDS.get(text.partition(" (")[0], "") if decides else "")
+
+
+def _read(view: View, value: float | None, unit: str) -> str:
+    """A number with its unit, as the view shows it."""
+    if value is None or not view.unit:
+        return with_unit(value, unit)
+    return f"{significant(_shown(unit, view.unit)[1](value))} {view.unit}"
 
 
 def _to_one_decimal(row: LongRow) -> dict[str, str]:
@@ -442,10 +471,10 @@ def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Interva
         names.append(": ".join(filter(None, _key(row, texts(view.x), table))))
         quantities.append(row.quantity)
         numbers.append((row.value, _TWO * row.sd, limit))
-        told = _to_one_decimal(row) or {"value": text(row.value, row.unit),
-                                        "expanded": text(_TWO * row.sd, row.unit)}  # fmt: skip
-        words.append((*(f"{told[c]} {shown_unit(row.unit)}".strip() for c in _NUMBERS[::2]),
-                      with_unit(limit, row.unit) if limit else MISSING,
+        told = {} if view.unit else _to_one_decimal(row)
+        words.append((*(f"{told[c]} {shown_unit(row.unit)}".strip() if told else
+                        _read(view, _number(row, c), row.unit) for c in _NUMBERS[::2]),
+                      _read(view, limit, row.unit) if limit else MISSING,
                       row.acceptance if limit else row.validation))  # fmt: skip
     value, half, most = np.array(numbers, dtype=float).reshape(-1, 3).T  # None becomes NaN
     return Intervals(view.name, view.title, tuple(names), value, half, most,
@@ -463,7 +492,7 @@ def _place(row: LongRow) -> tuple[str, ...]:
 def _sentence(view: View, row: LongRow, table: LongTable) -> str:
     columns = (*LongRow._fields, "name", "label")
     fields: dict[str, Any] = {c: _label(row, c, table) for c in columns}
-    fields |= {c: with_unit(_number(row, c), row.unit) for c in _NUMBERS}
+    fields |= {c: _read(view, _number(row, c), row.unit) for c in _NUMBERS}
     try:
         return view.text.format_map(fields)
     except (KeyError, ValueError, IndexError, AttributeError) as error:
