@@ -101,7 +101,7 @@ def test_everything_fits_on_one_screen(ran: RunResult, softer: RunResult, pulled
         if thing is not run.traces:
             assert one_screen(repr(thing)), type(thing)
     assert repr(ran).startswith("pulled+quick")
-    assert "0.0282 ± 0.0248 mm" in repr(ran)
+    assert "0.028 ± 0.025 mm" in repr(ran)
 
 
 def test_pages_ask_for_nothing(ran: RunResult, softer: RunResult) -> None:

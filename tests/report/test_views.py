@@ -342,6 +342,29 @@ def test_numbers_of_a_study_are_rows_of_the_store(tmp_path: Path) -> None:
     assert [(r.run, r.value) for r in found] == [("study-a", 0.002)]
 
 
+def test_numbers_of_a_check_have_the_decimal_of_its_uncertainty(tmp_path: Path) -> None:
+    """In the unit that is shown; terms of u_val have one more, a limit loses nothing."""
+    one = ONE._replace(part="check", value=9.041e-5, sd=7.1e-5)
+    parts = {"limit": 4.1e-4, "margin": 1.82169e-4, "u_num": 6.1775e-5, "raw": 1.74662e-4}
+    others = [one._replace(part=f"check.{k}", value=v, sd=None) for k, v in parts.items()]
+    of = table(one, *others)
+    view = replace(view_of("checks"), below="")
+    heads, line = read(view, of)
+    at = dict(zip(heads, line, strict=True))
+    wanted = {"E": "0.09", "2 u_val": "0.14", "limit": "0.41", "margin": "0.18", "raw rms": "0.17",
+              "u_num": "0.062"}  # fmt: skip
+    assert {k: at[f"{k} / mm"] for k in wanted} == wanted
+    save(filled(view, of), of, tmp_path / "checks.csv")
+    save(filled(view, of), of, tmp_path / "checks.tex")
+    row = (tmp_path / "checks.csv").read_text().splitlines()[1].split(",")
+    assert [row[heads.index(f"{k} / mm")] for k in wanted] == list(wanted.values())
+    assert all(f"${v}$" in (tmp_path / "checks.tex").read_text() for v in wanted.values())
+    micro = dict(zip(*read(replace(view, unit="µm"), of), strict=True))
+    assert (micro["E / µm"], micro["2 u_val / µm"]) == ("90", "140")
+    exact = table(one, one._replace(part="check.limit", value=4.15e-4, sd=None))
+    assert "0.415" in read(view, exact)[1]
+
+
 # --- a view that shows nothing, units of sentences, files of charts -------------------------------
 
 
@@ -355,7 +378,9 @@ def test_a_view_without_a_row_draws_nothing_and_names_the_condition(
         return  # a row without a number is a line of these
     x = "at" if form in ("lines", "points") else "method"
     view = View("f", "F", {"part": "score", "quantity": quantity}, form, x=x, by="kind", text="a")  # type: ignore[arg-type]
-    rows = table(ONE._replace(value=None), ONE._replace(value=None, quantity="side"))
+    # Charts leave out rows without a number at once, and need one across, too
+    one = ONE._replace(value=1.0 if x == "at" else None)
+    rows = table(one, one, one._replace(quantity="side"))
     found = explained(view, rows)
     (why,) = found.words
     assert figures(found, rows) == []

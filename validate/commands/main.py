@@ -22,6 +22,7 @@ from validate.commands.arguments import (
     detailed,
     external_simulators,
     output,
+    require_empty,
     require_new,
 )
 from validate.commands.external import external
@@ -378,6 +379,8 @@ def export_(
     from validate.commands import export as exporting
 
     require_new((file for file in (junit, latex) if file is not None), (Path(run),), force=force)
+    if figures is not None:
+        require_empty(figures, "--figures", force=force)
     exporting.export(run, junit, latex, figures)
 
 

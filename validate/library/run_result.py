@@ -17,7 +17,7 @@ from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
 from validate.report.stored.tables import stored_folder
 from validate.report.stored.views import exhibit_of
-from validate.report.views.numbers import text, with_unit
+from validate.report.views.numbers import scale, shown_unit, text, to_decimal_of, with_unit
 from validate.report.views.view_filling import explained
 from validate.study.stored_runs.score_comparison import read_table
 
@@ -168,7 +168,7 @@ class RunResult:
     @property
     def _screen(self) -> Screen:
         rows = tuple(
-            (c.method, c.name, f"{text(c.value, c.unit)} ± {_twice(c.u_val, c.unit)}",
+            (c.method, c.name, _with_interval(c.value, c.u_val, c.unit),
              "–" if c.limit is None else text(c.limit, c.unit), c.verdict)
             for c in self.checks
         )  # fmt: skip
@@ -183,8 +183,12 @@ class RunResult:
         return self._screen.html
 
 
-def _twice(u_val: float | None, unit: str) -> str:
-    return with_unit(None if u_val is None else 2 * u_val, unit)
+def _with_interval(value: float | None, u_val: float | None, unit: str) -> str:
+    """E ± 2 u_val in the shown unit, to one decimal."""
+    if value is None or u_val is None:
+        return with_unit(value, unit)
+    half, error = to_decimal_of(2 * u_val * scale(unit), value * scale(unit))
+    return f"{error} ± {half} {shown_unit(unit)}".strip()
 
 
 def open_run(path: str | Path) -> RunResult:

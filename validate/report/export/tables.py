@@ -6,7 +6,7 @@ from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
 from validate.files import safe_name
-from validate.report.views.numbers import MISSING, shown_unit, significant, text
+from validate.report.views.numbers import MISSING, digits, shown_unit, significant, text
 
 Row = Iterable[Entry | TableCell]
 _SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
@@ -85,7 +85,7 @@ def _digits(entry: Entry | TableCell) -> str | int:
     """A number as a page shows it, as programs read it."""
     value = plain(entry)
     if isinstance(entry, TableCell) and entry.text and isinstance(value, float):
-        return entry.text.replace("\u202f", "").replace("−", "-")
+        return digits(entry.text)
     return _written(value)
 
 
