@@ -5,6 +5,7 @@ import json
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,9 +18,12 @@ import validate
 from validate.compare.view import View
 from validate.display import COLUMNS, LINES
 from validate.errors import UsageError
+from validate.estimate.kalman.kf_fem import KfFem
 from validate.library import load
 from validate.library.run_result import RunResult
 from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Recording, Signal, Source
 from validate.report.stored.store import document
 from validate.study.stored_runs.overview import write_overview
@@ -182,6 +186,48 @@ def test_words_of_another_kind_are_refused_before_a_run() -> None:
         validate.run("kf_cube", methods="fem")
     with pytest.raises(UsageError, match="values by path"):
         validate.run("kf_cube", set="E=3")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Method("f", 7), "found 7"),
+        (lambda: Method("f", KfFem), r"found the class KfFem; give KfFem\(\)"),
+        (lambda: Method("f", KfFem(0.01)), "the filter KfFem is given no markers"),
+        (lambda: Method("f", KfFem(0.01), markers=("tap",)), "'f' is a filter: marker 'tap'"),
+        (None, r"pulled accepts none of its methods.*accepted=\(.kf.,\)"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_before_anything_is_solved(
+    pulled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    make: Callable[[], Method] | None, says: str,
+) -> None:  # fmt: skip
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError("it was to be refused first")
+
+    monkeypatch.setattr(ExperimentRuns, "start", solved)
+    experiment = load(pulled)
+
+    def run() -> None:
+        more = {"f": make()} if make else {}
+        changed = replace(experiment, methods={**experiment.methods, **more})
+        validate.run(changed if make else replace(changed, accepted=()), quick=True, out=tmp_path)
+
+    with pytest.raises(UsageError, match=says):
+        run()
+
+
+def test_a_run_without_an_accepted_method_warns_before_it_solves(
+    pulled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def solved(*_: object, **__: object) -> None:
+        raise UsageError("solved")
+
+    monkeypatch.setattr(ExperimentRuns, "start", solved)
+    with pytest.raises(UsageError, match="solved"):
+        validate.run(pulled, methods=["plain"], quick=True, out=tmp_path)
+    assert "none of the chosen methods is accepted" in caplog.text
+    assert "add one of kf" in caplog.text
 
 
 def test_a_view_of_others_that_cannot_be_filled_costs_a_warning(ran: RunResult) -> None:

@@ -16,6 +16,7 @@ from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.engine.execution import Report
+from validate.errors import ComparisonError, UsageError, ValidateError
 from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError
 from validate.parameters import Changed, Parameter, changed, describe, value_at
@@ -50,7 +51,9 @@ from validate.pipeline.experiment.origins import Opened, marked, opened
 from validate.pipeline.run.estimate import coarser, require_room
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.pipeline.run.runs import ExperimentRuns, Solves
+from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
+from validate.scene.meshless import Meshless
 from validate.solve.external.scheme import ExternalSimulator
 
 _AGAINST: Mapping[Kind, str] = {
@@ -119,6 +122,7 @@ def set_out(
         report(0, 1, "requests memory")
     asked = middle(experiment, parameters)
     require_room(experiment, methods, asked, shipped[0], quick=options.quick)
+    _require_measured(experiment, methods, asked, shipped[0])
     if report and (experiment.identify or experiment.calibrations):
         report(0, 1, "identifies parameters")
     every = all_methods(experiment, options)
@@ -149,6 +153,28 @@ def set_out(
         since=began, refused=refused, by=by,
     )  # fmt: skip
     return PreparedRuns(experiment, runs, found, identified, differing, fitted)
+
+
+def _require_measured(
+    experiment: Experiment, methods: Mapping[str, Method], parameters: Any, recording: Recording
+) -> None:
+    """Raise `UsageError` for a filter whose markers the recording lacks, before anything is
+    solved."""
+    filters = {method.markers: (name, method) for name, method in methods.items() if method.markers}
+    for name, method in filters.values():
+        try:
+            scene = experiment.build(recording, parameters, method.scene)
+            seen = experiment.place(recording, parameters, scene)
+        except ValidateError:  # it may need what is yet to be identified
+            continue
+        if not isinstance(scene, Meshless):
+            try:
+                method.require_measured(scene, seen)
+            except ComparisonError as error:
+                raise UsageError(
+                    f"method '{name}' is a filter: {error}; name markers of the recording, or run "
+                    "other methods with --methods"
+                ) from error
 
 
 def _compared(
