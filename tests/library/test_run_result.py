@@ -24,7 +24,7 @@ from validate.library.run_result import RunResult
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.run.runs import ExperimentRuns
-from validate.recording.types import Recording, Signal, Source
+from validate.recording.types import Markers, Recording, Signal, Source
 from validate.report.stored.store import document
 from validate.study.stored_runs.overview import write_overview
 
@@ -146,6 +146,36 @@ def test_figures_by_name(ran: RunResult) -> None:
     assert ran.plot.error_top().axes[0].lines
     with pytest.raises(AttributeError, match="no figure 'limit'; nearest: limits"):
         _ = ran.plot.limit
+
+
+def test_a_comparison_has_figures_and_tables_by_name(ran: RunResult, softer: RunResult) -> None:
+    both = validate.compare(ran, softer)
+    assert list(both.plot) == ["pair_1", "changes_1", "parameters"]
+    assert both.plot.changes_1().axes
+    assert "10000 Pa" in repr(both.plot.parameters())
+    assert "top.max" in both.plot.pair_1()._repr_html_()
+
+
+def test_a_recording_has_figures_by_topic() -> None:
+    """Signals over time in the shown unit; of markers how far each moved since it was seen."""
+    t = np.arange(3.0)
+    x = np.zeros((3, 2, 3))
+    x[:, 0, 2], x[:, 1, 0] = 1e-3 * t, (np.nan, 5e-3, 7e-3)
+    recording = Recording(
+        "two", Source("a.mcap", "", 0, "made here"), 0,
+        markers={"tracker/skin": Markers(t, ("a", "b"), x, 1e-4, "world")},
+        signals={"force": Signal(t, 2 * t[:, None], "N", 0.1, "machine")},
+    )  # fmt: skip
+    assert list(recording.plot) == ["force", "tracker_skin"]
+    moved, pulled = (recording.plot.tracker_skin().axes[0], recording.plot.force().axes[0])
+    lines = {line.get_label(): line.get_xydata() for line in moved.lines}
+    assert lines["a"].tolist() == [[0, 0], [1, 1], [2, 2]]
+    assert lines["b"].tolist() == pytest.approx(np.array([[1, 0], [2, 2]]))
+    assert pulled.lines[0].get_ydata().tolist() == [0, 2, 4]
+    assert (moved.get_xlabel(), pulled.get_ylabel()) == ("time / s", "force / N")
+    assert moved.get_ylabel().endswith(" / mm")
+    with pytest.raises(AttributeError, match="nearest: force"):
+        _ = recording.plot.forces
 
 
 def test_runs_compared_by_the_function_and_by_the_command(

@@ -15,7 +15,7 @@ from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.compare.row import LongRow, RowBlock
 from validate.compare.view import View
 from validate.errors import ComparisonError, UsageError
-from validate.library.plots import Plots
+from validate.library.plots import plots_of
 from validate.library.view_result import ShownView
 from validate.report import open_store
 from validate.report.export.table_file import stored_table
@@ -425,7 +425,7 @@ def test_a_script_finds_every_name_that_the_command_lists(
     monkeypatch.setenv("VALIDATE_NO_GL", "1")
     folder = write_report(replace(small_result(), exhibits=(shows(),)), tmp_path / "cube",
                           created="2026-01-01").parent  # fmt: skip
-    plot = Plots(folder)
+    plot = plots_of(folder)
     listed = CliRunner().invoke(cli, ["show", str(folder)]).output.splitlines()[1:]
     assert [line.split()[0] for line in listed] == list(plot)
     assert {"checks", "steps", "force", "limits"} <= set(plot)

@@ -9,7 +9,7 @@ from validate.compare.row import Wanted
 from validate.compare.view import View
 from validate.display import Screen, listed
 from validate.errors import UsageError
-from validate.library.plots import Plots
+from validate.library.plots import Plots, plots_of
 from validate.library.view_result import ShownView
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
@@ -118,7 +118,7 @@ class RunResult:
     @property
     def plot(self) -> Plots:
         """The figures by name: `result.plot.limits()` returns a matplotlib Figure."""
-        return Plots(self.folder)
+        return plots_of(self.folder)
 
     def table(self, **labels: Wanted) -> LongTable:
         """Return the rows of the long table that fit `labels`, as `quantity="marker.*"`.
