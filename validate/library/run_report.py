@@ -60,7 +60,7 @@ def reported_run(
     input, and `UsageError` for a folder that cannot be written, before anything runs.
     """
     experiment = with_simulators(plain, options.simulators)
-    require_accepted(experiment, options)
+    require_accepted(experiment)
     folder = run_folder(experiment, options, out)
     made_by = rests_on(experiment, options, command)
     warn_of_units(experiment, options)
@@ -89,20 +89,14 @@ def reported_run(
     return ReportedRun(result, page, by.words)
 
 
-def require_accepted(experiment: Experiment, options: Options) -> None:
-    """Raise `UsageError` where no method is accepted, so that no check could ever be made; warn
-    where none of the chosen methods is."""
+def require_accepted(experiment: Experiment) -> None:
+    """Raise `UsageError` where no method is accepted, so that no check could ever be made."""
     if not experiment.accepted:
         some = next(iter(experiment.methods), "fem")
         raise UsageError(
             f"{experiment.name} accepts none of its methods, so nothing would be compared; name "
             f'those that count, as Experiment(..., accepted=("{some}",))'
         )
-    if options.methods and not {*options.methods} & {*experiment.accepted}:
-        LOG.warning(
-            "none of the chosen methods is accepted, so no check is made and the run fails; add "
-            "one of %s", ", ".join(experiment.accepted),
-        )  # fmt: skip
 
 
 def warn_of_units(experiment: Experiment, options: Options) -> None:

@@ -3,6 +3,7 @@
 One for every experiment, at holds or over time, with a twin's truth beside or without one.
 """
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -56,6 +57,7 @@ from validate.register.markers.markers import MarkerObservation
 from validate.scene.meshless import Meshless
 from validate.solve.external.scheme import ExternalSimulator
 
+LOG = logging.getLogger(__name__)
 _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
     "twin": "recording of a twin",
@@ -189,6 +191,11 @@ def _compared(
     methods = runs.methods
     variants = variants_of(runs)
     runs.expect(variants)
+    if experiment.accepted and not {*methods} & {*experiment.accepted}:
+        LOG.warning(
+            "none of the chosen methods is accepted, so no check is made and the run fails; add "
+            "one of %s", ", ".join(experiment.accepted),
+        )  # fmt: skip
     remade = runs.start(found.recordings)
     runs.ahead(variants)
     main = {name: runs.main(name) for name in methods}
