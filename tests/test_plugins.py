@@ -230,7 +230,9 @@ BROKEN = {
     "raises": ("raise RuntimeError('a wrong line')", "RuntimeError: a wrong line"),
     "exits": ("raise SystemExit(3)", "SystemExit: 3"),
     "absent": ("", "AttributeError: module 'absent' has no attribute 'READER'"),
-    "number": ("READER = 7", "7: expected a Reader"),
+    "number": ("READER = 7", "expected a Reader, found an object of the class int"),
+    "kind": ("from validate.recording.reader import Reader as READER",
+             "expected a Reader, found the class Reader"),
     "taken": ("from validate.recording.motion_capture.c3d import C3D as READER",
               "the name 'c3d' is taken; choose another one"),
 }  # fmt: skip
@@ -252,6 +254,23 @@ def test_a_broken_plug_in_costs_one_warning(tmp_path: Path) -> None:
     assert {p["name"]: p["left_out"] for p in json.loads(listed)} == {
         name: why for name, (_, why) in BROKEN.items()
     }
+
+
+@pytest.mark.parametrize(
+    ("group", "hint"), [("reader", "did you mean validate.readers? "), ("zzz", "")]
+)
+def test_an_unknown_group_of_entry_points_costs_one_warning(
+    group: str, hint: str, tmp_path: Path
+) -> None:
+    package(tmp_path / "site", "gauge", f"[validate.{group}]\ngauge = gauge:READER\n")
+    (tmp_path / "log.csv").write_text(POINTS)
+    code, _, err = called("inspect", "log.csv", site=tmp_path / "site", cwd=tmp_path)
+    assert code == 0
+    assert err.splitlines() == [
+        f"validate: plug-in 'gauge' of gauge 1.0 (validate.{group}) is left out: no group "
+        f"'validate.{group}' of entry points; {hint}known: {', '.join(KINDS)}; update or "
+        "uninstall gauge"
+    ]
 
 
 def test_a_reader_that_breaks_its_contract_is_one_line(tmp_path: Path) -> None:
@@ -461,7 +480,7 @@ def test_a_scheme_that_fails_where_all_are_asked_is_passed_over(
         "'Failing' (schemes) is not asked further: RuntimeError: no step map"
     ]
     for wrong, why in (
-        (Newmark(), "expected a frozen dataclass"),
+        (Newmark(), "expected a frozen dataclass, found an object of the class Newmark"),
         (PlugIn, "PlugIn has no prepare"),
         (make_dataclass("Bare", (), namespace={"prepare": None}), "Bare.handles: expected Handles"),
     ):

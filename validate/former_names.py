@@ -27,7 +27,7 @@ FORMER = {
     "estimate.reduced_kf": "estimate.reduced.reduced_kf",
     "estimate.roukf": "estimate.ensemble.roukf",
     "fem.locate": "fem.assembly.locate",
-    "library.view_result": "library.run_result",
+    "library.view_result": "library.plots",
     "pipeline.plates.inclusion_body": "pipeline.plates.inclusion",
     "recording.alignment": "recording.clocks.alignment",
     "recording.events": "recording.clocks.events",

@@ -63,6 +63,11 @@ def to_decimal_of(u: float, *values: float) -> tuple[str, ...]:
     )
 
 
+def digits(text: str) -> str:
+    """Return a number as read in the signs that programs read."""
+    return text.replace("\u202f", "").replace("−", "-")
+
+
 def fixed(value: float, decimals: int) -> str:
     """Return a number already in its shown unit with fixed decimals and a true minus sign."""
     return f"{value:.{decimals}f}".replace("-", "−")

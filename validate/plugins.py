@@ -9,6 +9,7 @@ cannot be used is left out with one warning.
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
@@ -188,8 +189,15 @@ def _installed() -> tuple[tuple[PlugIn, EntryPoint], ...]:
             plug_in = PlugIn(
                 point.group.removeprefix(PREFIX), point.name, point.value, *_package(dist)
             )
-            if plug_in.kind in KINDS and Path(str(dist.locate_file(""))).resolve() != here:
+            if Path(str(dist.locate_file(""))).resolve() == here:
+                continue
+            if plug_in.kind in KINDS:
                 found.setdefault((plug_in.kind, plug_in.name, plug_in.package), (plug_in, point))
+            else:
+                near = get_close_matches(plug_in.kind, KINDS, n=1)
+                mean = f"did you mean {PREFIX}{near[0]}? " if near else ""
+                known = f"{mean}known: {', '.join(KINDS)}"
+                left_out(plug_in, f"no group '{PREFIX}{plug_in.kind}' of entry points; {known}")
     return tuple(found[key] for key in sorted(found))
 
 
@@ -212,9 +220,21 @@ def _package(dist: Distribution) -> tuple[str, str]:
         return "an unknown package", "?"
 
 
+def kind_fault(part: Any, kind: type) -> str:
+    """Return which kind of object was expected, and found; "" for one of it."""
+    return "" if isinstance(part, kind) else f"expected a {kind.__name__}, found {_found(part)}"
+
+
+def _found(part: Any) -> str:
+    """What an object is, without its own words."""
+    if isinstance(part, type):
+        return f"the class {part.__name__}"
+    return f"an object of the class {type(part).__name__}"
+
+
 def settings_faults(part: Any, *methods: str) -> str:
     """What keeps a class from being settings that experiments declare; "" for nothing."""
     if not isinstance(part, type) or not hasattr(part, "__dataclass_fields__"):
-        return f"{part!r}: expected a frozen dataclass"
+        return f"expected a frozen dataclass, found {_found(part)}"
     missing = [name for name in methods if not hasattr(part, name)]
     return f"{part.__name__} has no {', '.join(missing)}" if missing else ""

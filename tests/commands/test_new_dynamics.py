@@ -14,23 +14,32 @@ from click.testing import CliRunner
 from benchmarks.moving_bodies import written
 from validate.commands.check import described
 from validate.commands.main import cli
+from validate.commands.questions import motion
 from validate.commands.questions.motion import damping, held
 from validate.compare.result import Result
 from validate.engine.cell import Where
 from validate.errors import RegistrationError, UsageError
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
+from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.case_solution import solve
 from validate.pipeline.run.method_run import MAIN, MethodRun
 from validate.recording.mcap.write import write_recording
 from validate.recording.readers import read_recording
+from validate.recording.types import Recording, Source
 from validate.register.markers.markers import MarkerObservation
 from validate.scene.geometries.box import box
+from validate.scene.geometries.specification import Box
+from validate.scene.material import Material
 from validate.scene.mesh_files.mesh_file import write_mesh
+from validate.scene.scene import Scene
 from validate.study.filters.study import study
+
+# private: _first, _scene: called alone, and replaced to count its calls.
 
 
 def called(*arguments: str) -> tuple[int, str]:
@@ -405,3 +414,21 @@ def test_a_report_has_one_largest_motion_and_says_where_it_rests(here: Path) -> 
     for words in (note, facts["rests until"][3]):
         assert "at rest until 0.265 s, not at rest at the end" in words
     assert [s.label for s in shown.charts[0].series] == ["measured", mine.methods["modal"].label]
+
+
+def test_a_first_frequency_is_computed_once_for_a_recording_and_a_body(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Questions are listed again and again; ranges change no frequency, another recording does."""
+    solved: list[object] = []
+    monkeypatch.setattr(motion, "_scene", lambda recording, *_: solved.append(recording))
+    monkeypatch.setattr(motion, "first_frequencies", lambda *_: (3.0,))
+    monkeypatch.setattr(motion, "unknowns_of", lambda *_: 10)
+    scene = Scene(Box((0.1, 0.02, 0.02), (5, 1, 1), "hex27"), Material(1e5, 0.45))
+    body = Tree("none.mcap", scene, MeasuredBody())
+    source = Source("x", "", 0, "x")
+    one, other = (Recording("log", source, 0) for _ in range(2))
+    wider = replace(body, settings=MeasuredBody(ranges=BodyRanges(E=0.5)))
+    for recording, of in ((one, body), (one, wider), (other, body), (one, body)):
+        assert motion._first(recording, of, Path()) == 3.0
+    assert [r is one for r in solved] == [True, False]

@@ -66,7 +66,7 @@ def declared(folder: Path, shape: dict[str, str], *, tracked: bool) -> Experimen
     (folder / "a.toml").write_text(text, "utf-8")
     code, said = called("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
     assert code == 0, said
-    assert "first answer: about" in said
+    assert "first answer: up to" in said
     return load_file(folder / "experiments" / "mine.py")
 
 

@@ -5,10 +5,13 @@ from itertools import count
 
 import numpy as np
 import pytest
+from report_samples import small_result
 from scipy.stats import norm
 
-from validate.compare.overall_verdict import judge_all
+from validate.commands.run_screen import headline
+from validate.compare.overall_verdict import correction, judge_all
 from validate.compare.verdict import ALPHA, Acceptance, Check, Validation
+from validate.pipeline.checks.sentence import verdict_sentence
 
 _NAMES = count()
 
@@ -142,3 +145,19 @@ def test_repeated_names_are_corrected_by_hand(weaker_first: bool) -> None:
     assert [c.value for c in found.alone] == [2.1]
     last = judge_all([check(9.0, name="g"), *pair])  # g is gone: f is held against alpha
     assert [c.value for c in last.differs] == [9.0, beyond, 2.1]
+
+
+def test_an_interval_that_excludes_zero_says_what_it_is_corrected_for() -> None:
+    """In the sentence of the report and on the terminal; nothing where none excludes it."""
+    inside = [check(1.9, count=40), check(-0.5, count=7)]
+    many = [*inside, check(2.4, "not distinguishable", count=30)]
+    alone = [*inside, check(2.1)]
+    assert [correction(c) for c in (inside, many)] == ["", " (corrected for 30 comparisons)"]
+    for checks, number in ((inside, 0), (many, 30), (alone, 3)):
+        method = replace(small_result().methods[0], checks=tuple(checks))
+        result = replace(small_result(), methods=(method,))
+        line = headline(result)
+        assert "no error is distinguishable" in line
+        assert (f"corrected for {number} comparisons" in line) == (number > 0)
+        said = verdict_sentence(result.methods, "measured", quick=False)
+        assert ("corrected for 30 comparisons" in said) == (number == 30)

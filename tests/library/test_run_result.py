@@ -5,6 +5,7 @@ import json
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,10 +18,13 @@ import validate
 from validate.compare.view import View
 from validate.display import COLUMNS, LINES
 from validate.errors import UsageError
+from validate.estimate.kalman.kf_fem import KfFem
 from validate.library import load
 from validate.library.run_result import RunResult
 from validate.pipeline import run_in_memory
-from validate.recording.types import Recording, Signal, Source
+from validate.pipeline.experiment.method import Method
+from validate.pipeline.run.runs import ExperimentRuns
+from validate.recording.types import Markers, Recording, Signal, Source
 from validate.report.stored.store import document
 from validate.study.stored_runs.overview import write_overview
 
@@ -101,7 +105,7 @@ def test_everything_fits_on_one_screen(ran: RunResult, softer: RunResult, pulled
         if thing is not run.traces:
             assert one_screen(repr(thing)), type(thing)
     assert repr(ran).startswith("pulled+quick")
-    assert "0.0282 ± 0.0248 mm" in repr(ran)
+    assert "0.028 ± 0.025 mm" in repr(ran)
 
 
 def test_pages_ask_for_nothing(ran: RunResult, softer: RunResult) -> None:
@@ -144,6 +148,36 @@ def test_figures_by_name(ran: RunResult) -> None:
         _ = ran.plot.limit
 
 
+def test_a_comparison_has_figures_and_tables_by_name(ran: RunResult, softer: RunResult) -> None:
+    both = validate.compare(ran, softer)
+    assert list(both.plot) == ["pair_1", "changes_1", "parameters"]
+    assert both.plot.changes_1().axes
+    assert "10000 Pa" in repr(both.plot.parameters())
+    assert "top.max" in both.plot.pair_1()._repr_html_()
+
+
+def test_a_recording_has_figures_by_topic() -> None:
+    """Signals over time in the shown unit; of markers how far each moved since it was seen."""
+    t = np.arange(3.0)
+    x = np.zeros((3, 2, 3))
+    x[:, 0, 2], x[:, 1, 0] = 1e-3 * t, (np.nan, 5e-3, 7e-3)
+    recording = Recording(
+        "two", Source("a.mcap", "", 0, "made here"), 0,
+        markers={"tracker/skin": Markers(t, ("a", "b"), x, 1e-4, "world")},
+        signals={"force": Signal(t, 2 * t[:, None], "N", 0.1, "machine")},
+    )  # fmt: skip
+    assert list(recording.plot) == ["force", "tracker_skin"]
+    moved, pulled = (recording.plot.tracker_skin().axes[0], recording.plot.force().axes[0])
+    lines = {line.get_label(): line.get_xydata() for line in moved.lines}
+    assert lines["a"].tolist() == [[0, 0], [1, 1], [2, 2]]
+    assert lines["b"].tolist() == pytest.approx(np.array([[1, 0], [2, 2]]))
+    assert pulled.lines[0].get_ydata().tolist() == [0, 2, 4]
+    assert (moved.get_xlabel(), pulled.get_ylabel()) == ("time / s", "force / N")
+    assert moved.get_ylabel().endswith(" / mm")
+    with pytest.raises(AttributeError, match="nearest: force"):
+        _ = recording.plot.forces
+
+
 def test_runs_compared_by_the_function_and_by_the_command(
     ran: RunResult, softer: RunResult
 ) -> None:
@@ -182,6 +216,48 @@ def test_words_of_another_kind_are_refused_before_a_run() -> None:
         validate.run("kf_cube", methods="fem")
     with pytest.raises(UsageError, match="values by path"):
         validate.run("kf_cube", set="E=3")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Method("f", 7), "found 7"),
+        (lambda: Method("f", KfFem), r"found the class KfFem; give KfFem\(\)"),
+        (lambda: Method("f", KfFem(0.01)), "the filter KfFem is given no markers"),
+        (lambda: Method("f", KfFem(0.01), markers=("tap",)), "'f' is a filter: marker 'tap'"),
+        (None, r"pulled accepts none of its methods.*accepted=\(.kf.,\)"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_before_anything_is_solved(
+    pulled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    make: Callable[[], Method] | None, says: str,
+) -> None:  # fmt: skip
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError("it was to be refused first")
+
+    monkeypatch.setattr(ExperimentRuns, "start", solved)
+    experiment = load(pulled)
+
+    def run() -> None:
+        more = {"f": make()} if make else {}
+        changed = replace(experiment, methods={**experiment.methods, **more})
+        validate.run(changed if make else replace(changed, accepted=()), quick=True, out=tmp_path)
+
+    with pytest.raises(UsageError, match=says):
+        run()
+
+
+def test_a_run_without_an_accepted_method_warns_before_it_solves(
+    pulled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def solved(*_: object, **__: object) -> None:
+        raise UsageError("solved")
+
+    monkeypatch.setattr(ExperimentRuns, "start", solved)
+    with pytest.raises(UsageError, match="solved"):
+        validate.run(pulled, methods=["plain"], quick=True, out=tmp_path)
+    assert "none of the chosen methods is accepted" in caplog.text
+    assert "add one of kf" in caplog.text
 
 
 def test_a_view_of_others_that_cannot_be_filled_costs_a_warning(ran: RunResult) -> None:

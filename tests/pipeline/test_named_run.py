@@ -1,5 +1,6 @@
 """A run's folder is called by what it computes, not by how that was typed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,26 @@ def test_what_differs_is_in_the_name_and_in_the_hash(phantom: Experiment) -> Non
         "fluid_phantom+methods.p1_loop.tolerance", "fluid_phantom+quick",
         "fluid_phantom+quick+material.E", "fluid_phantom+methods", "fluid_phantom+methods",
     ]  # fmt: skip
+
+
+def test_what_a_script_changes_of_the_file_is_in_the_name(phantom: Experiment) -> None:
+    """Limits, accepted methods, further methods and values; the same change has the same name."""
+    stricter = replace(phantom.accept[0], limit=1e-6)
+    method = next(iter(phantom.methods.values()))
+    changed = {
+        "accept": replace(phantom, accept=(stricter, *phantom.accept[1:])),
+        "accepted": replace(phantom, accepted=("p1_fluid",)),
+        "methods": replace(phantom, methods={**phantom.methods, "mine": method}),
+        "material.E": replace(
+            phantom, parameters=with_values(phantom.parameters, {"material.E": "14kPa"})
+        ),
+    }
+    names = {word: name(of) for word, of in changed.items()}
+    assert {n.rpartition("-")[0] for n in names.values()} == {f"fluid_phantom+{w}" for w in changed}
+    assert names["material.E"] == name(phantom, material__E="14kPa")
+    assert name(replace(changed["accept"])) == names["accept"]
+    looser = replace(phantom, accept=(replace(stricter, limit=1e-5), *phantom.accept[1:]))
+    assert name(looser) != names["accept"]
 
 
 def test_the_order_of_what_is_given_does_not_count(phantom: Experiment) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from beside import experiment
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,10 +12,11 @@ from validate.catalogue import experiment_files
 from validate.errors import UsageError
 from validate.parameters import describe, value_at
 from validate.pipeline.bodies.choices import MeasuredBody
-from validate.pipeline.experiment.experiment import Case, vary
+from validate.pipeline.experiment.experiment import Case, Variant, vary
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.tree import TrackedTwin, Tree
 from validate.pipeline.experiment.variation import Shift, change_of
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.scene.contact import Indenter, RigidContact
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
@@ -109,3 +111,20 @@ def test_one_meaning_of_every_standard_uncertainty(name: str, file: Path) -> Non
 def test_an_input_needs_a_rule() -> None:
     with pytest.raises(UsageError, match='for example "relative 3 %"'):
         vary("material.E", "3 %")
+
+
+def test_a_change_is_parsed_once_for_all_that_is_asked_of_it() -> None:
+    """The time that is left, the memory and the runs themselves ask one and the same variant."""
+    parsed: list[object] = []
+
+    def change(parameters: object) -> object:
+        parsed.append(parameters)
+        return parameters
+
+    declared = experiment("kf_cube")
+    runs = ExperimentRuns(declared, declared.methods, declared.parameters, None, quick=False)
+    variants = [Variant("fem", change), Variant("kf_reduced", change)]
+    runs.expect(variants)
+    assert [runs.wanted(v).method for v in variants] == ["fem", "kf_reduced"]
+    assert runs.finer(variants[0]) == 1.0
+    assert len(parsed) == 1

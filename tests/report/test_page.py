@@ -177,7 +177,7 @@ def test_check_row_shows_two_u_val_and_its_parts() -> None:
     ]  # fmt: skip
     assert [shown(c) for c in table.rows[0]] == [
         "soft <cube>", "force.plate@2mm", "✓ good enough", "not distinguishable", "0.010",
-        "0.040", "0.500", "0.450", "0.0120", "0.00800", "0.0150", "0.0100", "0.00500", "1",
+        "0.040", "0.500", "0.450", "0.012", "0.008", "0.0150", "0.0100", "0.0050", "1",
         "ours: a half", "|E| is 0.5 u_val",
     ]  # fmt: skip
 

@@ -15,6 +15,7 @@ from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
 from validate.compare.row import LongRow, RowBlock
 from validate.compare.view import View
 from validate.errors import ComparisonError, UsageError
+from validate.library.plots import ShownView, plots_of
 from validate.report import open_store
 from validate.report.export.table_file import stored_table
 from validate.report.export.tables import shown
@@ -23,8 +24,8 @@ from validate.report.stored.exhibit_rows import stored_exhibits
 from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 from validate.report.views.drawers import figures, page, save, terminal
-from validate.report.views.standard import STANDARD, VIEWS
-from validate.report.views.view_filling import filled
+from validate.report.views.standard import STANDARD, VIEWS, view_of
+from validate.report.views.view_filling import explained, filled
 from validate.report.write import table_of, write_report
 
 # private: _added: plug-ins of the test are taken out again.
@@ -278,7 +279,7 @@ def test_show_prints_and_writes_views_of_a_stored_run(
     out = tmp_path / "checks.tex"
     assert run.invoke(cli, ["show", str(folder), "checks", "-o", str(out)]).exit_code == 0
     assert out.read_text().startswith("% ")
-    for words, said in ((["chekcs"], "nearest: checks"), (["checks", "-o", "x.gif"], ".svg")):
+    for words, said in ((["chekcs"], "nearest: checks"), (["checks", "-o", "x.gif"], ".csv")):
         done = run.invoke(cli, ["show", str(folder), *words])
         assert isinstance(done.exception, UsageError)
         assert said in str(done.exception)
@@ -327,7 +328,7 @@ def test_every_number_that_an_experiment_shows_can_be_asked_for(
     ]  # fmt: skip
     assert not {"table", "chart", "trace"} & {r.part for r in stored_table(folder).rows}
     run = CliRunner()
-    assert "limit" in run.invoke(cli, ["show", str(folder), "chart_force"]).output
+    assert "limit" in run.invoke(cli, ["show", str(folder), "force"]).output
     assert "soft <cube>" in run.invoke(cli, ["show", str(folder), "steps"]).output
 
 
@@ -338,3 +339,97 @@ def test_numbers_of_a_study_are_rows_of_the_store(tmp_path: Path) -> None:
     write_json(content, tmp_path / "study-a" / "results.json")
     found = open_store(tmp_path).where(part="table", statistic="force").rows()
     assert [(r.run, r.value) for r in found] == [("study-a", 0.002)]
+
+
+def test_numbers_of_a_check_have_the_decimal_of_its_uncertainty(tmp_path: Path) -> None:
+    """In the unit that is shown; terms of u_val have one more, a limit loses nothing."""
+    one = ONE._replace(part="check", value=9.041e-5, sd=7.1e-5)
+    parts = {"limit": 4.1e-4, "margin": 1.82169e-4, "u_num": 6.1775e-5, "raw": 1.74662e-4}
+    others = [one._replace(part=f"check.{k}", value=v, sd=None) for k, v in parts.items()]
+    of = table(one, *others)
+    view = replace(view_of("checks"), below="")
+    heads, line = read(view, of)
+    at = dict(zip(heads, line, strict=True))
+    wanted = {"E": "0.09", "2 u_val": "0.14", "limit": "0.41", "margin": "0.18", "raw rms": "0.17",
+              "u_num": "0.062"}  # fmt: skip
+    assert {k: at[f"{k} / mm"] for k in wanted} == wanted
+    save(filled(view, of), of, tmp_path / "checks.csv")
+    save(filled(view, of), of, tmp_path / "checks.tex")
+    row = (tmp_path / "checks.csv").read_text().splitlines()[1].split(",")
+    assert [row[heads.index(f"{k} / mm")] for k in wanted] == list(wanted.values())
+    assert all(f"${v}$" in (tmp_path / "checks.tex").read_text() for v in wanted.values())
+    micro = dict(zip(*read(replace(view, unit="µm"), of), strict=True))
+    assert (micro["E / µm"], micro["2 u_val / µm"]) == ("90", "140")
+    exact = table(one, one._replace(part="check.limit", value=4.15e-4, sd=None))
+    assert "0.415" in read(view, exact)[1]
+
+
+# --- a view that shows nothing, units of sentences, files of charts -------------------------------
+
+
+@pytest.mark.parametrize("form", ["table", "lines", "points", "heat", "intervals", "sentences"])
+@pytest.mark.parametrize("quantity", ["tap", "tip"])
+def test_a_view_without_a_row_draws_nothing_and_names_the_condition(
+    form: str, quantity: str, tmp_path: Path
+) -> None:
+    """Of another quantity, or without the numbers that it draws."""
+    if form in ("table", "sentences") and quantity == "tip":
+        return  # a row without a number is a line of these
+    x = "at" if form in ("lines", "points") else "method"
+    view = View("f", "F", {"part": "score", "quantity": quantity}, form, x=x, by="kind", text="a")  # type: ignore[arg-type]
+    # Charts leave out rows without a number at once, and need one across, too
+    one = ONE._replace(value=1.0 if x == "at" else None)
+    rows = table(one, one, one._replace(quantity="side"))
+    found = explained(view, rows)
+    (why,) = found.words
+    assert figures(found, rows) == []
+    assert ("quantity = 'tap'; nearest: tip" in why) == (quantity == "tap")
+    assert terminal(found, 200)[1:] == [why]
+    with pytest.raises(UsageError, match=re.escape(why)):
+        save(found, rows, tmp_path / "f.svg")
+
+
+def test_sentences_and_intervals_are_in_the_unit_that_is_asked_for() -> None:
+    rows = table(ONE._replace(value=2e-3, sd=1e-3, part="check"))
+    said = View("s", "S", {}, "sentences", text="{value}, {expanded}", unit="µm")
+    assert [w.replace("\u202f", "") for w in filled(said, rows).words] == ["2000 µm, 2000 µm"]
+    (bars,) = filled(View("i", "I", {}, "intervals", x="method", unit="µm"), rows).intervals
+    assert bars.texts[0].replace("\u202f", "").startswith("2000 µm ± 2000 µm")
+
+
+def test_what_is_drawn_is_written_as_numbers(tmp_path: Path) -> None:
+    """The points of a chart, the cells of a heat and the texts of intervals."""
+    of = whole()
+    out = tmp_path / "x.csv"
+    chart = View("f", "Force", {"part": "sample", "role": ""}, "lines", x="drives", by="label")
+    save(filled(chart, sampled()), sampled(), out)
+    assert out.read_text().splitlines()[:2] == [
+        "series,style,x: stage / mm,y: force / N,upper: force / N", "measured,points,0.0,0.0,",
+    ]  # fmt: skip
+    rows = table(*(ONE._replace(method=m, variation=v, value=x) for m, v, x in
+                   (("a", "1", 1e-3), ("a", "2", 2e-3), ("b", "2", 3e-3))))  # fmt: skip
+    save(filled(View("m", "M", {}, "heat", x="variation", by="method"), rows), rows, out)
+    assert out.read_text().splitlines() == ["method,variation,tip / mm", "a,1,1.0", "a,2,2.0",
+                                            "b,1,", "b,2,3.0"]  # fmt: skip
+    save(explained(view_of("limits"), of), of, out)
+    assert len(out.read_text().splitlines()) == 1 + len(of.where(part="check").rows)
+    with pytest.raises(UsageError, match=r"\.svg, \.pdf, \.png, \.csv, \.html \(a chart\)"):
+        save(filled(chart, sampled()), sampled(), tmp_path / "x.tex")
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_script_finds_every_name_that_the_command_lists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VALIDATE_NO_GL", "1")
+    folder = write_report(replace(small_result(), exhibits=(shows(),)), tmp_path / "cube",
+                          created="2026-01-01").parent  # fmt: skip
+    plot = plots_of(folder)
+    listed = CliRunner().invoke(cli, ["show", str(folder)]).output.splitlines()[1:]
+    assert [line.split()[0] for line in listed] == list(plot)
+    assert {"checks", "steps", "force", "limits"} <= set(plot)
+    assert isinstance(plot.checks(), ShownView)
+    parts = [name for name in plot if name.startswith("traces_")]
+    assert len(plot.traces().figures()) == len(parts) == 3  # type: ignore[union-attr]
+    assert {"difference", "difference_force_plate"} <= set(plot)
+    assert all(getattr(plot, name)().axes for name in (*parts, "difference", "body"))

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import jsonschema
 import numpy as np
 import pytest
+from command_line import refused
 
 from validate.commands.main import run
 from validate.compare.overall_verdict import ALPHA
@@ -18,6 +19,7 @@ from validate.errors import ComparisonError, UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.run.job import job_of
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.report.stored.store import schema
 from validate.study.coverage import bench as coverage_bench
 from validate.study.coverage import study as coverage_module
@@ -352,7 +354,7 @@ def test_a_drawn_truth_without_solution_is_taken_linearly_and_named(tmp_path: Pa
 
 
 def test_what_has_no_coverage_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ComparisonError, match="cell: SimpleNamespace cannot be drawn"):
+    with pytest.raises(ComparisonError, match="'cell' is compared as SimpleNamespace"):
         coverage_bench.drawable(SimpleNamespace(name="cell"))  # type: ignore[arg-type]
     end = SimpleNamespace(state="diverged", why="not finite")
     ended = SimpleNamespace(registered=[None], runs=[SimpleNamespace(outcome=end)])
@@ -395,3 +397,15 @@ def test_blocks_of_draws_that_fail_are_counted(monkeypatch: pytest.MonkeyPatch) 
         ComparisonError, match=r"kf: 1 of 2 blocks of \d+ draws could not be checked: o"
     ):
         coverage_module._of_method(study, "kf")  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_drawn_again_is_refused_before_anything_is_solved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError("it was to be refused first")
+
+    monkeypatch.setattr(ExperimentRuns, "start", solved)
+    line = refused("study", "coverage", "hanging_bar", "--quick", "--out", str(tmp_path))
+    assert "'drop' is compared as Drop" in line
+    assert "take an experiment that compares" in line

@@ -3,6 +3,8 @@
 import csv
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -135,3 +137,37 @@ def test_figures_are_vectors_and_tables_are_files(reports: Path, tmp_path: Path)
     assert float(root.get("width", "").removesuffix("pt")) == pytest.approx(85 / 25.4 * 72)
     assert root.findall(".//{*}image") == []  # lines, not pixels
     assert (folder / "limits_175mm.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_an_export_replaces_its_own_files_by_force_alone(reports: Path, tmp_path: Path) -> None:
+    """A file of an earlier export that is not written again is removed, one of the user's stays."""
+    folder = tmp_path / "figures"
+    folder.mkdir()
+    asked = ("export", str(reports / "cube"), "--figures", str(folder))
+    (folder / "thesis.tex").write_text("mine")
+    assert "--force" in refused(*asked)
+    (folder / "figures.json").write_text('{"files": ["old.svg", "../kept.svg", "gone.svg"]}')
+    (folder / "old.svg").touch()
+    (tmp_path / "kept.svg").touch()
+    assert here(*asked, "--force")[0] == 0
+    assert not (folder / "old.svg").exists()
+    assert (tmp_path / "kept.svg").exists()
+    assert (folder / "thesis.tex").read_text() == "mine"
+    names = set(json.loads((folder / "figures.json").read_text())["files"])
+    assert names == {f.name for f in folder.iterdir()} - {"thesis.tex", "figures.json"}
+
+
+def test_figures_report_their_progress(
+    reports: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[int, int]] = []
+
+    @contextmanager
+    def heard(title: str) -> Iterator[object]:
+        yield lambda done, total, text: told.append((done, total))
+
+    monkeypatch.setattr("validate.commands.export.progress", heard)
+    folder = tmp_path / "figures"
+    assert here("export", str(reports / "cube"), "--figures", str(folder))[0] == 0
+    count = len(list(folder.glob("*.pdf")))
+    assert told == [(i, count) for i in range(count)]

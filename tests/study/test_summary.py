@@ -267,6 +267,17 @@ def test_a_chart_shows_prediction_against_measurement_with_both_bands(tmp_path: 
     assert band.upper / band.x == pytest.approx(np.exp(2 * kind.stated.own))
 
 
+@pytest.mark.parametrize(("least", "log"), [(0.5, ""), (0.001, "xy")])
+def test_a_chart_is_logarithmic_where_an_axis_has_two_powers_of_ten(
+    tmp_path: Path, least: float, log: str
+) -> None:
+    stored(tmp_path, "a", check(11.0))
+    (kind,) = summary(tmp_path).kinds
+    (point,) = kind.points
+    small = replace(point, measured=least * point.measured, simulated=least * point.simulated)
+    assert _against(1, replace(kind, points=(point, small))).log == log
+
+
 def test_a_page_shows_the_largest_errors_and_a_file_all(tmp_path: Path) -> None:
     points = [check(10.0 + i / 100, name=f"force@{i + 1}mm") for i in range(_ROWS + 5)]
     stored(tmp_path, "a", *points)

@@ -132,3 +132,13 @@ def require_new(outputs: Iterable[Path], inputs: Iterable[Path] = (), *, force: 
             raise UsageError(
                 f"-o {out}: this file exists; name another output, or replace it with --force"
             )
+
+
+def require_empty(folder: Path, option: str, *, force: bool) -> None:
+    """Raise `UsageError` for a folder that holds something, unless `force` lets files be written
+    there."""
+    if folder.is_dir() and any(folder.iterdir()) and not force:
+        raise UsageError(
+            f"{option} {folder}: this folder is not empty; name another one, or write there with "
+            "--force"
+        )

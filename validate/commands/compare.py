@@ -15,6 +15,7 @@ from validate.errors import UsageError
 from validate.library.comparison import scores_of_runs
 from validate.numbers import shown_unit, significant, text
 from validate.report.stored.folder import try_results
+from validate.report.stored.tables import stored_folder
 from validate.report.views.layout import laid, width, wrapped
 from validate.study.stored_runs.score_comparison import (
     Pair,
@@ -39,8 +40,9 @@ class Shown:
     everything: bool = False
 
 
-def compare(paths: tuple[Path, ...], wanted: Shown, out: Path | None, *, as_json: bool) -> None:
+def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json: bool) -> None:
     """Prints stored runs side by side and draws a page; raises when nothing can be compared."""
+    paths = tuple(stored_folder(name) for name in names)
     found = scores_of_runs(paths, wanted.methods, wanted.scores, wanted.sort)
     if as_json:
         print(json.dumps(document(found), allow_nan=False, ensure_ascii=False, indent=1))

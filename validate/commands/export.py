@@ -1,20 +1,26 @@
 """`validate export`: a stored run as JUnit XML, LaTeX, or vector figures."""
 
+import itertools
+import json
 from dataclasses import replace
 from pathlib import Path
 
 from validate.commands.display import relative, say
-from validate.commands.show import folder_of, shown_of
+from validate.commands.progress import progress
 from validate.errors import UsageError
-from validate.files import safe_name
+from validate.files import json_value, safe_name
 from validate.places import try_file, try_folder, write_whole
 from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.tables import stored_folder
+from validate.report.stored.views import stored_views
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
 from validate.study.stored_runs.score_comparison import read_table
+
+_LIST = "figures.json"  # what an export wrote into a folder of figures, and of which run
 
 
 def export(
@@ -24,7 +30,7 @@ def export(
 
     Raises `UsageError` where none is requested, or no such run is stored.
     """
-    run = folder_of(name, None)
+    run = stored_folder(name)
     makers = ((junit_file, _junit), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted and figures is None:
@@ -50,21 +56,43 @@ def _figures(run: Path, folder: Path) -> None:
     table = read_table(run, *NOT_SHOWN)
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, _, exhibit in shown_of(run, table):
-        for part in drawable(exhibit):
-            for column in COLUMNS:
+    found = tuple(stored_views(run, table))
+    count = len(COLUMNS) * sum(len(drawable(exhibit)) for _, _, exhibit in found)
+    written: list[Path] = []
+    with progress(f"{table.head['experiment']}: figures") as report:
+        numbers = itertools.count(1)
+        for name, _, exhibit in found:
+            for part, column in itertools.product(drawable(exhibit), COLUMNS):
+                number = next(numbers)
+                report(number - 1, count, f"{part.name}, {column}: {number} of {count}")
                 figure = figure_of(part, table, column)
                 for suffix in (".svg", ".pdf"):
                     written.append(folder / f"{safe_name(part.name)}_{column}{suffix}")
                     figure.savefig(written[-1])
-        for suffix in (".csv", ".tex") if len(exhibit.tables) == 1 else ():
-            written.append(folder / f"{safe_name(name)}{suffix}")
-            save(replace(exhibit, charts=(), heats=(), intervals=()), table, written[-1])
+            for suffix in (".csv", ".tex") if len(exhibit.tables) == 1 else ():
+                written.append(folder / f"{safe_name(name)}{suffix}")
+                save(replace(exhibit, charts=(), heats=(), intervals=()), table, written[-1])
     for picture in sorted(run.glob("figures/body*.png")) if run.is_dir() else ():
         written.append(folder / picture.name)
         written[-1].write_bytes(picture.read_bytes())
-    say(f"{relative(folder)}: {len(set(written))} files", indent="  ")
+    names = {file.name for file in written}
+    gone = _exported(folder) - names
+    for name in gone:
+        (folder / name).unlink()
+    document = {"run": str(run), "created": table.head["created"], "files": sorted(names)}
+    write_whole(folder / _LIST, json.dumps(document, indent=1) + "\n")
+    replaced = f", {len(gone)} of an earlier export removed" if gone else ""
+    say(f"{relative(folder)}: {len(names)} files{replaced}", indent="  ")
+
+
+def _exported(folder: Path) -> set[str]:
+    """The names of files in a folder that an earlier export wrote."""
+    try:
+        found = json_value((folder / _LIST).read_bytes())["files"]
+        names = {str(name) for name in found if Path(str(name)).name == name}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    return {name for name in names if (folder / name).is_file()}
 
 
 def _junit(table: LongTable) -> str:

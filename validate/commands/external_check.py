@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.commands.arguments import FAILED, OK
+from validate.commands.arguments import FAILED, OK, require_empty
 from validate.commands.display import say, table
 from validate.errors import UsageError
 from validate.parameters import nearest_names
@@ -63,10 +63,7 @@ def job(
     force: bool,
 ) -> None:
     """Write the job of a method's scene to an empty `folder`; with `force` to any folder."""
-    if folder.exists() and any(folder.iterdir()) and not force:
-        raise UsageError(
-            f"-o {folder}: this folder is not empty; name another one, or write there with --force"
-        )
+    require_empty(folder, "-o", force=force)
     own = own_body(find(name, Path.cwd(), experiments))
     experiment, key = own.experiment, method or own.experiment.accepted[0]
     if key not in experiment.methods:

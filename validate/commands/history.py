@@ -31,7 +31,7 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
     """
     name = Path(name).stem if name.endswith(".py") else name
     files = experiment_files(Path.cwd(), named)
-    reports = reports_of(files.get(name), out)
+    reports = reports_of(files.get(name.partition("+")[0]), out)
     runs = history(reports, name)
     if not runs:
         first = f"start one with `validate run {name}`"

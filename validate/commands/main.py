@@ -22,6 +22,7 @@ from validate.commands.arguments import (
     detailed,
     external_simulators,
     output,
+    require_empty,
     require_new,
 )
 from validate.commands.external import external
@@ -295,7 +296,7 @@ def report_(out: Path | None) -> None:
 
 
 @cli.command("open")
-@click.argument("name", default="")
+@click.argument("name", default="", metavar="[NAME|FOLDER]")
 @click.option("--out", type=FOLDER, help="Folder of reports (default: as for run).")
 def open_(name: str, out: Path | None) -> None:
     """Open a report in the browser; without NAME the overview.
@@ -325,7 +326,7 @@ def summary_(out: Path | None, as_json: bool) -> None:
 
 
 @cli.command()
-@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("runs", nargs=-1, required=True, metavar="NAME|FOLDER ...")
 @click.option(
     "--method", "methods", multiple=True, metavar="GLOB", help="Only these methods: 'kf_*'."
 )
@@ -343,12 +344,12 @@ def summary_(out: Path | None, as_json: bool) -> None:
 @click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON document; write a page only with --out."
 )
-def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
+def compare(runs: tuple[str, ...], out: Path | None, as_json: bool, **wanted: Any) -> None:
     """Compare stored runs side by side, without new runs.
 
     \b
     Example:
-      validate compare reports/kf_cube reports/kf_cube_inertia
+      validate compare kf_cube kf_cube_inertia
     """
     from validate.commands import compare as comparing
 
@@ -356,7 +357,7 @@ def compare(runs: tuple[Path, ...], out: Path | None, as_json: bool, **wanted: A
 
 
 @cli.command("export")
-@click.argument("run")
+@click.argument("run", metavar="NAME|FOLDER")
 @click.option("--junit", type=FILE, help="Write checks and published figures as JUnit XML.")
 @click.option("--latex", type=FILE, help="Write checks as a LaTeX tabular.")
 @click.option(
@@ -378,6 +379,8 @@ def export_(
     from validate.commands import export as exporting
 
     require_new((file for file in (junit, latex) if file is not None), (Path(run),), force=force)
+    if figures is not None:
+        require_empty(figures, "--figures", force=force)
     exporting.export(run, junit, latex, figures)
 
 

@@ -3,12 +3,11 @@
 import webbrowser
 from pathlib import Path
 
-from validate.catalogue import experiment_files, reports_of
+from validate.catalogue import reports_of
 from validate.commands.display import relative, say
 from validate.errors import UsageError
-from validate.parameters import nearest_names
-from validate.report.stored.tables import report_folders
-from validate.study.stored_runs.overview import FOLDER, stored, write_overview
+from validate.report.stored.tables import stored_folder
+from validate.study.stored_runs.overview import stored, write_overview
 
 _PAGE = "report.html"
 
@@ -27,15 +26,10 @@ def open_page(name: str, out: Path | None) -> None:
 
     Raises `UsageError` where there is no such page.
     """
-    reports = reports_of(experiment_files(Path.cwd()).get(name), out)
-    folder = Path(name) if name and (Path(name) / _PAGE).is_file() else reports / (name or FOLDER)
-    if not name:
-        write_overview(reports)
+    folder = stored_folder(name, out) if name else write_overview(reports_of(None, out)).parent
     page = folder / _PAGE
     if not page.is_file():
-        known = {f.name for f in report_folders(reports)} if reports.is_dir() else set[str]()
-        told = f"; {nearest_names(name, known)}" if known else f"; `validate run {name}` makes it"
-        raise UsageError(f"no report of '{name}' below {reports}{told}")
+        raise UsageError(f"no {page}; `validate run {name}` makes it")
     say(f"page: {relative(page)}")
     if not webbrowser.open(page.resolve().as_uri()):
         say("no browser was found here; open the page in one")

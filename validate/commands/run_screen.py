@@ -19,6 +19,7 @@ from validate.commands.screen import (
     width,
     worst_first,
 )
+from validate.compare.overall_verdict import correction
 from validate.compare.result import KINDS, Result
 from validate.numbers import at_load, duration, rate, with_unit
 from validate.pipeline.calibration.fitted_moduli import sentence
@@ -88,7 +89,9 @@ def headline(result: Result) -> str:
         names = {c.name for c in found.differs}
         parts.append(f"{len(names)} of {found.total} errors differ from zero")
     elif any(c.validation == "not distinguishable" for c in result.checks):
-        parts.append("no error is distinguishable from zero")
+        tested = found.total if found.alone else 0
+        more = correction(result.checks, tested)
+        parts.append(f"no error is distinguishable from zero{more}")
     if not found.total:
         parts.append("no accepted method was run")
     elif found.absent:

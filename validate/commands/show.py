@@ -1,21 +1,14 @@
 """`validate show`: tables and charts of a stored run, on the terminal or as a file."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
-from validate.catalogue import experiment_files, reports_of
-from validate.checksums import read_sealed
 from validate.commands.display import console, relative, say
 from validate.commands.screen import rows
-from validate.compare.exhibit import Exhibit
-from validate.compare.view import View
 from validate.errors import UsageError
-from validate.parameters import nearest_names
-from validate.report.long_table import LongTable
-from validate.report.stored.exhibit_rows import NOT_SHOWN, stored_exhibits
-from validate.report.stored.folder import MARK
-from validate.report.views.drawers import drawable, save, terminal
-from validate.report.views.view_filling import filled_views
+from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.tables import stored_folder
+from validate.report.stored.views import exhibit_of, shown_by_name
+from validate.report.views.drawers import save, terminal
 from validate.study.stored_runs.score_comparison import read_table
 
 
@@ -24,44 +17,22 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
 
     Raises `UsageError` for a run or a name that is not there.
     """
-    folder = folder_of(run, reports)
+    folder = stored_folder(run, reports)
     table = read_table(folder, *NOT_SHOWN)
-    found = {name: (form, exhibit) for name, form, exhibit in shown_of(folder, table)}
-    for name in names:
-        if name not in found:
-            raise UsageError(f"{folder.name} shows no '{name}'; {nearest_names(name, set(found))}")
+    views = [exhibit_of(name, folder, table) for name in names]
     if out is not None:
         if len(names) != 1:
-            raise UsageError(f"-o takes one view, not {len(names)}; name one of {', '.join(found)}")
-        save(found[names[0]][1], table, out)
+            known = ", ".join(shown_by_name(folder, table))
+            raise UsageError(f"-o takes one view, not {len(names)}; name one of {known}")
+        save(views[0], table, out)
         say(f"{relative(out)}: {out.stat().st_size / 1e3:.1f} kB")
         return
     screen = console()
     if not names:
+        found = shown_by_name(folder, table)
         cells = [[name, form, exhibit.title] for name, (form, exhibit) in found.items()]
         for line in rows(["view", "form", "title"], cells, soft=2):
             screen.print(line, markup=False, soft_wrap=True)
-    for i, name in enumerate(names):
-        for line in (*([""] if i else []), *terminal(found[name][1], screen.width)):
+    for i, view in enumerate(views):
+        for line in (*([""] if i else []), *terminal(view, screen.width)):
             screen.print(line, markup=False, soft_wrap=True)
-
-
-def folder_of(run: str, reports: Path | None) -> Path:
-    """A report folder: as a path, or below the reports of an experiment."""
-    if (Path(run) / MARK).is_file() or Path(run).is_file():
-        return Path(run)
-    return reports_of(experiment_files(Path.cwd()).get(run), reports) / run
-
-
-def shown_of(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:
-    """Name, form and content of views that have rows, then of the run's own tables and charts."""
-    own = (View.from_json(v) for v in table.head.get("views", ()))
-    for view, found in filled_views(table, own):
-        if found.words or found.tables or drawable(found):
-            yield view.name, view.form, found
-    file = folder / MARK if folder.is_dir() else folder
-    for exhibit in stored_exhibits(read_sealed(file)):
-        for one in exhibit.tables:
-            yield one.name or exhibit.anchor, "table", Exhibit(one.name, one.title, tables=(one,))
-        for chart in exhibit.charts:
-            yield f"chart_{chart.name}", "chart", Exhibit(chart.name, chart.title, charts=(chart,))

@@ -196,3 +196,15 @@ def _holm(checks: Sequence[Check]) -> dict[str, float]:
             break
         levels[name] = level
     return levels
+
+
+def correction(checks: Iterable[Check], tested: int = 0) -> str:
+    """Return the end of a sentence that calls errors not distinguishable from zero: for how many
+    comparisons they are corrected, where an interval E +- 2 u_val excludes zero all the same.
+
+    `tested`: so many checks are corrected for, too. "" where each interval answers by itself.
+    """
+    excluding = [c for c in checks if c.validation == "not distinguishable"
+                 and abs(c.value) > 2 * c.u_val]  # fmt: skip
+    number = sum(c.count for c in excluding) + tested
+    return f" (corrected for {number} comparisons)" if number else ""

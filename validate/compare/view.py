@@ -99,8 +99,3 @@ def _tuples(value: Any) -> Any:
 def texts(one: str | tuple[str, ...]) -> tuple[str, ...]:
     """One name, or several, as a tuple."""
     return (one,) if isinstance(one, str) else one
-
-
-def view_faults(part: Any) -> str:
-    """Return the reason why an object is no view; "" for none."""
-    return "" if isinstance(part, View) else f"{part!r:.60}: expected a validate.report.View"

@@ -1,16 +1,20 @@
 """Comparison of stored runs, score by score."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from validate.compare.exhibit import Exhibit
 from validate.display import Screen
+from validate.library.plots import Plots, exhibit_plots
 from validate.library.run_result import RunResult
 from validate.numbers import shown_unit, significant, text
 from validate.report.long_table import frame
+from validate.report.stored.tables import stored_folder
 from validate.study.stored_runs.score_comparison import (
     SideBySide,
+    comparison_exhibits,
     narrowed,
     ordered,
     read_run,
@@ -41,6 +45,20 @@ class RunComparison:
     def warnings(self) -> tuple[str, ...]:
         """What makes the runs hard to compare: other recordings, quick runs."""
         return self.scores.warnings
+
+    @property
+    def plot(self) -> Plots:
+        """Tables and figures by name: `pair_1`, `changes_1`, `parameters`."""
+        return exhibit_plots(self._exhibits)
+
+    def _exhibits(self) -> dict[str, Exhibit]:
+        """Each table and each picture of the page alone, by its name."""
+        found: dict[str, Exhibit] = {}
+        for exhibit in comparison_exhibits(self.scores):
+            one = Exhibit(exhibit.anchor, exhibit.title)
+            found |= {t.name: replace(one, tables=(t,)) for t in exhibit.tables}
+            found |= {p.name: replace(one, pictures=(p,)) for p in exhibit.pictures}
+        return found
 
     def to_pandas(self) -> "DataFrame":
         """Return one row a score: method, score, unit, one column a run, SI.
@@ -90,7 +108,7 @@ def compare(
     Raises `UsageError` for fewer than two runs and for a folder without a run, `ComparisonError`
     where no score is shared.
     """
-    folders = [r.folder if isinstance(r, RunResult) else Path(r) for r in runs]
+    folders = [r.folder if isinstance(r, RunResult) else stored_folder(r) for r in runs]
     return RunComparison(scores_of_runs(folders, methods, scores, sort))
 
 

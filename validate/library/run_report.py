@@ -11,6 +11,7 @@ from pathlib import Path
 from validate.compare.result import Result
 from validate.engine.execution import CELLS, Report
 from validate.engine.pool import Pool
+from validate.errors import UsageError
 from validate.pipeline.calibration.calibrated import Identify, here
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options, doubtful, with_simulators
@@ -59,6 +60,7 @@ def reported_run(
     input, and `UsageError` for a folder that cannot be written, before anything runs.
     """
     experiment = with_simulators(plain, options.simulators)
+    require_accepted(experiment)
     folder = run_folder(experiment, options, out)
     made_by = rests_on(experiment, options, command)
     warn_of_units(experiment, options)
@@ -85,6 +87,16 @@ def reported_run(
             "history %s`", page.parent.name, old["created"], experiment.name,
         )  # fmt: skip
     return ReportedRun(result, page, by.words)
+
+
+def require_accepted(experiment: Experiment) -> None:
+    """Raise `UsageError` where no method is accepted, so that no check could ever be made."""
+    if not experiment.accepted:
+        some = next(iter(experiment.methods), "fem")
+        raise UsageError(
+            f"{experiment.name} accepts none of its methods, so nothing would be compared; name "
+            f'those that count, as Experiment(..., accepted=("{some}",))'
+        )
 
 
 def warn_of_units(experiment: Experiment, options: Options) -> None:

@@ -5,54 +5,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from validate.compare.exhibit import Exhibit
 from validate.compare.row import Wanted
 from validate.compare.view import View
 from validate.display import Screen, listed
 from validate.errors import UsageError
-from validate.library.plots import Plots
-from validate.numbers import text, with_unit
+from validate.library.plots import Plots, ShownView, plots_of
+from validate.numbers import scale, shown_unit, text, to_decimal_of, with_unit
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.json_values import Json
-from validate.report.views.drawers import figures, part, save, terminal
-from validate.report.views.standard import view_of
-from validate.report.views.view_filling import filled
+from validate.report.stored.tables import stored_folder
+from validate.report.stored.views import exhibit_of
+from validate.report.views.view_filling import explained
 from validate.study.stored_runs.score_comparison import read_table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
     from xarray import Dataset
-
-
-_WIDTH = 100  # letters of a line of text
-
-
-@dataclass(frozen=True, repr=False)
-class ShownView:
-    """A filled view: `print` gives its text, a notebook shows it as on the report's page."""
-
-    exhibit: Exhibit
-    table: LongTable
-
-    def figures(self) -> "list[Figure]":
-        """Return its charts as matplotlib figures; none for a table or sentences."""
-        return figures(self.exhibit, self.table)
-
-    def save(self, path: str | Path) -> None:
-        """Write it as the suffix says: .svg, .pdf, .png, .csv, .tex or .html.
-
-        Raises `UsageError` for another suffix, and for several charts or tables in one file.
-        """
-        save(self.exhibit, self.table, Path(path))
-
-    def __repr__(self) -> str:
-        return "\n".join(terminal(self.exhibit, _WIDTH))
-
-    def _repr_html_(self) -> str:
-        return part(self.exhibit, self.table)
 
 
 @dataclass(frozen=True)
@@ -147,7 +117,7 @@ class RunResult:
     @property
     def plot(self) -> Plots:
         """The figures by name: `result.plot.limits()` returns a matplotlib Figure."""
-        return Plots(self.folder)
+        return plots_of(self.folder)
 
     def table(self, **labels: Wanted) -> LongTable:
         """Return the rows of the long table that fit `labels`, as `quantity="marker.*"`.
@@ -165,14 +135,13 @@ class RunResult:
     def show(self, view: str | View) -> ShownView:
         """Return a view of the run: "checks", another that `validate show` lists, or one of yours.
 
-        `print` and a notebook show it; it has `.figures()` and `.save(path)`. Raises `UsageError`
-        for an unknown name.
+        `print` and a notebook show it, or which condition leaves no row; it has `.figures()` and
+        `.save(path)`. Raises `UsageError` for an unknown name.
         """
         table = self.table(part=NOT_SHOWN)
         if isinstance(view, str):
-            own = {v.name: v for v in map(View.from_json, table.head.get("views", ()))}
-            view = own[view] if view in own else view_of(view)
-        return ShownView(filled(view, table), table)
+            return ShownView(exhibit_of(view, self.folder, table), table)
+        return ShownView(explained(view, table), table)
 
     def to_pandas(self, **labels: Wanted) -> "DataFrame":
         """Return the long table as a DataFrame: one number a row, SI, with its unit and labels.
@@ -198,7 +167,7 @@ class RunResult:
     @property
     def _screen(self) -> Screen:
         rows = tuple(
-            (c.method, c.name, f"{text(c.value, c.unit)} ± {_twice(c.u_val, c.unit)}",
+            (c.method, c.name, _with_interval(c.value, c.u_val, c.unit),
              "–" if c.limit is None else text(c.limit, c.unit), c.verdict)
             for c in self.checks
         )  # fmt: skip
@@ -213,16 +182,20 @@ class RunResult:
         return self._screen.html
 
 
-def _twice(u_val: float | None, unit: str) -> str:
-    return with_unit(None if u_val is None else 2 * u_val, unit)
+def _with_interval(value: float | None, u_val: float | None, unit: str) -> str:
+    """E ± 2 u_val in the shown unit, to one decimal."""
+    if value is None or u_val is None:
+        return with_unit(value, unit)
+    half, error = to_decimal_of(2 * u_val * scale(unit), value * scale(unit))
+    return f"{error} ± {half} {shown_unit(unit)}".strip()
 
 
 def open_run(path: str | Path) -> RunResult:
-    """Return the stored run in a folder of reports, as `reports/fluid_phantom`.
+    """Return a stored run: a folder, as `reports/fluid_phantom`, or a name, as `validate show`.
 
     Raises `UsageError` where no run is stored there, and for the folder of a study.
     """
-    folder = Path(path).resolve()
+    folder = stored_folder(path).resolve()
     table = read_table(folder, "score*", "check*", "published*")
     if not table.head.get("methods"):
         raise UsageError(f"{path}: a study or a comparison, not a run; open its report.html")

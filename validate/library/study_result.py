@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from validate.checksums import read_sealed
 from validate.display import Screen
 from validate.files import LARGEST, read_text
-from validate.library.plots import Plots
+from validate.library.plots import Plots, plots_of
 from validate.report.long_table import frame
 from validate.report.stored.folder import MARK
 from validate.report.stored.json_values import Json
@@ -45,7 +45,7 @@ class StudyResult:
     @property
     def plot(self) -> Plots:
         """The figures by name, as matplotlib Figures."""
-        return Plots(self.folder)
+        return plots_of(self.folder)
 
     def cells(self) -> tuple[tuple[str | float, ...], ...]:
         """Return the rows of `tables/cells.csv`, the head first: texts and numbers."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.parameters import nearest_names
-from validate.plugins import Registry
+from validate.plugins import Registry, kind_fault
 from validate.recording.formats.matlab import MATLAB
 from validate.recording.formats.rosbag import ROSBAG
 from validate.recording.formats.slicer import FCSV, MARKUPS
@@ -97,11 +97,9 @@ _OWN: tuple[Reader, ...] = (
 )  # fmt: skip
 
 
-def _faults(part: object) -> str:
-    return "" if isinstance(part, Reader) else f"{part!r}: expected a Reader"
-
-
-READERS: Registry[Reader] = Registry("readers", _OWN, lambda reader: reader.name, _faults)
+READERS: Registry[Reader] = Registry(
+    "readers", _OWN, lambda reader: reader.name, lambda part: kind_fault(part, Reader)
+)
 
 
 def in_order() -> tuple[Reader, ...]:

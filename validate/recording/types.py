@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from validate.arrays import Floats, checked, rebuilt
 from validate.display import Screen, brief
 from validate.errors import RecordingError, UsageError
+from validate.exports import lazily
 from validate.installation import install_command
 
 if TYPE_CHECKING:
@@ -351,6 +352,12 @@ class Recording:
         head = ("stream", "content", "samples", "time / s", "unit", "frame")
         records = (f"records: {', '.join(self.metadata)}",) if self.metadata else ()
         return Screen(title, (), head, rows, records)
+
+    @property
+    def plot(self) -> Any:
+        """Figures by topic, as `recording.plot.force()`: signals over time, and how far markers
+        moved; a `validate.library` Plots, which `list()` names."""
+        return lazily("validate.library", {"plots": ("recording_plots",)})("recording_plots")(self)
 
     def to_xarray(self) -> "DataTree":
         """Return a tree with each stream at its topic, since every stream has its own times.

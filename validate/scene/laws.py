@@ -15,7 +15,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity
-from validate.plugins import Registry
+from validate.plugins import Registry, kind_fault
 
 VolumetricName = Literal["split", "coupled"]
 StabilityRule = Literal["required", "open"]
@@ -43,7 +43,7 @@ class LawKind:
 def _faults(part: object) -> str:
     """What keeps an object from being the law of a plug-in."""
     if not isinstance(part, LawKind):
-        return f"{part!r}: expected a LawKind"
+        return kind_fault(part, LawKind)
     if part.at_point is None:
         return f"law '{part.name}' has no at_point, which makes the law at a point"
     known = {f.name for f in fields(part.holds or Coefficients)}

@@ -1,9 +1,10 @@
 """Questions about dynamics of a body and the methods of its experiment."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 
@@ -98,32 +99,33 @@ def proposal(recording: Recording, p: Tree, folder: Path) -> Proposal:
     return Proposal(STATIC, f"{facts}: slow enough for statics")
 
 
-class _Firsts:
-    """First frequencies of the last recording's bodies: questions are listed again and again."""
+@dataclass(frozen=True, eq=False)
+class _Same:
+    """A recording as an argument that is remembered: equal to itself alone."""
 
-    recording: Recording | None = None
-    found: ClassVar[list[tuple[Tree, Path, float | None]]] = []
+    recording: Recording
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.recording is self.recording
+
+    def __hash__(self) -> int:
+        return id(self.recording)
 
 
 def _first(recording: Recording, p: Tree, folder: Path) -> float | None:
+    """The first frequency of a body, Hz: computed once, as questions are listed again and again."""
     p = replace(p, settings=replace(p.settings, ranges=type(p.settings.ranges)()))  # change none
-    if _Firsts.recording is not recording:
-        _Firsts.recording, _Firsts.found = recording, []
-    for body, at, first in _Firsts.found:
-        if (body, at) == (p, folder):
-            return first
-    first = _computed_first(recording, p, folder)
-    _Firsts.found.append((p, folder, first))
-    return first
+    return _computed_first(_Same(recording), p, folder)
 
 
-def _computed_first(recording: Recording, p: Tree, folder: Path) -> float | None:
+@lru_cache(maxsize=8)
+def _computed_first(one: _Same, p: Tree, folder: Path) -> float | None:
     try:
         body = p.scene.body
         if isinstance(body, MeshFile) and unknowns_of(p, 1, folder) > _QUADRATIC:
             p = p.with_scene(body=replace(body, halvings=-1))
         order = 2 if unknowns_of(p, 2, folder) <= _QUADRATIC else 1
-        return first_frequencies(_scene(recording, p, folder, order), 1)[0]
+        return first_frequencies(_scene(one.recording, p, folder, order), 1)[0]
     except (ValidateError, np.linalg.LinAlgError):
         return None
 
@@ -158,7 +160,7 @@ def motion_questions(
         proposed = Proposal(DYNAMIC, "a release is a motion in time")
     else:
         needed = ((k, v) for k, v in found.items() if k.startswith(_OF_A_MODE) and v)
-        proposed = _proposed(recording, tuple(sorted(needed)))
+        proposed = _proposed(_Same(recording), tuple(sorted(needed)))
     asked = [Question("motion.how", "dynamic: solve the motion in time; static: solve states of "
                       "rest, without inertia", proposed.how, proposed.why,
                       choices=(STATIC, DYNAMIC))]  # fmt: skip
@@ -222,19 +224,9 @@ def _listed(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-class _LastProposal:
-    """The last proposal with its recording and answers: questions are listed again and again."""
-
-    last: tuple[Recording, tuple[tuple[str, str], ...], Proposal] | None = None
-
-
-def _proposed(recording: Recording, values: tuple[tuple[str, str], ...]) -> Proposal:
-    last = _LastProposal.last
-    if last and last[0] is recording and last[1] == values:
-        return last[2]
-    found = proposal(recording, tree_of(recording, dict(values)), Path())
-    _LastProposal.last = (recording, values, found)
-    return found
+@lru_cache(maxsize=1)
+def _proposed(one: _Same, values: tuple[tuple[str, str], ...]) -> Proposal:
+    return proposal(one.recording, tree_of(one.recording, dict(values)), Path())
 
 
 # --- what is written ------------------------------------------------------------------------------

@@ -105,8 +105,9 @@ def new(
     say(f"{path}: edit it, then `validate run {_called(name, path)}`", indent="  ")
     if expected:
         say(
-            f"first answer: about {float(f'{expected.seconds:.1g}'):.0f} s, "
-            f"{expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} unknowns at most (estimated)",
+            f"first answer: up to {float(f'{expected.seconds:.1g}'):.0f} s (often far less: `run` "
+            f"shows what is left), about {expected.memory / 1e9:.1f} GB, {expected.unknowns:.0f} "
+            "unknowns at most",
             indent="  ",
         )
     if found.get(_HALVINGS):

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-from validate.compare.overall_verdict import Overall, judge_all
+from validate.compare.overall_verdict import Overall, correction, judge_all
 from validate.compare.published import Published
 from validate.compare.result import Kind, MethodResult
 from validate.compare.verdict import Check
@@ -77,7 +77,8 @@ def _counted(
         there = [c for c in checks if answer(c) == key]
         if there:
             which = f" ({_named(there)})" if named else ""
-            found.append(f"{len(there)} of {len(checks)} {what} {text}{which}")
+            more = correction(there) if answer(there[0]) == "not distinguishable" else ""
+            found.append(f"{len(there)} of {len(checks)} {what} {text}{which}{more}")
     return ", ".join(found)
 
 

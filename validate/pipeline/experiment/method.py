@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
+from inspect import signature
 from typing import Any, Protocol, cast, runtime_checkable
 
 from validate.errors import UsageError
@@ -10,6 +11,7 @@ from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.pipeline.experiment.variation import ByPath
 from validate.register.registration import Registered
+from validate.scene.scene import Scene
 from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.
@@ -48,6 +50,26 @@ class Method:
     def __post_init__(self) -> None:
         if isinstance(self.scene, Mapping):
             object.__setattr__(self, "scene", ByPath(self.scene))
+        kind = self.settings if isinstance(self.settings, type) else type(self.settings)
+        steps = hasattr(kind, "prepare") or hasattr(kind, "solve")
+        if self.settings is not None and (kind is self.settings or not steps):
+            made = f"; give {kind.__name__}()" if steps else ""
+            found = f"the class {kind.__name__}" if steps else f"{self.settings!r:.40}"
+            raise UsageError(
+                f"method '{self.label}': expected the settings of a scheme or a filter, as "
+                f"Newmark(), found {found}{made}"
+            )
+
+    @property
+    def filters(self) -> bool:
+        """Whether its settings are a filter: they are prepared with measurements."""
+        prepare = getattr(self.settings, "prepare", None)
+        given = signature(prepare).parameters.values() if prepare else ()
+        return sum(p.default is p.empty and p.kind is p.POSITIONAL_OR_KEYWORD for p in given) > 1
+
+    def require_measured(self, scene: Scene, seen: Registered) -> None:
+        """Raise `ComparisonError` where the recording has none of its markers and outlines."""
+        measurements(seen, scene.mesh).of(*self.markers)
 
     def prepare(
         self,

@@ -144,6 +144,12 @@ def configure(experiment: Experiment, options: Options) -> tuple[Any, dict[str, 
     added = added_simulators(methods, options.simulators)
     chosen = tuple(dict.fromkeys((*options.methods, *added))) if options.methods else methods
     picked = {name: methods[name] for name in chosen}
+    for name, method in picked.items():
+        if method.filters and not method.markers:
+            raise UsageError(
+                f"method '{name}': the filter {type(method.settings).__name__} is given no "
+                'markers; name some of the recording, as Method(..., markers=("tip",))'
+            )
     given = with_values(parameters, mine)
     # A value of the scene that every method replaces by its own is not read
     for path, text in mine.items():

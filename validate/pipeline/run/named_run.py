@@ -14,7 +14,13 @@ from typing import Any
 from validate.catalogue import reports_of as reports_of
 from validate.parameters import Parameter, changed, describe
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.options import Options, all_methods, configure
+from validate.pipeline.experiment.find import loaded_from
+from validate.pipeline.experiment.options import (
+    Options,
+    added_simulators,
+    all_methods,
+    configure,
+)
 
 _LONGEST = 60  # characters of what differs in a folder's name
 _DIGITS = 6  # of the hash
@@ -39,11 +45,14 @@ def run_name(experiment: Experiment, options: Options) -> str:
 
 
 def differences(experiment: Experiment, options: Options) -> tuple[list[str], list[Any]]:
-    """Return the user's changes: in words, and as content with every value.
+    """Return the user's changes: in words, and as content with every value. Those of a script, to
+    what the experiment's file declares, are among them.
 
     Raises `UsageError` for unknown methods, paths and values.
     """
-    declared = _settable(experiment, Options({}, (), options.quick))
+    loaded = loaded_from(experiment.path) if experiment.path else ()
+    file = next(iter(loaded), experiment)
+    declared = _settable(file, Options({}, (), options.quick))
     differing = sorted((c.path, c.value) for c in changed(declared, _settable(experiment, options)))
     methods = sorted(set(options.methods))
     if methods == sorted(experiment.methods):
@@ -51,8 +60,14 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
     case = [f"case_{options.case}"] * bool(options.case)
     words = ["quick"] * options.quick + case + ["methods"] * bool(methods)
     simulators = sorted(options.simulators)
-    content = [options.quick, methods, differing, *simulators, *case]
-    return [*words, *(p for p, _ in differing), *["external"] * bool(simulators)], content
+    simulated = added_simulators(experiment.methods, options.simulators)
+    added = sorted({*experiment.methods} - {*file.methods, *simulated})
+    if added and not methods:
+        words.append("methods")
+    other = {name: getattr(experiment, name) for name in ("accept", "accepted")
+             if getattr(experiment, name) != getattr(file, name)}  # fmt: skip
+    content = [options.quick, methods, differing, *simulators, *case, *added, *other.items()]
+    return [*words, *other, *(p for p, _ in differing), *["external"] * bool(simulators)], content
 
 
 def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:

@@ -3,6 +3,7 @@
 One for every experiment, at holds or over time, with a twin's truth beside or without one.
 """
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -16,6 +17,7 @@ from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
 from validate.compare.score import Score, run_scores, scores_of
 from validate.engine.execution import Report
+from validate.errors import ComparisonError, UsageError, ValidateError
 from validate.fem.locking import locking_notes
 from validate.memory import MemoryShortError
 from validate.parameters import Changed, Parameter, changed, describe, value_at
@@ -50,9 +52,12 @@ from validate.pipeline.experiment.origins import Opened, marked, opened
 from validate.pipeline.run.estimate import coarser, require_room
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.pipeline.run.runs import ExperimentRuns, Solves
+from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
+from validate.scene.meshless import Meshless
 from validate.solve.external.scheme import ExternalSimulator
 
+LOG = logging.getLogger(__name__)
 _AGAINST: Mapping[Kind, str] = {
     "measured": "measured recording",
     "twin": "recording of a twin",
@@ -119,6 +124,7 @@ def set_out(
         report(0, 1, "requests memory")
     asked = middle(experiment, parameters)
     require_room(experiment, methods, asked, shipped[0], quick=options.quick)
+    _require_measured(experiment, methods, asked, shipped[0])
     if report and (experiment.identify or experiment.calibrations):
         report(0, 1, "identifies parameters")
     every = all_methods(experiment, options)
@@ -151,6 +157,28 @@ def set_out(
     return PreparedRuns(experiment, runs, found, identified, differing, fitted)
 
 
+def _require_measured(
+    experiment: Experiment, methods: Mapping[str, Method], parameters: Any, recording: Recording
+) -> None:
+    """Raise `UsageError` for a filter whose markers the recording lacks, before anything is
+    solved."""
+    filters = {method.markers: (name, method) for name, method in methods.items() if method.markers}
+    for name, method in filters.values():
+        try:
+            scene = experiment.build(recording, parameters, method.scene)
+            seen = experiment.place(recording, parameters, scene)
+        except ValidateError:  # it may need what is yet to be identified
+            continue
+        if not isinstance(scene, Meshless):
+            try:
+                method.require_measured(scene, seen)
+            except ComparisonError as error:
+                raise UsageError(
+                    f"method '{name}' is a filter: {error}; name markers of the recording, or run "
+                    "other methods with --methods"
+                ) from error
+
+
 def _compared(
     experiment: Experiment,
     options: Options,
@@ -163,6 +191,11 @@ def _compared(
     methods = runs.methods
     variants = variants_of(runs)
     runs.expect(variants)
+    if experiment.accepted and not {*methods} & {*experiment.accepted}:
+        LOG.warning(
+            "none of the chosen methods is accepted, so no check is made and the run fails; add "
+            "one of %s", ", ".join(experiment.accepted),
+        )  # fmt: skip
     remade = runs.start(found.recordings)
     runs.ahead(variants)
     main = {name: runs.main(name) for name in methods}

@@ -180,6 +180,7 @@ class ExperimentRuns:
         self._finest: dict[str, float] = {}  # how many times as fine, by method
         self._fresh: dict[RunWanted, MethodRun] = {}  # solved in this process, as yet without truth
         self._whole: dict[RunWanted, MethodRun] = {}
+        self._parsed: dict[int, tuple[Change, Any]] = {}
 
     # --- what will be asked for -------------------------------------------------------------------
 
@@ -206,7 +207,7 @@ class ExperimentRuns:
     def wanted(self, variant: Variant) -> RunWanted:
         """Return a variant on the experiment's own recordings; a method as it is is wanted
         whole."""
-        changed = variant.change(self.parameters)
+        changed = self._changed_by(variant)
         as_it_is = (changed, variant.split, variant.off) == (self.parameters, 1, ())
         whole = as_it_is and variant.method in self.methods
         return RunWanted(MAIN, variant.method, changed, variant.split, variant.off, whole)
@@ -231,7 +232,14 @@ class ExperimentRuns:
         if uncertainty is None or uncertainty.mesh is None:
             return 1.0
         size = uncertainty.mesh.size
-        return size(self.parameters) / size(variant.change(self.parameters))
+        return size(self.parameters) / size(self._changed_by(variant))
+
+    def _changed_by(self, variant: Variant) -> Any:
+        """The parameters of a variant, parsed once by each change."""
+        change = variant.change
+        if id(change) not in self._parsed:
+            self._parsed[id(change)] = change, change(self.parameters)  # kept, so that its id is
+        return self._parsed[id(change)][1]
 
     # --- recordings -------------------------------------------------------------------------------
 

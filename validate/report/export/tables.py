@@ -7,7 +7,7 @@ from pathlib import Path
 
 from validate.compare.exhibit import Chart, Entry, NumberTable, TableCell, plain
 from validate.files import safe_name
-from validate.numbers import MISSING, shown_unit, significant, text
+from validate.numbers import MISSING, digits, shown_unit, significant, text
 
 Row = Iterable[Entry | TableCell]
 _LONG, _WIDE = 30, 6  # letters of a text that goes below its row, columns of a wide table
@@ -98,8 +98,13 @@ def write_table(table: NumberTable, folder: Path) -> None:
 
 def write_chart(chart: Chart, folder: Path) -> None:
     """Every point of every series as a CSV file."""
+    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", *chart_rows(chart))
+
+
+def chart_rows(chart: Chart) -> tuple[tuple[str, ...], Iterator[Row]]:
+    """Return the head of a chart's file, and a row for each point of a series and each level."""
     head = ("series", "style", f"x: {chart.x}", f"y: {chart.y}", f"upper: {chart.y}")
-    write_csv(folder / f"chart_{safe_name(chart.name)}.csv", head, _points(chart))
+    return head, _points(chart)
 
 
 def write_csv(
@@ -120,7 +125,7 @@ def _digits(entry: Entry | TableCell) -> str | int:
     """A number as a page shows it, as programs read it."""
     value = plain(entry)
     if isinstance(entry, TableCell) and entry.text and isinstance(value, float):
-        return entry.text.replace("\u202f", "").replace("−", "-")
+        return digits(entry.text)
     return _written(value)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from validate.errors import UsageError
 from validate.report.stored.history import LINES, lines_of
 from validate.report.stored.json_values import Json
+from validate.report.stored.tables import is_called
 
 BEYOND = 2.0  # standard uncertainties of the difference: as a check's |E| against u_val
 _ROUNDING = 1e-9  # relative: the same computation on another machine
@@ -79,22 +80,15 @@ class Since:
 
 
 def history(reports: Path, name: str) -> tuple[PastRun, ...]:
-    """Every run of an experiment below a folder of reports, the oldest first.
+    """Every run of an experiment (or, of `NAME+quick`, of those variations) below a folder of
+    reports, the oldest first.
 
     Raises `UsageError` for a damaged line.
     """
-    found = [run for folder in _folders(reports, name) for run in _runs(folder)]
-    mine = (r for r in found if r.line["experiment"] == name)
+    folders = sorted(reports.iterdir()) if reports.is_dir() else []
+    found = (run for f in folders if f.is_dir() and is_called(f, name) for run in _runs(f))
+    mine = (r for r in found if r.line["experiment"] == name.partition("+")[0])
     return tuple(sorted(mine, key=lambda r: r.created))
-
-
-def _folders(reports: Path, name: str) -> list[Path]:
-    if not reports.is_dir():
-        return []
-    return sorted(
-        f for f in reports.iterdir()
-        if f.is_dir() and (f.name == name or f.name.startswith(f"{name}+"))
-    )  # fmt: skip
 
 
 def _runs(folder: Path) -> Iterator[PastRun]:

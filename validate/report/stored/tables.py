@@ -10,11 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from validate.catalogue import experiment_files, name_of, reports_of
 from validate.compare.row import LongRow, Wanted, require_columns
 from validate.errors import RecordingError, UsageError
+from validate.parameters import nearest_names
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, frame
 from validate.report.stored.folder import MARK
+from validate.report.stored.history import current
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -78,3 +81,38 @@ def report_folders(reports: Path) -> list[Path]:
         return [reports]
     folders = (f for f in reports.iterdir() if f.is_dir() and not f.name.startswith("."))
     return sorted(f for f in folders if (f / MARK).is_file())
+
+
+def stored_folder(run: str | Path, reports: Path | None = None) -> Path:
+    """Return the folder of a stored run or study, or its results.json: a path, or a name below
+    `reports` (default: where the experiment's runs are written).
+
+    `NAME` is the run as declared, else the newest of its variations; `NAME+quick` the newest whose
+    folder is called so but for its last words and its hash; `FILE.py` is the name of its
+    experiment. Raises `UsageError` where nothing is stored by that name.
+    """
+    path, name = Path(run), str(run)
+    if path.suffix == ".py":
+        name = name_of(path)
+    elif (path / MARK).is_file() or path.is_file():
+        return path
+    experiment = name.partition("/")[0].partition("+")[0]  # of `NAME/study-filters`, too
+    reports = reports_of(experiment_files(Path.cwd()).get(experiment), reports)
+    if (reports / name / MARK).is_file():
+        return reports / name
+    folders = report_folders(reports) if reports.is_dir() else []
+    called = [folder for folder in folders if is_called(folder, name)]
+    if not called:
+        hint = nearest_names(name, {f.name for f in folders}) if folders else ""
+        made = hint or f"`validate run {experiment}` makes one"
+        raise UsageError(f"no stored run at {path}, and none of that name below {reports}; {made}")
+    newest = max(called, key=lambda folder: str((current(folder) or {}).get("created")))
+    if len(called) > 1:
+        LOG.warning(f"{name}: {newest.name}, the newest of {len(called)} stored runs")
+    return newest
+
+
+def is_called(folder: Path, name: str) -> bool:
+    """Whether a folder of results holds the run of that name, or a variation of it."""
+    varied = (f"{name}+", f"{name}-") if "+" in name else (f"{name}+",)  # - is before the hash
+    return folder.name == name or folder.name.startswith(varied)

@@ -3,6 +3,7 @@
 Each takes an exhibit, and the run whose methods have their colours.
 """
 
+from collections.abc import Iterable
 from itertools import cycle
 from pathlib import Path
 from string import ascii_lowercase
@@ -11,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import plotille
 
-from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
+from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals, NumberTable
 from validate.errors import UsageError
 from validate.numbers import significant
-from validate.report.export.tables import sheet, write_csv
+from validate.report.export.tables import Row, chart_rows, sheet, write_csv
 from validate.report.views.bars import bar, legend
 from validate.report.views.layout import laid, wrapped
 
@@ -60,36 +61,56 @@ def _tick(value: float, chars: int, *_: object, **__: object) -> str:
 
 _NOTHING = "No row fits."
 _FIGURES = (".svg", ".pdf", ".png")
-_SUFFIXES = (*_FIGURES, ".csv", ".tex", ".html")
 
 
 # --- a file ---------------------------------------------------------------------------------------
 
 
 def save(found: Exhibit, run: "HasMethods", path: Path) -> None:
-    """Write an exhibit as its file's suffix says: a chart as .svg, .pdf or .png, a table as .csv or
-    .tex, anything as .html.
+    """Write an exhibit as its file's suffix says: a chart as .svg, .pdf, .png or, its points, as
+    .csv; a table as .csv or .tex; anything as .html.
 
     Raises `UsageError` for another suffix, and for several charts or tables in one file.
     """
     suffix = path.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise UsageError(f"{path.name}: a view is written as {', '.join(_SUFFIXES)}")
+    drawn = drawable(found)
+    parts = (*found.tables, *drawn)
+    taken: tuple[str, ...] = (*_FIGURES, ".csv") if drawn else (".csv", ".tex")
+    what = "a chart" if drawn else "a table"
+    if len(parts) != 1:
+        taken, what = (), " ".join(found.words) or _NOTHING
+        what = f"{len(parts)} charts or tables: take one of them" if parts else what
+    if suffix not in (*taken, ".html"):
+        known = ", ".join((*taken, ".html"))
+        raise UsageError(f"{path.name}: '{found.anchor}' is written as {known} ({what})")
     if suffix == ".html":
         path.write_text(page(found, run), encoding="utf-8")
-        return
-    parts = found.tables if suffix in (".csv", ".tex") else drawable(found)
-    if len(parts) != 1:
-        what = "tables" if suffix in (".csv", ".tex") else "charts"
-        raise UsageError(f"{path.name}: '{found.anchor}' has {len(parts)} {what}; write .html")
-    if suffix in _FIGURES:
+    elif suffix in _FIGURES:
         figures(found, run)[0].savefig(path)
-    elif suffix == ".csv":
-        write_csv(path, found.tables[0].headings, found.tables[0].rows, as_shown=True)
-    else:
+    elif suffix == ".tex":
         from validate.report.export.junit_latex import tabular
 
         path.write_text(tabular(found.tables[0]), encoding="utf-8")
+    else:
+        write_csv(path, *_cells(parts[0]), as_shown=bool(found.tables))
+
+
+def _cells(part: NumberTable | Chart | Heat | Intervals) -> tuple[tuple[str, ...], Iterable[Row]]:
+    """Head and rows of the file of a table, or of the numbers that are drawn."""
+    match part:
+        case NumberTable():
+            return part.headings, part.rows
+        case Chart():
+            return chart_rows(part)
+        case Heat():
+            lines = zip(part.rows, part.values.tolist(), strict=True)
+            return (part.y, part.x, part.quantity), (
+                (row, column, v if np.isfinite(v) else None)
+                for row, values in lines for column, v in zip(part.columns, values, strict=True)
+            )  # fmt: skip
+        case Intervals():
+            rows = zip(part.labels, part.texts, part.answers, strict=True)
+            return ("check", "E ± 2 u_val of limit", "verdict"), rows
 
 
 # --- a static picture -----------------------------------------------------------------------------

@@ -3,10 +3,10 @@
 VIEWS.add(View("late_error", "Error at the last markers", {"part": "score"}, x="method", by="name"))
 """
 
-from validate.compare.view import View, view_faults
+from validate.compare.view import View
 from validate.errors import UsageError
 from validate.parameters import nearest_names
-from validate.plugins import Registry
+from validate.plugins import Registry, kind_fault
 
 _CHECKS = View(
     "checks", "Checks", {"part": ("check", "check.*", "!check.size.*")},
@@ -130,7 +130,9 @@ STANDARD = (
     _CHECKS, _LIMITS, _COST, _SPEEDS, _ERRORS, _TRUTH, _WHOLE, _BY_LOAD, _PUBLISHED, _SETTINGS,
     _IDENTIFIED, _REST, _EFFECTS, _BUDGET, _CURVES, _DIFFERENCES, _TRACES,
 )  # fmt: skip
-VIEWS: Registry[View] = Registry("views", STANDARD, lambda view: view.name, view_faults)
+VIEWS: Registry[View] = Registry(
+    "views", STANDARD, lambda view: view.name, lambda part: kind_fault(part, View)
+)
 
 
 def view_of(name: str) -> View:

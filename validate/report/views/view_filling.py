@@ -21,15 +21,16 @@ from validate.compare.exhibit import (
     TableCell,
     plain,
 )
-from validate.compare.row import MEASURED, VALUE, LongRow
+from validate.compare.row import MEASURED, VALUE, LongRow, selects
 from validate.compare.view import View, texts
 from validate.errors import ComparisonError, UsageError
 from validate.numbers import (
     MISSING,
+    digits,
     scale,
     shown_unit,
+    significant,
     spaced,
-    text,
     to_decimal_of,
     with_unit,
 )
@@ -66,6 +67,26 @@ def filled_views(
         yield view, VIEWS.answer(view, lambda v: filled(v, table), Exhibit("", ""))
 
 
+def explained(view: View, table: LongTable) -> Exhibit:
+    """Return the view, or, where it shows nothing, a sentence that names the condition that leaves
+    no row. Raises as `filled`."""
+    found = filled(view, table)
+    if found != Exhibit(view.name, view.title):
+        return found
+    left = table.rows
+    for column, wanted in view.rows.items():
+        fits = selects(wanted)
+        values = {str(getattr(row, column)) for row in left}
+        count, left = len(left), tuple(row for row in left if fits(getattr(row, column)))
+        if not left:
+            hint = nearest_names(" ".join(map(str, texts(wanted))), values)  # type: ignore[arg-type]
+            why = f"Of {count} rows none has {column} = {wanted!r}; {hint}."
+            return replace(found, words=(why,))
+    less = f" and a row of '{view.less}'" if view.less else ""
+    why = f"{len(left)} rows fit; none has numbers for x = {view.x!r} and y = {view.y!r}{less}."
+    return replace(found, words=(why,))
+
+
 def filled(view: View, table: LongTable) -> Exhibit:
     """Return the view as an exhibit of its name and title; empty where no row fits.
 
@@ -83,11 +104,13 @@ def filled(view: View, table: LongTable) -> Exhibit:
             return replace(one, tables=tuple(_table(v, rows, table) for v, rows in parts))
         case "lines" | "points":
             charts = (_chart(v, rows, table) for v, rows in parts)
-            return replace(one, charts=tuple(c for c in charts if c is not None))
+            return replace(one, charts=tuple(c for c in charts if c and (c.series or c.levels)))
         case "heat":
-            return replace(one, heats=tuple(_heat(v, rows, table) for v, rows in parts))
+            heats = (_heat(v, rows, table) for v, rows in parts)
+            return replace(one, heats=tuple(h for h in heats if np.isfinite(h.values).any()))
         case "intervals":
-            return replace(one, intervals=tuple(_intervals(v, rows, table) for v, rows in parts))
+            bars = (_intervals(v, rows, table) for v, rows in parts)
+            return replace(one, intervals=tuple(b for b in bars if b.labels))
         case "sentences":
             return replace(one, words=tuple(_sentence(view, row, table) for row in found))
 
@@ -148,7 +171,7 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
     one, else in a column of their own, else beside each number."""
     labels, grid = texts(view.x), _grid(view, rows, table)
     across = _across(view, rows, table)
-    cells = [[_cell(view, line.get(key, []), column) for _, key, column in across]
+    cells = [[_cell(view, line.get(key, []), column, _check(line)) for _, key, column in across]
              for line in grid.values()]  # fmt: skip
     kept = [j for j in range(len(across)) if any(plain(c[j]) not in (None, "") for c in cells)]
     units = [_units(c[j] for c in cells) for j in kept]
@@ -208,12 +231,19 @@ def _matched(label: str, keys: Iterable[str]) -> list[tuple[str, str]]:
             if k.startswith(before) and k.endswith(behind)]  # fmt: skip
 
 
-def _cell(view: View, rows: list[LongRow], column: str) -> TableCell:
+def _check(line: Mapping[str, list[LongRow]]) -> LongRow | None:
+    """The one check that a line is of; None where it is of none or of several."""
+    checks = [row for rows in line.values() for row in rows if row.part == "check"]
+    return checks[0] if len(checks) == 1 else None
+
+
+def _cell(view: View, rows: list[LongRow], column: str, check: LongRow | None) -> TableCell:
     row = _chosen(view, rows, column)
     if row is None:
         return TableCell(None)
     if column in _NUMBERS:
-        return TableCell(_number(row, column), row.unit, _to_one_decimal(row).get(column, ""))
+        number = _number(row, column)
+        return TableCell(number, row.unit, _to_decimal(view, row, number, check))
     found = getattr(row, column)
     if column in _COUNTS:
         return TableCell(found)
@@ -222,12 +252,24 @@ def _cell(view: View, rows: list[LongRow], column: str) -> TableCell:
     return TableCell(text, emphasis=WORDS.get(text.partition(" (")[0], "") if decides else "")
 
 
-def _to_one_decimal(row: LongRow) -> dict[str, str]:
-    """Error and uncertainties of a check in the shown unit, to the same decimal."""
-    if row.part != "check" or row.value is None or row.sd is None:
-        return {}
-    found = (scale(row.unit) * v for v in (_TWO * row.sd, row.value, row.sd))
-    return dict(zip(("expanded", "value", "sd"), to_decimal_of(*found), strict=True))
+def _read(view: View, value: float | None, unit: str) -> str:
+    """A number with its unit, as the view shows it."""
+    if value is None or not view.unit:
+        return with_unit(value, unit)
+    return f"{significant(_shown(unit, view.unit)[1](value))} {view.unit}"
+
+
+def _to_decimal(view: View, row: LongRow, number: float | None, check: LongRow | None) -> str:
+    """A number of a check in the shown unit, to the decimal of two digits of 2 u_val; the terms of
+    u_val to one more. "" where that is no rule: a limit that it would change has its own digits.
+    """
+    turn = _shown(row.unit, view.unit)[1]
+    if check is None or check.sd is None or number is None or row.unit != check.unit or turn(0.0):
+        return ""
+    term = 0.1 if row.part.startswith("check.u_") else 1.0
+    found = to_decimal_of(term * turn(_TWO * check.sd), turn(number))[1]
+    changed = float(digits(found)) != float(f"{turn(number):.9g}")
+    return "" if row.part == "check.limit" and changed else found
 
 
 def _chosen(view: View, rows: list[LongRow], column: str) -> LongRow | None:
@@ -254,8 +296,7 @@ def _written(view: View, cell: TableCell, *, in_cell: bool) -> TableCell:
     if in_cell and not view.unit:
         told = f"{cell.text} {shown_unit(cell.unit)}".strip() if cell.text else ""
         return TableCell(told or with_unit(value, cell.unit))
-    text = "" if view.unit else cell.text
-    return TableCell(_shown(cell.unit, view.unit)[1](value), text=text)
+    return TableCell(_shown(cell.unit, view.unit)[1](value), text=cell.text)
 
 
 def _also(line: Mapping[str, list[LongRow]], name: str, first: LongRow) -> TableCell:
@@ -442,10 +483,10 @@ def _intervals(view: View, rows: Sequence[LongRow], table: LongTable) -> Interva
         names.append(": ".join(filter(None, _key(row, texts(view.x), table))))
         quantities.append(row.quantity)
         numbers.append((row.value, _TWO * row.sd, limit))
-        told = _to_one_decimal(row) or {"value": text(row.value, row.unit),
-                                        "expanded": text(_TWO * row.sd, row.unit)}  # fmt: skip
-        words.append((*(f"{told[c]} {shown_unit(row.unit)}".strip() for c in _NUMBERS[::2]),
-                      with_unit(limit, row.unit) if limit else MISSING,
+        unit = view.unit or shown_unit(row.unit)
+        told = ((v, _to_decimal(view, row, v, row)) for v in (row.value, _TWO * row.sd))
+        words.append((*(f"{t} {unit}".strip() if t else _read(view, v, row.unit) for v, t in told),
+                      _read(view, limit, row.unit) if limit else MISSING,
                       row.acceptance if limit else row.validation))  # fmt: skip
     value, half, most = np.array(numbers, dtype=float).reshape(-1, 3).T  # None becomes NaN
     return Intervals(view.name, view.title, tuple(names), value, half, most,
@@ -463,7 +504,7 @@ def _place(row: LongRow) -> tuple[str, ...]:
 def _sentence(view: View, row: LongRow, table: LongTable) -> str:
     columns = (*LongRow._fields, "name", "label")
     fields: dict[str, Any] = {c: _label(row, c, table) for c in columns}
-    fields |= {c: with_unit(_number(row, c), row.unit) for c in _NUMBERS}
+    fields |= {c: _read(view, _number(row, c), row.unit) for c in _NUMBERS}
     try:
         return view.text.format_map(fields)
     except (KeyError, ValueError, IndexError, AttributeError) as error:

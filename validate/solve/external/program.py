@@ -17,7 +17,7 @@ from pathlib import Path
 
 from validate.catalogue import shipped
 from validate.errors import UsageError
-from validate.plugins import Registry
+from validate.plugins import Registry, kind_fault
 
 # --- External simulators by name: `validate run NAME --external felupe`.
 
@@ -51,7 +51,7 @@ SIMULATORS: Registry[Simulator] = Registry(
         _shipped("sofa", "SOFA", "runSofa"),
     ),
     lambda simulator: simulator.name,
-    lambda part: "" if isinstance(part, Simulator) else f"{part!r}: expected a Simulator",
+    lambda part: kind_fault(part, Simulator),
 )
 
 

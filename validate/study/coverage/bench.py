@@ -18,10 +18,10 @@ from validate.pipeline.calibration.problem import Problem
 from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.case_solution import solve
+from validate.pipeline.run.case_solution import placed, solve
 from validate.pipeline.run.job import Job
 from validate.pipeline.run.method_run import MethodRun
-from validate.pipeline.run.pipeline import set_out
+from validate.pipeline.run.pipeline import PreparedRuns, set_out
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.observation import Drawable, Observation
 from validate.study.coverage.plan import ReadingCell, TermsCell, in_world, numbered, true_method
@@ -138,6 +138,7 @@ def opened_here(job: Job, identify: Identify = here) -> tuple[CoverageBench, Ope
         return found[number]
 
     out = set_out(*_judged(job), identify=once)
+    _require_drawable(out)
     out.runs.start(out.found.recordings)
     return CoverageBench(out.runs), Opening(key_of(job, "opening"), found)
 
@@ -151,10 +152,22 @@ def _judged(job: Job) -> tuple[Experiment, Options]:
     return experiment, Options(dict(job.values), names, job.quick)
 
 
+def _require_drawable(out: PreparedRuns) -> None:
+    """Raise `ComparisonError`, before anything is solved, for an observation whose noise cannot be
+    drawn again."""
+    of, runs = out.experiment, out.runs
+    for name in of.accepted:
+        _, registered = placed(of, out.found.recordings, runs.settings[name], runs.parameters)
+        for observation in (o for seen in registered for o in seen.compared):
+            drawable(observation)
+
+
 def drawable(o: Observation) -> Drawable:
     if not isinstance(o, Drawable):
         raise ComparisonError(
-            f"{o.name}: {type(o).__name__} cannot be drawn again; give it `left` and `anew`"
+            f"'{o.name}' is compared as {type(o).__name__}, whose noise cannot be drawn again "
+            "(it has no `left` and `anew`), so coverage is not known; take an experiment that "
+            "compares markers, outlines or signals, such as kf_cube or fluid_phantom"
         )
     return o
 

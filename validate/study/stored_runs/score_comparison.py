@@ -342,6 +342,12 @@ def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) 
         "; ".join(f"{r.name} ({r.created})" for r in found.runs),
         f"{len(found.rows)} scores of {len(found.runs)} runs, nothing was run again.",
     )
+    exhibits = comparison_exhibits(found)
+    return write_loose(told, exhibits, document, folder, "Comparison", found.warnings)
+
+
+def comparison_exhibits(found: SideBySide) -> tuple[Exhibit, ...]:
+    """Return pairs with their changes, the parameters that differ, and all scores as data."""
     shown, _, _ = pairs(found)
     drawn = (_pair(i, p) for i, p in enumerate(shown, 1))
     names = tuple(f"{r.name} {r.created}" for r in found.runs)
@@ -353,12 +359,11 @@ def write_comparison(found: SideBySide, document: dict[str, Any], folder: Path) 
     # Every score in every column, for the files
     values = {column: f"values.{i}" for i, column in enumerate(found.columns)}
     columns = {"method": "method", "score": "score", "unit": "unit", **values}
-    exhibits = (
+    return (
         *drawn,
         Exhibit("parameters", "Parameters", (), (differing,)),
         Exhibit("scores", "Scores", data=(table("scores", "Scores, SI.", found.rows, columns),)),
     )
-    return write_loose(told, exhibits, document, folder, "Comparison", found.warnings)
 
 
 _PAIR = {

@@ -239,6 +239,9 @@ def _table(name: str, kinds: tuple[OfKind, ...]) -> NumberTable:
     )
 
 
+_TWO_TICKS = 100.0  # ratio of an axis's ends from which two powers of ten lie on it for certain
+
+
 def _against(number: int, kind: OfKind) -> Chart:
     """Predicted over measured sizes, with the bands of both."""
     stated, unit = kind.stated, shown_unit(kind.covered.unit) or "1"
@@ -255,7 +258,7 @@ def _against(number: int, kind: OfKind) -> Chart:
     chart_ = chart(
         f"against_{number}", f"{kind.kind}: predicted against measured",
         (f"measured / {unit}", "measured"), (f"predicted / {unit}", "simulated"),
-        points=by_name, log="xy",
+        points=by_name, log="xy" if x[1] >= _TWO_TICKS * x[0] else "",
         caption="All counted checks. Bands: two standard deviations of the measurements, and of "
         "the models' scatter.",
     )  # fmt: skip
