@@ -17,9 +17,9 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import loaded_from
 from validate.pipeline.experiment.options import (
     Options,
-    added_simulators,
     all_methods,
     configure,
+    with_simulators,
 )
 
 _LONGEST = 60  # characters of what differs in a folder's name
@@ -51,7 +51,7 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
     Raises `UsageError` for unknown methods, paths and values.
     """
     loaded = loaded_from(experiment.path) if experiment.path else ()
-    file = next(iter(loaded), experiment)
+    file = with_simulators(loaded[0], options.simulators) if loaded else experiment
     declared = _settable(file, Options({}, (), options.quick))
     differing = sorted((c.path, c.value) for c in changed(declared, _settable(experiment, options)))
     methods = sorted(set(options.methods))
@@ -60,8 +60,7 @@ def differences(experiment: Experiment, options: Options) -> tuple[list[str], li
     case = [f"case_{options.case}"] * bool(options.case)
     words = ["quick"] * options.quick + case + ["methods"] * bool(methods)
     simulators = sorted(options.simulators)
-    simulated = added_simulators(experiment.methods, options.simulators)
-    added = sorted({*experiment.methods} - {*file.methods, *simulated})
+    added = sorted({*experiment.methods} - {*file.methods})
     if added and not methods:
         words.append("methods")
     other = {name: getattr(experiment, name) for name in ("accept", "accepted")
