@@ -400,12 +400,13 @@ def test_blocks_of_draws_that_fail_are_counted(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_cannot_be_drawn_again_is_refused_before_anything_is_solved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_data: Path
 ) -> None:
     def solved(*_: object, **__: object) -> None:
         raise AssertionError("it was to be refused first")
 
     monkeypatch.setattr(ExperimentRuns, "start", solved)
+    monkeypatch.setenv("VALIDATE_SHARED_DATA", str(shared_data))
     line = refused("study", "coverage", "hanging_bar", "--quick", "--out", str(tmp_path))
     assert "'drop' is compared as Drop" in line
     assert "take an experiment that compares" in line
