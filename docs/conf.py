@@ -33,6 +33,7 @@ os.environ["VALIDATE_DOCS"] = str(HERE)  # where a tutorial finds its log
 os.environ.pop("VALIDATE_SHARED_DATA", None)  # readers may not have it
 os.environ["PYTHONWARNINGS"] = "ignore:IProgress not found"  # tqdm's, without ipywidgets
 
+smartquotes = False  # they would break options in prose
 html_theme = "pydata_sphinx_theme"
 html_title = "validate"
 html_static_path = ["static"]

@@ -139,7 +139,8 @@ def test_latex_escapes_and_is_a_whole_table() -> None:
     (tabular,) = (n for n in nodes if isinstance(n, LatexEnvironmentNode))
     assert tabular.environmentname == "tabular"
     inside = tabular.latex_verbatim().splitlines()
-    assert {line.replace(r"\&", "").count("&") for line in inside if "&" in line} == {10}
+    rows = [re.sub(r"(?<!\\)%.*|\\&", "", line) for line in inside]
+    assert {row.count("&") for row in rows if "&" in row} == {9}
 
 
 def test_latex_typesets_it(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.tables import stored_folder
-from validate.report.stored.views import stored_views
+from validate.report.stored.views import pictures, plain_name, stored_views
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
@@ -50,14 +50,19 @@ def export(
 
 def _figures(run: Path, folder: Path) -> None:
     """Every view, chart and table of a stored run by its name: charts as SVG and PDF for one column
-    (85 mm) and two (175 mm), tables as CSV and LaTeX, still pictures as the run has them."""
+    (85 mm) and two (175 mm), tables as CSV and LaTeX, pictures as they are and in SVG and PDF.
+    """
     from validate.report.charts.style import COLUMNS  # matplotlib takes half a second
+    from validate.report.stored.figures import figure_of_file
 
     table = read_table(run, *NOT_SHOWN)
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     found = tuple(stored_views(run, table))
-    count = len(COLUMNS) * sum(len(drawable(exhibit)) for _, _, exhibit in found)
+    drawn = {plain_name(part.name) for _, _, exhibit in found for part in drawable(exhibit)}
+    others = pictures(run).items() if run.is_dir() else ()
+    images = [file for name, file in others if name not in drawn]
+    count = len(images) + len(COLUMNS) * sum(len(drawable(exhibit)) for _, _, exhibit in found)
     written: list[Path] = []
     with progress(f"{table.head['experiment']}: figures") as report:
         numbers = itertools.count(1)
@@ -72,9 +77,13 @@ def _figures(run: Path, folder: Path) -> None:
             for suffix in (".csv", ".tex") if len(exhibit.tables) == 1 else ():
                 written.append(folder / f"{safe_name(name)}{suffix}")
                 save(replace(exhibit, charts=(), heats=(), intervals=()), table, written[-1])
-    for picture in sorted(run.glob("figures/body*.png")) if run.is_dir() else ():
-        written.append(folder / picture.name)
-        written[-1].write_bytes(picture.read_bytes())
+        for file in images:
+            report(next(numbers) - 1, count, f"{file.stem}, as it is")
+            written.append(folder / file.name)
+            written[-1].write_bytes(file.read_bytes())
+            for suffix in (".svg", ".pdf"):
+                written.append(folder / f"{file.stem}{suffix}")
+                figure_of_file(file).savefig(written[-1])
     names = {file.name for file in written}
     gone = _exported(folder) - names
     for name in gone:

@@ -7,9 +7,18 @@ from validate.commands.screen import rows
 from validate.errors import UsageError
 from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.tables import stored_folder
-from validate.report.stored.views import exhibit_of, shown_by_name
+from validate.report.stored.views import exhibit_of, pictures, shown_by_name
 from validate.report.views.drawers import save, terminal
 from validate.study.stored_runs.score_comparison import read_table
+
+
+def picture(file: Path, out: Path) -> None:
+    """Write a stored picture as .svg, .pdf or .png; raises `UsageError` for another suffix."""
+    if out.suffix not in (".svg", ".pdf", ".png"):
+        raise UsageError(f"{out}: a picture is written as .svg, .pdf or .png")
+    from validate.report.stored.figures import figure_of_file
+
+    figure_of_file(file).savefig(out)
 
 
 def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | None) -> None:
@@ -24,7 +33,11 @@ def show(run: str, names: tuple[str, ...], reports: Path | None, out: Path | Non
         if len(names) != 1:
             known = ", ".join(shown_by_name(folder, table))
             raise UsageError(f"-o takes one view, not {len(names)}; name one of {known}")
-        save(views[0], table, out)
+        file = pictures(folder).get(names[0]) if folder.is_dir() else None
+        if file is not None and not (views[0].charts or views[0].tables or views[0].intervals):
+            picture(file, out)
+        else:
+            save(views[0], table, out)
         say(f"{relative(out)}: {out.stat().st_size / 1e3:.1f} kB")
         return
     screen = console()

@@ -218,7 +218,8 @@ def _clock(found: Difference, shown: RecordedMotion | None) -> Cause | None:
         "clock", shares[best],
         f"the recorded motion comes {1e3 * abs(lag):.3g} ms "
         f"{'later' if lag > 0 else 'earlier'} than the simulated one",
-        "`validate align` the files, or set motion.start; tap the body once so that both record it",
+        "put the files on one clock (validate align), or set motion.start; tap the body once so "
+        "that both record it",
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ _WORDS = (
     "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
     "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
     "peak of the external simulator's largest process; for our method it is the peak of the "
-    "whole `validate` process until then."
+    "whole process until then."
 )
 
 

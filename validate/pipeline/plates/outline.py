@@ -119,7 +119,7 @@ def _instants(
         raise ComparisonError(
             f"'{card.topic}': {len(own)} of {len(contours.t)} outlines lie within the "
             f"{stage.t[0]:.3f}..{stage.t[-1]:.3f} s of the log up to its limit; 2 are needed: "
-            f"`validate align` their clocks"
+            f"put them on one clock (validate align)"
         )
     d = np.interp(own, stage.t, stage.y[:, 0])
     first = int(np.abs(d).argmin())

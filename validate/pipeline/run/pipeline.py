@@ -30,7 +30,7 @@ from validate.pipeline.calibration.calibrated import (
     with_inputs,
 )
 from validate.pipeline.calibration.problem import Calibrated
-from validate.pipeline.calibration.sentences import predicted
+from validate.pipeline.calibration.sentences import fitted_sentence
 from validate.pipeline.checks.checks import checks_of, effects_of, joint_inputs, variants_of
 from validate.pipeline.checks.consistency import consistency_scores
 from validate.pipeline.checks.likely_causes import Difference, Failed, difference_of, explained_by
@@ -116,8 +116,9 @@ def set_out(
     parameters, methods = configure(experiment, options)
     cases = chosen_cases(experiment, options)
     found = opened(experiment, parameters)
-    declared = _settings(experiment.parameters, experiment.methods)
-    differing = changed(declared, _settings(parameters, methods))
+    declared = experiment.quick(experiment.parameters) if options.quick else experiment.parameters
+    shipped_settings = _settings(declared, experiment.methods)
+    differing = changed(shipped_settings, _settings(parameters, methods))
     experiment = _following(experiment, found, differing)
     shipped, parameters = found.recordings, found.parameters
     if report:
@@ -228,10 +229,9 @@ def _compared(
         title=experiment.title,
         source=experiment.source,
         sentence=("With warnings on the input; " if warnings else "")
-        + (f"{identified.headline}; " if identified and identified.headline else "")
-        + (f"{predicted(results)}. " if out.fitted else "")
         + verdict_sentence(results, runs.kind, quick=options.quick)
         + because
+        + fitted_sentence(identified.headline if identified else "", out.fitted, results)
         + figures_sentence(published),
         parameters=parameters_used,
         methods=results,

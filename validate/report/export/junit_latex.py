@@ -2,11 +2,12 @@
 
 import re
 from dataclasses import replace
+from itertools import zip_longest
 from xml.etree import ElementTree
 
 from validate.compare.exhibit import Entry, NumberTable, TableCell
 from validate.numbers import MISSING, significant
-from validate.report.export.tables import shown, word_columns
+from validate.report.export.tables import sheet, word_columns
 from validate.report.stored.json_values import Json
 
 _FAILS = ("not good enough", "undecided", "differs", "no answer", "nothing compared")
@@ -124,21 +125,25 @@ def _clean(text: str) -> str:
 
 
 def tabular(table: NumberTable, remark: str = "") -> str:
-    """Return a table as LaTeX's `tabular` (no package is needed), entries as a page shows them."""
+    """Return a table as LaTeX's `tabular` (no package is needed), entries as a page shows them; the
+    words that stand below a row there are comments."""
+    found = sheet(replace(table, rows=tuple(tuple(map(_unmarked, row)) for row in table.rows)))
     words = word_columns(table)
-    columns = "".join("l" if i in words else "r" for i in range(len(table.headings)))
-    rows = [" & ".join(map(_entry, map(_text, row))) for row in table.rows]
+    columns = "".join("l" if i in words else "r" for i in found.columns)
+    said = (f" % {' '.join(words.split())}" if words else "" for words in found.below)
+    rows = [f"{' & '.join(map(_entry, row))} \\\\{after}"
+            for row, after in zip_longest(found.texts, said, fillvalue="")]  # fmt: skip
     return "\n".join((
         f"% {' '.join((remark or table.title).split())}",
         rf"\begin{{tabular}}{{{columns}}}", r"\hline",
-        " & ".join(_escaped(h) for h in table.headings) + r" \\", r"\hline",
-        *(row + r" \\" for row in rows), r"\hline", r"\end{tabular}", "",
+        " & ".join(_escaped(table.headings[i]) for i in found.columns) + r" \\", r"\hline",
+        *rows, r"\hline", r"\end{tabular}", "",
     ))  # fmt: skip
 
 
-def _text(entry: Entry | TableCell) -> str:
-    """As a page shows it, without the sign of an emphasis."""
-    return shown(replace(entry, emphasis="") if isinstance(entry, TableCell) else entry)
+def _unmarked(entry: Entry | TableCell) -> Entry | TableCell:
+    """Without an emphasis, so without its sign."""
+    return replace(entry, emphasis="") if isinstance(entry, TableCell) else entry
 
 
 def _entry(text: str) -> str:

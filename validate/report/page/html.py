@@ -24,7 +24,7 @@ from validate.compare.result import Result
 from validate.files import safe_name
 from validate.numbers import duration, with_unit
 from validate.report.charts.encode import uri
-from validate.report.charts.intervals import shares
+from validate.report.charts.intervals import order, reach, shares
 from validate.report.charts.style import DPI
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import caption, sheet, shown, word_columns
@@ -33,7 +33,6 @@ from validate.report.sections.observations import timed, where_shown
 from validate.report.views.view_filling import WORDS
 
 _SHRUNK = 0.47  # CSS pixels a pixel: letters of 8.5 points at 130 dots an inch are 7 high then
-_FAR = 3.0  # shares of the limit that a track shows; what lies beyond ends in an arrow
 _LONG = 420  # letters of a sentence that are shown at once: four lines
 #: Sections that a reader opens: how the numbers came about, and long lists.
 CLOSED = ("discrimination", "body", "scores", "registration", "recording", "parameters", "made",
@@ -138,14 +137,12 @@ def cost(result: Result) -> str:
 def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
     """Return intervals as lines of HTML; `links` leads from a quantity to its picture."""
     share, half, of = shares(found)
-    reach = float(np.abs(share).max(initial=0.0) + half.max(initial=0.0))
-    far = float(np.clip(1.15 * reach, 1.2, _FAR)) if np.isfinite(reach) else _FAR
+    far = reach(share, half)
     left = -far if (share - half < 0).any() else 0.0
 
     def place(x: float) -> float:
         return round(100 * (float(np.clip(x, left, far)) - left) / (far - left), 2)
 
-    order = np.argsort(-(np.abs(share) + half), kind="stable")
     common = {label.partition(": ")[0] for label in found.labels if ": " in label}
     prefix = f"{common.pop()}: " if len(common) == 1 else ""
     lines = tuple(
@@ -156,7 +153,7 @@ def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
             place(share[i]), _beyond(share[i], far), found.texts[i], found.answers[i],
             WORDS.get(found.answers[i], "open"),
         )
-        for i in order.tolist()
+        for i in order(found)
     )  # fmt: skip
     start = place(-1.0)
     name = f"intervals_{found.name}"

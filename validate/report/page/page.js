@@ -132,8 +132,15 @@
       const every = Math.ceil((ticks.some(v => v < 0) ? 2 : 1) * count / 7);
       return ticks.map((v, i) => v === 0 || powers[i] % every === 0 ? v : null);
     };
+    const roomy = (u, ticks) => { // of an axis about zero: zero, then the largest ones that have room
+      const kept = [], at = v => u.valToPos(v, "y");
+      for (const v of [...decades(u, ticks)].filter(v => v != null).sort((a, b) => (b === 0) - (a === 0) || Math.abs(b) - Math.abs(a))) {
+        if (kept.every(k => Math.abs(at(k) - at(v)) > 20)) kept.push(v);
+      }
+      return ticks.map(v => kept.includes(v) ? v : null);
+    };
     const axis = (label, name) => {
-      const filter = found.log.includes(name) || (name === "y" && found.linear) ? { filter: decades } : {};
+      const filter = name === "y" && found.linear ? { filter: roomy } : found.log.includes(name) ? { filter: decades } : {};
       return { label, stroke: ink, labelSize: 22, ...filter, grid: { stroke: style("--line"), width: 1, ...filter },
         ticks: { stroke: style("--line"), width: 1, ...filter }, values: (u, ticks) => ticks.map(v => v == null ? "" : shown(v)) };
     };
@@ -639,17 +646,24 @@
     if (frames > 1) row.append(make("label", {}, "Load or time "), slider, output);
     else row.append(output);
     const choice = make("div", { class: "controls" }), more = make("div", { class: "controls" });
+    const colours = select("Colour", [...names], state.by, v => { state.by = v; }), by = colours.querySelector("select");
     if (methods.length > 1) {
       const beside = select("beside", [[-1, "none"], ...labels], -1, v => { state.other = Number(v); });
       const others = beside.querySelector("select");
-      const apart = () => { // a method does not stand beside itself
-        for (const option of others.options) option.hidden = option.disabled = option.value === String(state.method);
+      const apart = () => { // a method stands neither beside itself nor differs from itself, or on another mesh
+        const out = (option, gone) => { option.hidden = option.disabled = gone; };
+        for (const option of others.options) out(option, option.value === String(state.method));
         if (state.other === state.method) others.value = String(state.other = -1);
+        for (const option of by.options) {
+          const other = option.value.startsWith("difference ") && methods[Number(option.value.slice(11))];
+          out(option, Boolean(other) && (other === methods[state.method] || other.packed !== methods[state.method].packed));
+        }
+        if (by.selectedOptions[0].disabled) by.value = state.by = "displacement";
       };
       choice.append(select("Method", labels, 0, v => { state.method = Number(v); apart(); }), beside);
       apart();
     }
-    choice.append(select("Colour", [...names], state.by, v => { state.by = v; }));
+    choice.append(colours);
     more.append(select("Displacements", [[1, "true"], [2, "2 times"], [5, "5 times"], [10, "10 times"], [0, "none"]], 1,
       v => { state.scale = Number(v); }));
     if (methods.some(m => m.markers)) {

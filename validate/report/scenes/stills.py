@@ -68,9 +68,7 @@ Rows = tuple[tuple[_Cell, ...], ...]
 def _rows(scene: BodyScene, coloured: Sequence[str], most: int) -> Rows:
     """Instants of the displacement but those at rest, then fields at the largest one: `most` panels
     in a row."""
-    moved = np.abs(scene.methods[0].u()).max(axis=(1, 2))
-    there = np.flatnonzero(moved > _AT_REST * moved.max())
-    frames = [(f, _DISPLACEMENT) for f in there.tolist() or range(len(scene.labels))]
+    frames = [(f, _DISPLACEMENT) for f in _moved(scene)]
     hidden = scene.cut is not None and any(m.markers for m in scene.methods)
     at_worst = [(scene.worst, name) for name in (*[_ERROR] * hidden, *coloured)]
     if len(scene.methods) == 1:
@@ -84,6 +82,13 @@ def _rows(scene: BodyScene, coloured: Sequence[str], most: int) -> Rows:
         (*(_Cell(f, m, by) for m in shown), *([] if other is None else [_Cell(f, 0, by, other)]))
         for f, by in (*frames, *at_worst)
     )
+
+
+def _moved(scene: BodyScene) -> list[int]:
+    """The instants at which the body is not at rest; all where it never moves."""
+    moved = np.abs(scene.methods[0].u()).max(axis=(1, 2))
+    there = np.flatnonzero(moved > _AT_REST * moved.max())
+    return there.tolist() or list(range(len(scene.labels)))
 
 
 @dataclass(frozen=True)
@@ -187,7 +192,8 @@ def picture(drawn: Sheet, width: float) -> Picture:
 def _caption(drawn: Sheet) -> str:
     scene = drawn.scene
     names = ", ".join(m.result.label for m in scene.methods)
-    found = [f"{names} at {', '.join(scene.labels)}, true to scale: displacement in mm"]
+    labels = ", ".join(scene.labels[f] for f in _moved(scene))
+    found = [f"{names} at {labels}, true to scale: displacement in mm"]
     if drawn.coloured:
         found[0] += f"; {' and '.join(drawn.coloured)} at the largest displacement"
     found += [w for w in _notes(drawn) if w not in found]

@@ -4,7 +4,7 @@ These are plain data that every drawer takes; nothing here draws.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -342,7 +342,8 @@ def _chart(view: View, rows: Sequence[LongRow], table: LongTable) -> Chart | Non
             series.append(Series(label, x, y - band, "band", y + band, of))
         marked = view.form == "points" or label == MEASURED
         series.append(Series(label, x, y, "points" if marked else "line", of=of))
-    drawn, hidden = _apart(series)
+    checked = {label for m in table.methods if m.accepted for label in (m.name, m.label)}
+    drawn, hidden = _apart(series, checked)
     quantity = _common(r.quantity for r in rows) or "value"
     quantity = f"{quantity} − {view.less}" if view.less else quantity
     return Chart(
@@ -352,9 +353,11 @@ def _chart(view: View, rows: Sequence[LongRow], table: LongTable) -> Chart | Non
     )  # fmt: skip
 
 
-def _apart(series: list[Series]) -> tuple[tuple[Series, ...], str]:
-    """The series without lines that lie on another, and a sentence that names these."""
+def _apart(series: list[Series], checked: Collection[str]) -> tuple[tuple[Series, ...], str]:
+    """The series without lines that lie on another, and a sentence that names these; a line of a
+    checked method is the one that stays."""
     lines = [s for s in series if s.style == "line"]
+    lines.sort(key=lambda s: s.label not in checked)
     span = max((float(np.ptp(s.y)) for s in lines), default=0.0)
     drawn: list[Series] = []
     hidden = []

@@ -51,8 +51,9 @@ def words(choice: Choice) -> Iterator[str]:
         limit = SAME_TIME * (choice.pick.time_s or 0.0)
         rows = [r for r in _judged(choice) if (r.time_s or 0.0) <= limit]
         equal = meeting(rows, choice.wanted, choice.by, dynamic)
-        best = min(equal, key=lambda r: error_of(r, choice.by) or 0.0, default=choice.pick)
-        if best is not choice.pick:
+        own = choice.pick
+        best = min(equal, key=lambda r: error_of(r, choice.by) or 0.0, default=own)
+        if (best.solver, best.element, best.level) != (own.solver, own.element, own.level):
             yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
     else:
         yield f"Nothing meets both {asked}."

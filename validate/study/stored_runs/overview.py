@@ -106,7 +106,7 @@ def write_overview(reports: Path) -> Path:
     tables = (_table(found), *_pages(reports))
     exhibit = Exhibit("runs", "Stored runs", (), tables, _trends(found))
     told = ("overview", "All stored runs", reports.resolve().name,
-            f"{len(found)} stored runs: {counted}.")  # fmt: skip
+            f"{len(found)} stored run{'s' if len(found) != 1 else ''}: {counted}.")  # fmt: skip
     members = [
         {"folder": s.folder, "created": s.runs[-1].created, "verdict": s.verdict,
          "largest_share_of_limit": share(s.runs[-1]), "changed": s.changed}
