@@ -14,6 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
+from numpy.typing import ArrayLike
+
 from validate.plugins import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -144,6 +146,7 @@ def _plain(text: str) -> str:
         text = re.sub(rf"numpy\.ndarray\[[^\]]*\], numpy\.dtype\[numpy\.{dtype}\]\]", name, text)
     text = re.sub(r" at 0x[0-9a-f]+", "", text)
     text = re.sub(r"\*<class '([\w.]+)'>", r"Unpack[\1]", text)
+    text = re.sub(r"<class '([\w.]+)'>", r"\1", text).replace(str(ArrayLike), "ArrayLike")
     return re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z_])", "", text)
 
 

@@ -194,7 +194,9 @@ def test_json_on_standard_output_is_one_document(tmp_path: Path) -> None:
         "run", "fluid_phantom", "--json", "--methods", "p1_dry", "--out", str(tmp_path), *COARSE
     )
     assert json.loads(done.stdout)["experiment"] == "fluid_phantom"
-    lines = done.stderr.splitlines()  # progress, where it took long: at most one in ten seconds
+    first, *lines = done.stderr.splitlines()
+    assert first.startswith("validate: none of the chosen methods is accepted")
+    # Progress, where it took long: at most one in ten seconds.
     assert all(line.startswith("fluid_phantom: ") for line in lines)
 
 

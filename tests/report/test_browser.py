@@ -582,6 +582,8 @@ def test_no_serious_barrier(browser: str, report: Path, tmp_path: Path, scheme: 
     page = tmp_path / "with_axe.html"
     page.write_text(report.read_text().replace("</body>", f"<script>{axe}</script></body>"))
     action = """found.dark = matchMedia("(prefers-color-scheme: dark)").matches;
+      for (const one of document.querySelectorAll("details")) one.open = true;
+      await wait(200);
       const told = await axe.run({resultTypes: ["violations"]});
       found.barriers = told.violations.filter(v => ["serious", "critical"].includes(v.impact))
         .map(v => [v.id, v.nodes.map(n => n.html.slice(0, 120))]);"""
