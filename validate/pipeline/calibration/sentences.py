@@ -42,12 +42,10 @@ def unit_of(one: Calibrated, path: str) -> str:
     return {p.path: p.unit for p in describe(one.problem.parts[0].parameters)}[path]
 
 
-def fitted_sentence(
-    headline: str, fitted: Sequence[Calibrated], results: Sequence[MethodResult]
-) -> str:
-    """Return what was fitted, and what is therefore predicted; "" where nothing was."""
-    said = "; ".join(filter(None, (headline, predicted(results) if fitted else "")))
-    return f" {said[0].upper()}{said[1:]}." if said else ""
+def fitted_sentence(opening: str, results: Sequence[MethodResult]) -> str:
+    """Return what was fitted, and what is therefore predicted."""
+    said = "; ".join(filter(None, (opening, predicted(results))))
+    return f" {said[0].upper()}{said[1:]}."
 
 
 def predicted(results: Sequence[MethodResult]) -> str:

@@ -218,8 +218,9 @@ def free(
 class Identified:
     """Result of an identification: parameters to use, scores, and sentences of the report.
 
-    `headline` opens the verdict. `calibrated` names the residuals (a quantity, or quantity@load)
-    whose data served: checks on them are fitted, and no evidence. `doubts` of what was given are
+    `headline` opens the verdict, or tells behind it what was fitted. `calibrated` names the
+    residuals (a quantity, or quantity@load) whose data served: checks on them are fitted, and no
+    evidence. `doubts` of what was given are
     shown as warnings. `values` are the identified values with their budgets; `inputs` and `mesh`
     stand in place of those declared, since each moves what was identified, too (None: as declared).
     """

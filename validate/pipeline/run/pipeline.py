@@ -224,14 +224,16 @@ def _compared(
     )
     named = experiment.specimen or (lambda _: experiment.name)
     declared = experiment.uncertainty.inputs if experiment.uncertainty else ()
+    headline = identified.headline if identified else ""
     return Result(
         name=experiment.name,
         title=experiment.title,
         source=experiment.source,
         sentence=("With warnings on the input; " if warnings else "")
+        + (f"{headline}; " if headline and not out.fitted else "")
         + verdict_sentence(results, runs.kind, quick=options.quick)
         + because
-        + fitted_sentence(identified.headline if identified else "", out.fitted, results)
+        + (fitted_sentence(headline, results) if out.fitted else "")
         + figures_sentence(published),
         parameters=parameters_used,
         methods=results,
