@@ -1,4 +1,4 @@
-"""Table of external simulators beside the checked method: error, verdict, rate and memory."""
+"""Table of external simulators and internal methods: error, verdict, rate and memory."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ _WORDS = (
     "All use the u_val of the accepted method: its measurement, inputs and mesh error. The "
     "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
     "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
-    "peak of the external simulator's largest process; for our method it is the peak of the "
+    "peak of the external simulator's largest process; for our methods it is the peak of the "
     "whole process until then."
 )
 
@@ -33,15 +33,14 @@ def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tu
         return ()
     accepted = [n for n in runs.experiment.accepted if n in main][:1]
     terms = {k: t for n in accepted for _, one in terms_of(runs, main[n]) for k, t in one.items()}
-    theirs = [r for n in simulators for r in _rows(main[n], runs.methods[n].settings, terms)]
-    ours = [r for n in accepted for r in _rows(main[n], runs.methods[n].settings, terms)]
-    checks = dict.fromkeys(r[2] for r in theirs)  # ours before theirs, check by check
-    rows = [r for name in checks for r in (*ours, *theirs) if r[2] == name]
+    made = {n: _rows(f, runs.methods[n].settings, terms) for n, f in main.items()}
+    checks = {row[2] for n in simulators for row in made[n]}  # ours are shown beside theirs alone
+    rows = [row for own in made.values() for row in own if row[2] in checks]
     said = []
     for name in simulators:
         lines = dict.fromkeys(line for run in main[name].runs for line in run.said)
         said += [(main[name].label, s) for s in lines if not s.startswith("external: ")]
-    tables = [NumberTable(_NAME, "External simulators and the checked method", _HEAD, tuple(rows))]
+    tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
     if said:
         head = ("simulator", "deviations and failures")
         tables.append(NumberTable("external_findings", "Findings", head, tuple(said)))
@@ -51,7 +50,7 @@ def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tu
 def _rows(
     f: MethodRun, settings: Any, terms: Mapping[str, Terms]
 ) -> list[tuple[TableCell | float | str | None, ...]]:
-    """A row a check; one alone where it was not run, or has nothing that is checked."""
+    """A row a check; one alone where an external one was not run, or has nothing checked."""
     run, external = f.run, isinstance(settings, ExternalSimulator)
     named = [line.removeprefix("external: ") for line in run.said if line.startswith("external: ")]
     program = next(iter(named), "-") if external else _OURS
@@ -60,6 +59,8 @@ def _rows(
     end = run.outcome.state + (f": {run.outcome.why}" if run.outcome.why else "")
     cost = (rate, memory, end)
     judged = [t.judge(f.residuals[k]) for k, t in terms.items() if k in f.residuals]
+    if not judged and not external:
+        return []
     if not judged or not run.finished:
         return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
     return [
