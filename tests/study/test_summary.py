@@ -16,6 +16,7 @@ from validate.checksums import sealed, unsealed
 from validate.errors import UsageError
 from validate.report.export import parquet
 from validate.report.export.table_file import stored_table, write_long_table
+from validate.report.export.tables import shown
 from validate.study.stored_runs.predictions import predictions, stored_runs
 from validate.study.stored_runs.summary import _ROWS, Summary, _against, _points, document, summary
 
@@ -286,6 +287,15 @@ def test_a_page_shows_the_largest_errors_and_a_file_all(tmp_path: Path) -> None:
     assert {row[1] for row in data.rows} - {row[1] for row in page.rows} == {
         f"force@{i}mm" for i in range(1, 6)
     }
+
+
+def test_an_error_and_its_u_val_have_one_decimal(tmp_path: Path) -> None:
+    stored(tmp_path, "a", check(10.123))
+    page, _ = _points("predictions", summary(tmp_path).kinds)
+    (row,) = page.rows
+    texts = [shown(row[page.headings.index(name)]) for name in ("E", "u_val")]
+    decimals = {len(text.partition(" ")[0].partition(".")[2]) for text in texts}
+    assert len(decimals) == 1, texts
 
 
 def test_a_summary_loads_no_solver_and_no_kernel(tmp_path: Path) -> None:

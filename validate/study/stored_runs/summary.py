@@ -12,7 +12,7 @@ from validate.arrays import Floats
 from validate.compare.bias import Estimated, Predicted, Statement, area_metric, statement
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series, TableCell
 from validate.errors import UsageError
-from validate.numbers import scale, shown_unit, significant, text, with_unit
+from validate.numbers import scale, shown_unit, significant, text, to_decimal_of, with_unit
 from validate.report.stored.json_values import Json
 from validate.report.views.records import Shown, chart, grouped, table, value
 from validate.study.loose_page import write_loose
@@ -295,8 +295,8 @@ def _points(name: str, kinds: tuple[OfKind, ...]) -> tuple[NumberTable, NumberTa
     columns: Mapping[str, Shown] = {
         "experiment": "experiment", "check": "check", "specimen": "specimen",
         "measured": _with_unit("measured"), "predicted": _with_unit("simulated"),
-        "ratio / 1": lambda p: p.simulated / p.measured, "E": _with_unit("error"),
-        "u_val": _with_unit("u_val"), "area": _with_unit(area_of), "verdict": "verdict",
+        "ratio / 1": lambda p: p.simulated / p.measured, "E": _rounded("error"),
+        "u_val": _rounded("u_val"), "area": _with_unit(area_of), "verdict": "verdict",
         "runs": lambda p: ", ".join(p.folders),
     }  # fmt: skip
     page = table("", words, (p for p in points if p in largest), columns, note, below="runs")
@@ -306,6 +306,17 @@ def _points(name: str, kinds: tuple[OfKind, ...]) -> tuple[NumberTable, NumberTa
 def _with_unit(of: Shown) -> Shown:
     """Each number with the unit of its prediction."""
     return lambda p: TableCell(value(p, of), p.unit, with_unit(value(p, of), p.unit))
+
+
+def _rounded(of: Shown) -> Shown:
+    """Each number with its unit, to the decimal of two digits of u_val."""
+
+    def shown(p: Any) -> TableCell:
+        number, by = value(p, of), scale(p.unit)
+        words = f"{to_decimal_of(by * p.u_val, by * number)[1]} {shown_unit(p.unit)}"
+        return TableCell(number, p.unit, words.strip())
+
+    return shown
 
 
 def _more(name: str, count: int, which: str) -> str:
