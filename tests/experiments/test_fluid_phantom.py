@@ -119,6 +119,7 @@ def test_a_quick_run_has_a_banner_and_no_published_verdicts(phantom: Experiment)
     result = compare(phantom, Options({}, ("p2_fluid",), quick=True))
     assert result.quick
     assert result.published == ()
+    assert result.changed == ()  # what --quick changes is none of the user's changes
     assert "quick run" in result.sentence
 
 

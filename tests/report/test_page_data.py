@@ -144,6 +144,13 @@ def test_a_line_lies_where_its_share_is() -> None:
     assert near.wide == pytest.approx(0.5 * (one - zero), abs=0.03)
 
 
+def test_what_decides_stands_above_what_was_fitted() -> None:
+    values, ones = np.array([3.0, 0.1, 0.5]), np.ones(3)
+    answers = ("fitted", "good enough", "undecided")
+    shown = Intervals("limits", "L", ("a", "b", "c"), values, 0.1 * ones, ones, ("",) * 3, answers)
+    assert [line.label for line in forest(shown, {}).lines] == ["c", "b", "a"]
+
+
 # --- the body -------------------------------------------------------------------------------------
 
 

@@ -152,6 +152,8 @@ def test_lines_that_coincide_are_named_once() -> None:
     (chart,) = filled(view, table(*rows, *same)).charts
     assert [s.label for s in chart.series] == ["measured", "Kalman filter"]
     assert "again (on Kalman filter)" in chart.caption
+    before = filled(view, table(*same, *rows)).charts[0]  # a checked method is the one that stays
+    assert {s.label for s in before.series} == {"measured", "Kalman filter"}
 
 
 def test_an_axis_has_one_unit_and_x_is_a_number() -> None:
