@@ -160,15 +160,11 @@ def _factor(unit: str, quantity: str) -> float | None:
     if _PRODUCT.fullmatch(text) is None:
         return None
     if quantity == "strain":
-        return _ratio(text)
+        # mm/mm and its like; pint's other numbers (turn, count, ppm) are no strain
+        over, slash, under = text.partition("/")
+        top, bottom = _convert(over.strip(), "metre"), _convert(under.strip(), "metre")
+        return top / bottom if slash and top is not None and bottom is not None else None
     return _convert(text, _SI[quantity])
-
-
-def _ratio(text: str) -> float | None:
-    """mm/mm and its like; pint's other numbers (turn, count, ppm) are no strain."""
-    over, slash, under = text.partition("/")
-    top, bottom = _convert(over.strip(), "metre"), _convert(under.strip(), "metre")
-    return top / bottom if slash and top is not None and bottom is not None else None
 
 
 def _spelling(unit: str) -> str:

@@ -55,17 +55,6 @@ def calibrate(
             f"a pixel would be {1e3 * size:.4g} mm wide, above {1e3 * _LARGEST:g} mm: check the "
             "unit of the targets"
         )
-    _told(seen, found, frames)
-    frame = probe.partition("To")[0] or probe
-    placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
-    metadata = {**recording.metadata, f"image_plane/{topic}": _record(seen, found, frames)}
-    streams = {**recording.frames, topic: placed}
-    done = replace(recording, frames=streams, metadata=metadata)
-    write_recording(done, out)
-    written(done, out)
-
-
-def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
     table(
         f"{len(seen.px)} points in {len(np.unique(seen.image))} images",
         ["target", "points", "rms error, mm"],
@@ -81,6 +70,13 @@ def _told(seen: SeenPoints, found: ImagePlane, frames: Frames) -> None:
             f"{1e3 * wide:.3g} mm, "
             f"largest at '{far[0]}': check for swapped targets and for the frame of the targets"
         )
+    frame = probe.partition("To")[0] or probe
+    placed = replace(frames, m_per_px=found.m_per_px, pose=found.pose.matrix, frame=frame)
+    metadata = {**recording.metadata, f"image_plane/{topic}": _record(seen, found, frames)}
+    streams = {**recording.frames, topic: placed}
+    done = replace(recording, frames=streams, metadata=metadata)
+    write_recording(done, out)
+    written(done, out)
 
 
 def _record(seen: SeenPoints, found: ImagePlane, frames: Frames) -> dict[str, str]:

@@ -47,7 +47,22 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
     if as_json:
         print(json.dumps(document(found), allow_nan=False, ensure_ascii=False, indent=1))
     else:
-        _show(found, everything=wanted.everything)
+        # The largest change first, then pairs of methods and parameters, on one screen
+        everything = wanted.everything
+        columns = width(sys.stdout)
+        warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
+        head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
+        parameters = _parameters(found, columns, everything=everything)
+        shown, more, unseen = pairs(found, every=everything)
+        room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
+        lines, rows, drawn = _pairs(shown, columns, room)
+        for line in (*head, *lines, *parameters):
+            say(line)
+        more += len(shown) - drawn
+        left = sum(len(p.rows) for p in shown) - rows
+        counts = {"scores": left, "pairs of methods": more, "scores without a pair": unseen}
+        if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
+            say(f"left out: {what}; --all, --method, --score or --json show them")
     if out or not as_json:
         page = _drawn(found, paths, wanted, out)
         if page and not as_json:
@@ -73,24 +88,6 @@ def _drawn(
         complain(f"no charts: {error}")
         return None
     return write_comparison(found, document(found), folder)
-
-
-def _show(found: SideBySide, *, everything: bool) -> None:
-    """The largest change first, then pairs of methods and parameters, on one screen."""
-    columns = width(sys.stdout)
-    warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
-    head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
-    parameters = _parameters(found, columns, everything=everything)
-    shown, more, unseen = pairs(found, every=everything)
-    room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
-    lines, rows, drawn = _pairs(shown, columns, room)
-    for line in (*head, *lines, *parameters):
-        say(line)
-    more += len(shown) - drawn
-    left = sum(len(p.rows) for p in shown) - rows
-    counts = {"scores": left, "pairs of methods": more, "scores without a pair": unseen}
-    if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
-        say(f"left out: {what}; --all, --method, --score or --json show them")
 
 
 def _headline(found: SideBySide) -> str:

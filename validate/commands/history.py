@@ -50,17 +50,13 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
     count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     say(f"{name}: {count} below {relative(reports)}")
     for i, run in enumerate(runs):
-        _run(i + 1, run)
+        when = run.created[:16].replace("T", " ")
+        gone = ", replaced" if "replaced" in run.line else ""
+        say(f"\n{(i + 1)}. {when} UTC, {run.folder}{gone}: {run.verdict}", "bold", "   ")
+        say(f"   differs: {_differs(run)}; commit {run.commit}", indent="     ")
+        say(f"   figures: {_figures(run)}", indent="     ")
         if i:
             _since(i, changes[i - 1])
-
-
-def _run(number: int, run: PastRun) -> None:
-    when = run.created[:16].replace("T", " ")
-    gone = ", replaced" if "replaced" in run.line else ""
-    say(f"\n{number}. {when} UTC, {run.folder}{gone}: {run.verdict}", "bold", "   ")
-    say(f"   differs: {_differs(run)}; commit {run.commit}", indent="     ")
-    say(f"   figures: {_figures(run)}", indent="     ")
 
 
 def _differs(run: PastRun) -> str:

@@ -49,7 +49,23 @@ def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "sc
             ]
         )
     else:
-        _in_full(experiment)
+        say(f"{experiment.name}: {experiment.title}", "bold")
+        say(experiment.source)
+        rows_ = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
+        table("Parameters", ["path", "default", "description (type)"], rows_)
+        methods = [
+            [k, m.label, "checked" if k in experiment.accepted else ""]
+            for k, m in experiment.methods.items()
+        ]
+        table("Methods", ["name", "what", ""], methods)
+        required = [
+            [a.quantity, ", ".join(a.loads) or "all", a.statistic,
+             "none" if a.required is None else f"{a.required:g}", a.why]
+            for a in experiment.accept
+        ]  # fmt: skip
+        table("Requirements", ["quantity", "at", "statistic", "limit (SI)", "why"], required)
+        known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
+        table("Expected verdicts", ["method", "check", "verdict", "why"], known)
 
 
 def declare(name: str, named: tuple[Path, ...]) -> None:
@@ -99,26 +115,6 @@ def _details(experiment: Experiment) -> dict[str, Any]:
         "seed": experiment.seed,
         "kind": experiment.declared_kind,
     }
-
-
-def _in_full(experiment: Experiment) -> None:
-    say(f"{experiment.name}: {experiment.title}", "bold")
-    say(experiment.source)
-    rows_ = [[p.path, _default(p), f"{p.doc} ({p.type})"] for p in parameters_of(experiment)]
-    table("Parameters", ["path", "default", "description (type)"], rows_)
-    methods = [
-        [k, m.label, "checked" if k in experiment.accepted else ""]
-        for k, m in experiment.methods.items()
-    ]
-    table("Methods", ["name", "what", ""], methods)
-    required = [
-        [a.quantity, ", ".join(a.loads) or "all", a.statistic,
-         "none" if a.required is None else f"{a.required:g}", a.why]
-        for a in experiment.accept
-    ]  # fmt: skip
-    table("Requirements", ["quantity", "at", "statistic", "limit (SI)", "why"], required)
-    known = [[e.method, e.check, e.verdict, e.why] for e in experiment.expected]
-    table("Expected verdicts", ["method", "check", "verdict", "why"], known)
 
 
 def _block(title: str, cells: Sequence[Sequence[str]], keep: int) -> Passage:

@@ -68,7 +68,16 @@ def show_run(
         detail,
     )
     if verbose:
-        _in_full(result)
+        # Every check with both answers, every notice of a method, every printed figure
+        print_views(
+            table_of(result, document(result, ""), result.name), "checks", "published", "settings"
+        )
+        for method in result.methods:
+            for words in dict.fromkeys(w for r in method.runs for w in r.said):
+                say(f"{method.name}: {words}", indent="  ")
+        for value in result.identified_values:
+            say(f"{sentence(value)}.", indent="  ")
+        say(f"\n{result.sentence}")
         say(end)
 
 
@@ -150,7 +159,17 @@ def _identified(result: Result) -> tuple[str, ...]:
 
 def _ranking(result: Result) -> Passage | None:
     """Methods by the error that decides, with their rates; None where fewer than two have it."""
-    by = _ranked_by(result)
+    # The score that most methods share: of the worst check where two have it, else over time
+    counts = Counter(s.name for m in result.methods for s in m.scores)
+    worst = [c["name"] for c in worst_first(_checks(result))[:1]]
+    over_time = [n for n in counts if n.endswith((".rmse", ".rms")) and "@" not in n]
+    at_load_ = [n for n in counts if ".rms@" in n]
+    sizes = {n: median(abs(s.value) for m in result.methods for s in m.scores if s.name == n)
+             for n in over_time}  # fmt: skip
+    over_time.sort(key=lambda n: (-counts[n], -sizes[n]))
+    first = [*over_time, *worst] if _filters(result) else [*worst, *over_time]
+    names = [*first, *sorted(at_load_, key=lambda n: -counts[n])]
+    by = next((n for n in names if counts[n] > 1), None)
     if by is None:
         return None
     scored = [(m, s) for m in result.methods for s in m.scores if s.name == by]
@@ -174,20 +193,6 @@ def _ranking(result: Result) -> Passage | None:
     title = cut(f"Methods by {quantity}{where}, against {against}", width())
     lines = rows(["", "error", "rate", "p99 of a step"], cells)
     return Passage(title, lines, 4, _FIRST + 1, "more methods: --verbose")
-
-
-def _ranked_by(result: Result) -> str | None:
-    """The score that most methods share: of the worst check where two have it, else over time."""
-    counts = Counter(s.name for m in result.methods for s in m.scores)
-    worst = [c["name"] for c in worst_first(_checks(result))[:1]]
-    over_time = [n for n in counts if n.endswith((".rmse", ".rms")) and "@" not in n]
-    at_load_ = [n for n in counts if ".rms@" in n]
-    sizes = {n: median(abs(s.value) for m in result.methods for s in m.scores if s.name == n)
-             for n in over_time}  # fmt: skip
-    over_time.sort(key=lambda n: (-counts[n], -sizes[n]))
-    first = [*over_time, *worst] if _filters(result) else [*worst, *over_time]
-    names = [*first, *sorted(at_load_, key=lambda n: -counts[n])]
-    return next((n for n in names if counts[n] > 1), None)
 
 
 def _speed(run: Run) -> tuple[str, str]:
@@ -243,16 +248,3 @@ def _filters(result: Result) -> bool:
 
 
 # --- in full --------------------------------------------------------------------------------------
-
-
-def _in_full(result: Result) -> None:
-    """Every check with both answers, every notice of a method, every printed figure."""
-    print_views(
-        table_of(result, document(result, ""), result.name), "checks", "published", "settings"
-    )
-    for method in result.methods:
-        for words in dict.fromkeys(w for r in method.runs for w in r.said):
-            say(f"{method.name}: {words}", indent="  ")
-    for value in result.identified_values:
-        say(f"{sentence(value)}.", indent="  ")
-    say(f"\n{result.sentence}")

@@ -167,7 +167,16 @@ def judge_all(checks: Sequence[Check]) -> Overall:
         if c.validation in ("differs", "not distinguishable")
     ]  # fmt: skip
     differing = [c for c in tested if c.validation == "differs"]
-    levels = _holm(tested)
+    # The level that rejects, by the name of every comparison that is rejected
+    smallest: dict[str, float] = {}
+    for c in tested:
+        smallest[c.name] = min(c.p_value, smallest.get(c.name, 1.0))
+    levels: dict[str, float] = {}
+    for rank, name in enumerate(sorted(smallest, key=lambda name: smallest[name])):
+        level = ALPHA / (len(smallest) - rank)
+        if not smallest[name] < level:
+            break
+        levels[name] = level
     rejected = [c.p_value < levels.get(c.name, 0.0) for c in differing]
     total = len({c.name for c in checks})
     return Overall(
@@ -182,20 +191,6 @@ def judge_all(checks: Sequence[Check]) -> Overall:
         total=total,
         again=len(checks) - total,
     )
-
-
-def _holm(checks: Sequence[Check]) -> dict[str, float]:
-    """The level that rejects, by the name of every comparison that is rejected."""
-    smallest: dict[str, float] = {}
-    for c in checks:
-        smallest[c.name] = min(c.p_value, smallest.get(c.name, 1.0))
-    levels: dict[str, float] = {}
-    for rank, name in enumerate(sorted(smallest, key=lambda name: smallest[name])):
-        level = ALPHA / (len(smallest) - rank)
-        if not smallest[name] < level:
-            break
-        levels[name] = level
-    return levels
 
 
 def correction(checks: Iterable[Check], tested: int = 0) -> str:

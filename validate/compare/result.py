@@ -77,21 +77,18 @@ def _uses(recording: Recording, registered: Sequence[Registered]) -> Iterator[St
     roles = {o.name: _ROLES[o.role] for seen in registered for o in seen.observations}
     found_in = {c.images: k for k, c in recording.contours.items() if c.images and k in roles}
     for topic, stream in recording.streams.items():
-        use = _use(topic, stream, roles, found_in)
+        # What a stream is used for; empty where it is not
+        if topic in found_in:
+            use = f"source of the outlines '{found_in[topic]}'"
+        else:
+            made = isinstance(stream, Contours) and stream.images
+            end = f"; extracted from the images '{made}', not as recorded" if made else ""
+            use = f"{roles[topic]}{end}" if topic in roles else ""
         why = use or _why_not(stream, recording, roles)
         kind = next(name for kind, name in _KINDS if isinstance(stream, kind))
         yield StreamUse(recording.name, topic, kind, bool(use), why)
     for topic, why in recording.unread.items():
         yield StreamUse(recording.name, topic, "not read", False, why)
-
-
-def _use(topic: str, stream: Stream, roles: Mapping[str, str], found_in: Mapping[str, str]) -> str:
-    """What a stream is used for; empty where it is not."""
-    if topic in found_in:
-        return f"source of the outlines '{found_in[topic]}'"
-    made = isinstance(stream, Contours) and stream.images
-    end = f"; extracted from the images '{made}', not as recorded" if made else ""
-    return f"{roles[topic]}{end}" if topic in roles else ""
 
 
 def _why_not(stream: Stream, recording: Recording, roles: Mapping[str, str]) -> str:

@@ -5,7 +5,7 @@ import os
 import tempfile
 from asyncio import CancelledError
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from time import sleep
@@ -206,7 +206,13 @@ class Drain:
             batch = queue.take(1 if self._deaths else size)
             if not batch:
                 return
-            self._send(batch, workers, alone=suspect)
+            # In turn: on the first worker while it is there, so that one machine measures all
+            on = list(workers if self._ahead else workers[:1])
+            future = self._client.submit(
+                run_batch, self._plan.open, self._plan.run, self._plan.job, batch, pure=False,
+                workers=on, allow_other_workers=False,
+            )  # fmt: skip
+            self._sent.append(_Sent(future, batch, frozenset(on), suspect))
             if suspect:
                 return
 
@@ -260,15 +266,6 @@ class Drain:
             return 1
         size = int(TASK_S * self._finished / self._spent)
         return max(1, min(size, waiting // most))
-
-    def _send(self, batch: Batch, workers: Sequence[str], *, alone: bool) -> None:
-        """In turn: on the first worker while it is there, so that one machine measures all."""
-        on = list(workers if self._ahead else workers[:1])
-        future = self._client.submit(
-            run_batch, self._plan.open, self._plan.run, self._plan.job, batch, pure=False,
-            workers=on, allow_other_workers=False,
-        )  # fmt: skip
-        self._sent.append(_Sent(future, batch, frozenset(on), alone))
 
     def _collect(self, one: _Sent, queue: Queue) -> bool:
         """Takes the records that proven code made; others are asked for again, of all workers.

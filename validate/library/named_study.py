@@ -96,7 +96,20 @@ def study(
     if kind == "choose" and not {"error", "rate"} <= given.keys():
         raise UsageError('study "choose": give error, as "0.5mm", and rate, as "100Hz"')
     where = Where(0 if workers == 1 and not scheduler else workers, scheduler)
-    command = _command(kind, experiment, given, quick=quick)
+    # The words of the same command
+    name = str(experiment.name if isinstance(experiment, Experiment) else experiment)
+    words = [*(() if kind == "identify" else ("study",)), kind, name, *["--quick"] * quick]
+    for key, value in given.items():
+        option, plain = _WORDS.get(key, f"--{key}"), _plain(key, value)
+        if key == _SET:
+            words += set_words(plain)
+        elif key in _EACH:
+            words += [word for one in plain for word in (option, one)]
+        elif isinstance(plain, bool):
+            words += [option] * plain
+        else:
+            words += [option, ",".join(plain) if isinstance(plain, tuple) else str(plain)]
+    command = tuple(words)
     command += () if out is None else ("--out", str(out))
     settings = StudySettings(None if out is None else Path(out), quick, where, command)
     found = run(load(experiment), settings, **{_NAMES.get(k, k): _plain(k, v)
@@ -111,22 +124,3 @@ def _plain(name: str, value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(value)
     return value
-
-
-def _command(
-    kind: str, experiment: str | Path | Experiment, given: Mapping[str, Any], *, quick: bool
-) -> tuple[str, ...]:
-    """The words of the same command."""
-    name = str(experiment.name if isinstance(experiment, Experiment) else experiment)
-    words = [*(() if kind == "identify" else ("study",)), kind, name, *["--quick"] * quick]
-    for key, value in given.items():
-        option, plain = _WORDS.get(key, f"--{key}"), _plain(key, value)
-        if key == _SET:
-            words += set_words(plain)
-        elif key in _EACH:
-            words += [word for one in plain for word in (option, one)]
-        elif isinstance(plain, bool):
-            words += [option] * plain
-        else:
-            words += [option, ",".join(plain) if isinstance(plain, tuple) else str(plain)]
-    return tuple(words)

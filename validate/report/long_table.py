@@ -130,7 +130,11 @@ def long_table(
     Raises `KeyError` or `TypeError` for what is no results.json of a run.
     """
     found = residuals or {}
-    experiment, recording = str(content["experiment"]), _recording(content)
+    names = dict.fromkeys(str(d["recording"]) for d in content.get("domain", ()))
+    experiment, recording = (
+        str(content["experiment"]),
+        ("all" if len(names) > 1 else next(iter(names), "")),
+    )
     one = LongRow(run, experiment, recording, variation=_variation(content))
     rows: list[LongRow] = []
     for method in content["methods"]:
@@ -151,7 +155,11 @@ def long_table(
             part=block.row.part or SAMPLE,
         )  # fmt: skip
         rows += replace(block, row=own).rows()
-    return LongTable(_head(content), tuple(rows))
+    methods = [{k: m[k] for k in _METHOD if k in m} for m in content["methods"]]
+    figures = [{k: v for k, v in p.items() if k not in _PRINTED}
+               for p in content.get("published", ())]  # fmt: skip
+    head = {k: content[k] for k in _HEAD if k in content}
+    return LongTable({**head, "methods": methods, "published": figures}, tuple(rows))
 
 
 def traces_of(content: Json, run: str) -> Iterator[LongRow]:
@@ -168,20 +176,6 @@ def traces_of(content: Json, run: str) -> Iterator[LongRow]:
                 row = named(of, name, trace["unit"])
                 block = (a for a in zip(made["t"], trace["y"], strict=True) if None not in a)
                 yield from (row._replace(at=at, value=value) for at, value in block)
-
-
-def _head(content: Json) -> Json:
-    methods = [{k: m[k] for k in _METHOD if k in m} for m in content["methods"]]
-    figures = [{k: v for k, v in p.items() if k not in _PRINTED}
-               for p in content.get("published", ())]  # fmt: skip
-    head = {k: content[k] for k in _HEAD if k in content}
-    return {**head, "methods": methods, "published": figures}
-
-
-def _recording(content: Json) -> str:
-    """The name of the only recording; "all" where numbers rest on several."""
-    names = dict.fromkeys(str(d["recording"]) for d in content.get("domain", ()))
-    return "all" if len(names) > 1 else next(iter(names), "")
 
 
 def _variation(content: Json) -> str:
@@ -291,7 +285,12 @@ def content_of(table: LongTable) -> Json:
          "checks": [_without(c) for c in checks if c["method"] == m["name"]]}
         for m in table.head["methods"]
     ]  # fmt: skip
-    return {**table.head, "methods": methods, "published": _figures_of(table)}
+    figures: list[Json] = [p | dict.fromkeys(_PRINTED) for p in table.head.get("published", ())]
+    for row in table.where(part="published*").rows:
+        key = row.part.removeprefix("published").removeprefix(".") or "ours"
+        if key in _PRINTED:
+            figures[row.point or 0][key] = row.value
+    return {**table.head, "methods": methods, "published": figures}
 
 
 def _without(member: Json) -> Json:
@@ -341,12 +340,3 @@ def _scores_of(rows: Iterable[LongRow]) -> Iterator[Json]:
             }  # fmt: skip
     if score:
         yield score
-
-
-def _figures_of(table: LongTable) -> list[Json]:
-    figures: list[Json] = [p | dict.fromkeys(_PRINTED) for p in table.head.get("published", ())]
-    for row in table.where(part="published*").rows:
-        key = row.part.removeprefix("published").removeprefix(".") or "ours"
-        if key in _PRINTED:
-            figures[row.point or 0][key] = row.value
-    return figures

@@ -78,7 +78,16 @@ def _dynamic(found: Answers) -> bool:
 
 
 def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Question]:
-    asked = _of_the_body(recording, found)
+    shape, file = found.get("body.shape"), found.get("body.file", "")
+    asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
+    if shape == "file":
+        asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (`validate "
+                              "body` fills a surface)", open=True, check=there,
+                              words=()))  # fmt: skip
+        if Path(file).suffix.lower() in FOREIGN:
+            asked.append(Question("body.unit", "unit of the file's lengths, as mm", open=True))
+    elif shape in ("block", "cylinder"):
+        asked.append(size_question(recording, shape))
     mesh = answered_mesh(found)
     asked += known_size("body.size", mesh, found.get("body.unit", "m"))
     asked += [
@@ -114,20 +123,6 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
             for k, text in words.items()
         ),
     ]
-
-
-def _of_the_body(recording: Recording, found: Answers) -> list[Question]:
-    shape, file = found.get("body.shape"), found.get("body.file", "")
-    asked = [Question("body.shape", "the body", open=True, choices=_SHAPES)]
-    if shape == "file":
-        asked.append(Question("body.file", "mesh file: npz, inp, msh, vtu, vtk (`validate "
-                              "body` fills a surface)", open=True, check=there,
-                              words=()))  # fmt: skip
-        if Path(file).suffix.lower() in FOREIGN:
-            asked.append(Question("body.unit", "unit of the file's lengths, as mm", open=True))
-    elif shape in ("block", "cylinder"):
-        asked.append(size_question(recording, shape))
-    return asked
 
 
 def _of_the_material(recording: Recording, found: Answers) -> list[Question]:

@@ -130,19 +130,15 @@ def name_levels(ax: Axes, chart: Chart) -> None:
         return
     ax.set_ylim(*ax.get_ylim())  # the names belong to these limits
     to_axes = (ax.transData + ax.transAxes.inverted()).transform
-    at = _apart([(float(to_axes((1.0, y))[1]), name.count("\n") + 1) for name, y in shown])
+    # Rising heights of names of so many lines, each above the one below
+    names = [(float(to_axes((1.0, y))[1]), name.count("\n") + 1) for name, y in shown]
+    at: list[float] = []
+    for i, (height, lines) in enumerate(names):
+        gap = _LINE * (lines + names[i - 1][1]) / 2 + 0.02 if i else 0.0
+        at.append(max(height, at[-1] + gap) if at else height)
     for (name, _), height in zip(shown, at, strict=True):
         ax.text(1.012, height, name, transform=ax.transAxes, va="center", fontsize=8.5,
                 linespacing=1.05, color="#404040")  # fmt: skip
-
-
-def _apart(names: list[tuple[float, int]]) -> list[float]:
-    """Rising heights of names of so many lines, each above the one below."""
-    found: list[float] = []
-    for i, (height, lines) in enumerate(names):
-        gap = _LINE * (lines + names[i - 1][1]) / 2 + 0.02 if i else 0.0
-        found.append(max(height, found[-1] + gap) if found else height)
-    return found
 
 
 # --- ticks ---------------------------------------------------------------------------------------
@@ -150,22 +146,27 @@ def _apart(names: list[tuple[float, int]]) -> list[float]:
 
 def readable(ax: Axes, chart: Chart, most: int = 6) -> None:
     """Plain numbers on logarithmic axes of ordinary size; at most some `most` ticks an axis."""
-    _about_constants(ax)
-    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
-        if name == "y" and chart.linear:
-            _both_signs(axis, chart.linear, most)
-        elif name in chart.log:
-            _logarithmic(axis, most)
-        else:
-            axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
-
-
-def _about_constants(ax: Axes) -> None:
-    """A y that differs by rounding only is constant: it gets room about it, no digits to differ."""
+    # A y that differs by rounding only is constant: it gets room about it, no digits to differ
     low, high = ax.get_ylim()
     size = max(abs(low), abs(high))
     if high - low < _ROUNDING * size:
         ax.set_ylim(low - _ABOUT * size, high + _ABOUT * size)
+    for axis, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+        if name == "y" and chart.linear:
+            # Zero and powers of ten beyond the linear part, of both signs where there are both
+            low, high = axis.get_view_interval()
+            first = int(np.ceil(np.log10(chart.linear) + 1e-9))
+            last = int(np.floor(np.log10(max(-low, high, chart.linear))))
+            every = max(1, -(-2 * (last - first + 1) // most))
+            powers: Floats = 10.0 ** np.arange(last, first - 1, -every, dtype=np.float64)
+            ticks = [0.0, *(p for p in powers if p <= high), *(-p for p in powers if -p >= low)]
+            axis.set_major_locator(FixedLocator(sorted(ticks)))
+            axis.set_major_formatter(FuncFormatter(_plain))
+            axis.set_minor_locator(NullLocator())
+        elif name in chart.log:
+            _logarithmic(axis, most)
+        else:
+            axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
 
 
 def _logarithmic(axis: Axis, most: int) -> None:
@@ -186,16 +187,3 @@ def _logarithmic(axis: Axis, most: int) -> None:
 
 def _plain(value: float, _: int) -> str:
     return f"{value:g}".replace("-", "−")
-
-
-def _both_signs(axis: Axis, linear: float, most: int) -> None:
-    """Zero and powers of ten beyond the linear part, of both signs where there are both."""
-    low, high = axis.get_view_interval()
-    first = int(np.ceil(np.log10(linear) + 1e-9))
-    last = int(np.floor(np.log10(max(-low, high, linear))))
-    every = max(1, -(-2 * (last - first + 1) // most))
-    powers: Floats = 10.0 ** np.arange(last, first - 1, -every, dtype=np.float64)
-    ticks = [0.0, *(p for p in powers if p <= high), *(-p for p in powers if -p >= low)]
-    axis.set_major_locator(FixedLocator(sorted(ticks)))
-    axis.set_major_formatter(FuncFormatter(_plain))
-    axis.set_minor_locator(NullLocator())

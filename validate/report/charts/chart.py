@@ -50,17 +50,17 @@ def picture(result: HasMethods, chart: Chart) -> Picture:
     pixels = draw(*drawing(result, chart))
     names = "; ".join(dict.fromkeys(s.name for s in chart.series))
     scale = {"x": " Logarithmic x.", "y": " Logarithmic y.", "xy": " Logarithmic axes."}
-    words = " ".join(_sentence(w) for w in (chart.title, chart.caption, _undrawn(chart)) if w)
+    words = " ".join(
+        (w if w.endswith((".", "!", "?")) else f"{w}.")
+        for w in (chart.title, chart.caption, _undrawn(chart))
+        if w
+    )
     return Picture(
         f"chart_{chart.name}",
         f"{words} Upward: {chart.y}; across: {chart.x}.{scale.get(chart.log, '')}",
         f"Chart: {chart.title}; {chart.y} against {chart.x}: {names}.",
         pixels,
     )
-
-
-def _sentence(words: str) -> str:
-    return words if words.endswith((".", "!", "?")) else f"{words}."
 
 
 def _undrawn(chart: Chart) -> str:
@@ -79,7 +79,12 @@ def drawing(result: HasMethods, chart: Chart, width: float = WIDTH) -> Drawing:
     """Return the function that fills the figure, and its width and height in inches."""
     labels = panel_labels(chart)
     if labels:
-        return _one_each(result, chart, labels, width)
+        found = {name: alone(result, panel_series(chart, name, labels), name) for name in labels}
+        names = [*_common(found), *(name for name, _ in levels(chart))]
+        below = legend_height(_broken(names, width), width) if names else 0.0
+        rows = -(-len(labels) // _columns(labels))
+        height = _PANEL * rows + _ROOM + below
+        return lambda f: _panels(f, chart, found, names, width), width, height
     drawn = styled(result, chart.series)
     names = _drawn_names(chart, drawn)
     below = legend_height(_broken(names, width), width) if len(names) > 1 else 0.0
@@ -137,15 +142,6 @@ def _broken(names: Sequence[str], width: float) -> list[str]:
 
 
 # --- one axes a line -----------------------------------------------------------------------------
-
-
-def _one_each(result: HasMethods, chart: Chart, labels: tuple[str, ...], width: float) -> Drawing:
-    found = {name: alone(result, panel_series(chart, name, labels), name) for name in labels}
-    names = [*_common(found), *(name for name, _ in levels(chart))]
-    below = legend_height(_broken(names, width), width) if names else 0.0
-    rows = -(-len(labels) // _columns(labels))
-    height = _PANEL * rows + _ROOM + below
-    return lambda f: _panels(f, chart, found, names, width), width, height
 
 
 def _columns(labels: Sequence[str]) -> int:

@@ -2,7 +2,6 @@
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
@@ -51,9 +50,21 @@ def _fill(figure: Figure, heat: Heat, across: float) -> None:
     )
     shown = ax.imshow(heat.values, cmap=colours, norm=norm, aspect="auto", origin="lower")
     ax.grid(visible=False)
-    _texts(ax, heat)
+    for axis, texts in ((ax.xaxis, heat.columns), (ax.yaxis, heat.rows)):
+        every = -(-len(texts) // _TICKS)
+        at = list(range(0, len(texts), every))
+        axis.set_ticks(at, [_short(texts[i]) for i in at])
+    if max(len(_short(text)) for text in heat.columns) > 6:
+        ax.tick_params(axis="x", rotation=30)
+    ax.set(xlabel=heat.x, ylabel=heat.y)
     if across >= _LEGIBLE:
-        _numbers(ax, heat.values, shown)
+        # Black on light squares, white on dark ones
+        for (i, j), value in np.ndenumerate(heat.values):
+            if np.isfinite(value):
+                red, green, blue, _ = shown.to_rgba(np.array([value]))[0]
+                light = 0.299 * red + 0.587 * green + 0.114 * blue > 0.55
+                ax.text(j, i, significant(value), ha="center", va="center", fontsize=8,
+                        color="black" if light else "white")  # fmt: skip
     figure.colorbar(shown, ax=ax, label=heat.quantity)
 
 
@@ -79,29 +90,9 @@ def _logarithmic(values: Floats) -> bool:
     return bool(seen.size and seen.min() > 0)
 
 
-def _texts(ax: Axes, heat: Heat) -> None:
-    for axis, texts in ((ax.xaxis, heat.columns), (ax.yaxis, heat.rows)):
-        every = -(-len(texts) // _TICKS)
-        at = list(range(0, len(texts), every))
-        axis.set_ticks(at, [_short(texts[i]) for i in at])
-    if max(len(_short(text)) for text in heat.columns) > 6:
-        ax.tick_params(axis="x", rotation=30)
-    ax.set(xlabel=heat.x, ylabel=heat.y)
-
-
 def _short(text: str) -> str:
     """A number in three digits, any other text as it is."""
     try:
         return f"{float(text):.3g}"
     except ValueError:
         return text
-
-
-def _numbers(ax: Axes, values: Floats, shown: mpl.cm.ScalarMappable) -> None:
-    """Black on light squares, white on dark ones."""
-    for (i, j), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            red, green, blue, _ = shown.to_rgba(np.array([value]))[0]
-            light = 0.299 * red + 0.587 * green + 0.114 * blue > 0.55
-            ax.text(j, i, significant(value), ha="center", va="center", fontsize=8,
-                    color="black" if light else "white")  # fmt: skip

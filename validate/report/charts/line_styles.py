@@ -86,7 +86,19 @@ def alone(result: HasMethods, series: Sequence[Series], label: str) -> list[Draw
 def _of_lines(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
     known = _known(result)
     unknown = [s for s in series if s.label not in known and not is_given(s)]
-    mine = _apart([(s.label, known[s.label]) for s in series if s.label in known])
+    # By label the methods' styles; of two with one colour or dash the later takes a free one
+    named = [(s.label, known[s.label]) for s in series if s.label in known]
+    mine: dict[str, Style] = {}
+    for label, look in dict(named).items():
+        colours = {s.colour for s in mine.values()}
+        free = [c for c in (look.colour, *PALETTE) if c not in colours] or [look.colour]
+        other = replace(look, colour=free[0])
+        for i in range(1, len(PALETTE)):
+            if all(other.dash != s.dash for s in mine.values()):
+                break
+            turned = free_look(i, other.colour)
+            other = replace(other, dash=turned.dash, point=turned.point)
+        mine[label] = other
     taken = {look.colour for look in mine.values()}
     free = [c for c in PALETTE if c not in taken] or list(PALETTE)
     others = {id(s): free_look(i, free[i % len(free)]) for i, s in enumerate(unknown)}
@@ -101,22 +113,6 @@ def _of_lines(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
         )
         for s in series
     ]
-
-
-def _apart(named: Sequence[tuple[str, Style]]) -> dict[str, Style]:
-    """By label the methods' styles; of two with one colour or dash the later takes a free one."""
-    found: dict[str, Style] = {}
-    for label, look in dict(named).items():
-        colours = {s.colour for s in found.values()}
-        free = [c for c in (look.colour, *PALETTE) if c not in colours] or [look.colour]
-        other = replace(look, colour=free[0])
-        for i in range(1, len(PALETTE)):
-            if all(other.dash != s.dash for s in found.values()):
-                break
-            turned = free_look(i, other.colour)
-            other = replace(other, dash=turned.dash, point=turned.point)
-        found[label] = other
-    return found
 
 
 def _given(series: Series, shade: str) -> Style:

@@ -66,7 +66,12 @@ def _panel(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
         _edges(shown.x), edges, panel.codes, cmap=colours, norm=norm,
         edgecolors="white", linewidth=0.2,
     )  # fmt: skip
-    _hatch(ax, shown, panel)
+    # Strokes over the regimes that grey paper would not tell apart
+    x = _edges(shown.x)
+    for code, hatch in enumerate(_HATCHES[: len(shown.regimes)]):
+        for row, column in np.argwhere(panel.codes == code) if hatch else ():
+            ax.fill_between(x[column : column + 2], row - 0.5, row + 0.5, facecolor="none",
+                            edgecolor="#00000055", hatch=hatch, lw=0)  # fmt: skip
     span = _edges(shown.x)[[0, -1]]
     for row, at in enumerate(panel.border):
         if np.isfinite(at) and span[0] < at < span[1]:
@@ -77,15 +82,6 @@ def _panel(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
     ax.set(xlim=tuple(span), ylim=(edges[0], edges[-1]))
     ax.grid(visible=False)
     ax.minorticks_off()
-
-
-def _hatch(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
-    """Strokes over the regimes that grey paper would not tell apart."""
-    x = _edges(shown.x)
-    for code, hatch in enumerate(_HATCHES[: len(shown.regimes)]):
-        for row, column in np.argwhere(panel.codes == code) if hatch else ():
-            ax.fill_between(x[column : column + 2], row - 0.5, row + 0.5, facecolor="none",
-                            edgecolor="#00000055", hatch=hatch, lw=0)  # fmt: skip
 
 
 def _look(i: int, mark: Mark) -> dict[str, Any]:

@@ -129,20 +129,18 @@ def painted(
         canvas: Any = FigureCanvasAgg(figure)  # its methods carry no annotations
         paint(figure)
         if size != 1.0:
-            _resize(figure, size)
+            for text in figure.findobj(Text):
+                text.set_fontsize(size * float(text.get_fontsize()))
+            for line in figure.findobj(Line2D):
+                line.set_linewidth(size * line.get_linewidth())
+                line.set_markersize(size * line.get_markersize())
+            for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+                now: Any = axis.get_tick_params().get("labelsize", _LETTERS)
+                axis.set_tick_params(
+                    labelsize=size * now
+                )  # also of ticks that are still to be made
         canvas.draw()
     return figure
-
-
-def _resize(figure: Figure, size: float) -> None:
-    for text in figure.findobj(Text):
-        text.set_fontsize(size * float(text.get_fontsize()))
-    for line in figure.findobj(Line2D):
-        line.set_linewidth(size * line.get_linewidth())
-        line.set_markersize(size * line.get_markersize())
-    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
-        now: Any = axis.get_tick_params().get("labelsize", _LETTERS)
-        axis.set_tick_params(labelsize=size * now)  # also of ticks that are still to be made
 
 
 def panels(figure: Figure, count: int, columns: int) -> tuple[list[Axes], list[Axes]]:

@@ -33,7 +33,15 @@ def junit(content: Json) -> str:
     """
     name = _clean(str(content["experiment"]))
     root = ElementTree.Element("testsuites", name=name)
-    suites = [(f"{name}.verdict", [_verdict(content)])]
+    case = ElementTree.Element("testcase", name="all checks", classname=content["experiment"])
+    overall = content["overall"]
+    said = _clean(f"{overall['verdict']}, {overall['evidence']} of {overall['checks']} checks are "
+                  f"evidence; {' '.join(content['sentence'].split())}")  # fmt: skip
+    if content["passed"]:
+        ElementTree.SubElement(case, "system-out").text = said
+    else:
+        ElementTree.SubElement(case, "failure", message=said, type=overall["verdict"])
+    suites = [(f"{name}.verdict", [case])]
     suites += [(_clean(f"{name}.{m['name']}"), _cases(content, m)) for m in content["methods"]]
     suites += [
         (f"{name}.published", [_figure(p) for p in content["published"] if p.get("result", True)])
@@ -56,18 +64,6 @@ def _suite(
     suite = ElementTree.SubElement(root, "testsuite", name=name, timestamp=created)
     suite.attrib.update({key: str(value) for key, value in told.items()})
     suite.extend(cases)
-
-
-def _verdict(content: Json) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", name="all checks", classname=content["experiment"])
-    overall = content["overall"]
-    said = _clean(f"{overall['verdict']}, {overall['evidence']} of {overall['checks']} checks are "
-                  f"evidence; {' '.join(content['sentence'].split())}")  # fmt: skip
-    if content["passed"]:
-        ElementTree.SubElement(case, "system-out").text = said
-    else:
-        ElementTree.SubElement(case, "failure", message=said, type=overall["verdict"])
-    return case
 
 
 def _cases(content: Json, method: Json) -> list[ElementTree.Element]:

@@ -45,7 +45,14 @@ def _series(method: MethodResult, folder: Path) -> Path:
     entries = []
     for k, frame in enumerate(_chosen(len(run.u))):
         t = float(run.t[run.at[frame]])
-        body = pv.UnstructuredGrid(*_cells(scene), _three(scene.mesh.nodes))
+        # VTK's packed cells and their kinds; middles of edges stand as ours do. hex27: its
+        # corners.
+        mesh = scene.mesh
+        cells = mesh.cells[:, : _CORNERS.get(mesh.kind, mesh.cells.shape[1])]
+        packed = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
+        body = pv.UnstructuredGrid(
+            *(packed, np.full(len(cells), _VTK[mesh.kind])), _three(scene.mesh.nodes)
+        )
         _fill(body, scene, run, int(frame))
         entries.append((t, 0, _saved(body, parts / f"body_{k:04d}.vtu")))
         if seen is not None:
@@ -59,14 +66,6 @@ def _series(method: MethodResult, folder: Path) -> Path:
 
 def _chosen(count: int) -> Ints:
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int))
-
-
-def _cells(scene: Scene) -> tuple[Ints, Ints]:
-    """VTK's packed cells and their kinds; middles of edges stand as ours do. hex27: its corners."""
-    mesh = scene.mesh
-    cells = mesh.cells[:, : _CORNERS.get(mesh.kind, mesh.cells.shape[1])]
-    packed = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
-    return packed, np.full(len(cells), _VTK[mesh.kind])
 
 
 def _three(x: Floats) -> Floats:

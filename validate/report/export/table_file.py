@@ -9,7 +9,7 @@ import gzip
 import hashlib
 import json
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from io import BytesIO, StringIO
 from itertools import takewhile
 from pathlib import Path
@@ -45,19 +45,24 @@ def write_long_table(table: LongTable, folder: Path) -> Path:
     """Write the table into `folder`, but for traces, which results.json has; return its path."""
     text = json.dumps({SEAL: _BLANK, **table.head}, ensure_ascii=False, allow_nan=False)
     kept = [r for r in table.rows if r.part != TRACE]
-    groups = [[r for r in kept if _group(r.part) == i] for i in range(len(_LAST) + 1)]
+    groups = [
+        [r for r in kept if (_LAST.index(r.part) + 1 if r.part in _LAST else 0) == i]
+        for i in range(len(_LAST) + 1)
+    ]
     if parquet.available():
         path, data = folder / PARQUET, _sealed(parquet.parquet_bytes(text, groups))
     else:
-        plain = _sealed(_csv_text(text, [r for rows in groups for r in rows]).encode())
+        # The head, the columns' names, then a line a row; numbers in full precision
+        rows = [r for rows in groups for r in rows]
+        out = StringIO()
+        out.write(f"{text}\n")
+        writer = csv.writer(out)  # lines end in \r\n, as RFC 4180 says: only so is \r quoted
+        writer.writerow(LongRow._fields)
+        writer.writerows([repr(v) if isinstance(v, float) else v for v in row] for row in rows)
+        plain = _sealed(out.getvalue().encode())
         path, data = folder / CSV, gzip.compress(plain, 6, mtime=0)
     path.write_bytes(data)
     return path
-
-
-def _group(part: str) -> int:
-    """Which group of rows a part is in: those of many rows come last."""
-    return _LAST.index(part) + 1 if part in _LAST else 0
 
 
 def stored_table(folder: Path, **labels: Wanted) -> LongTable:
@@ -124,16 +129,6 @@ def _from_parquet(data: bytes, labels: Mapping[str, Wanted]) -> LongTable:
 
 
 # --- CSV ------------------------------------------------------------------------------------------
-
-
-def _csv_text(head: str, rows: Sequence[LongRow]) -> str:
-    """The head, the columns' names, then a line a row; numbers in full precision."""
-    out = StringIO()
-    out.write(f"{head}\n")
-    writer = csv.writer(out)  # lines end in \r\n, as RFC 4180 says: only so is \r quoted
-    writer.writerow(LongRow._fields)
-    writer.writerows([repr(v) if isinstance(v, float) else v for v in row] for row in rows)
-    return out.getvalue()
 
 
 def _from_csv(data: bytes, labels: Mapping[str, Wanted]) -> LongTable:

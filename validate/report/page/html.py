@@ -97,7 +97,16 @@ def page(
     colour, word = band
     shown = [e for e in exhibits if e.shown]
     first = first_pictures(shown)
-    links = _links(result, shown)
+    # The anchor of the picture that shows a compared quantity, by the quantity
+    figures = {picture.name for e in shown for picture in e.pictures}
+    anchors = {e.exhibit.anchor for e in shown}
+    links = {}
+    for quantity, section in where_shown(result).items():
+        curve = f"chart_curve_{quantity.replace('.', '_')}"
+        if curve in figures or "chart_curve" in figures:
+            links[quantity] = f"#figure-{curve if curve in figures else 'chart_curve'}"
+        if section in anchors:
+            links[quantity] = f"#{section}"
     live = Live(
         {f"chart_{c.name}": plot(result, c) for e in shown for c in e.exhibit.charts},
         {f"intervals_{i.name}": forest(i, links) for e in shown for i in e.exhibit.intervals},
@@ -164,20 +173,6 @@ def forest(found: Intervals, links: Mapping[str, str]) -> Forest:
 
 def _beyond(share: float, far: float) -> str:
     return "" if abs(share) <= far else "above" if share > 0 else "below"
-
-
-def _links(result: Result, exhibits: Iterable[DrawnExhibit]) -> dict[str, str]:
-    """The anchor of the picture that shows a compared quantity, by the quantity."""
-    figures = {picture.name for e in exhibits for picture in e.pictures}
-    anchors = {e.exhibit.anchor for e in exhibits}
-    found = {}
-    for quantity, section in where_shown(result).items():
-        curve = f"chart_curve_{quantity.replace('.', '_')}"
-        if curve in figures or "chart_curve" in figures:
-            found[quantity] = f"#figure-{curve if curve in figures else 'chart_curve'}"
-        if section in anchors:
-            found[quantity] = f"#{section}"
-    return found
 
 
 def fragment(exhibits: Iterable[DrawnExhibit]) -> str:

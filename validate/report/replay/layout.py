@@ -27,7 +27,11 @@ def layout(shown: Shown) -> str:
     panels: dict[str, Json] = {}
     tabs = [{"title": _title(view), "layout": _recording(view, tracks, panels)}
             for view, tracks in shown if tracks]  # fmt: skip
-    root = tabs[0]["layout"] if len(tabs) == 1 else _add(panels, "Tab", _tabs(tabs))
+    root = (
+        tabs[0]["layout"]
+        if len(tabs) == 1
+        else _add(panels, "Tab", {"activeTabIdx": 0, "tabs": tabs})
+    )
     found = {"configById": panels, "globalVariables": {}, "userNodes": {},
              "playbackConfig": {"speed": 1}, "layout": root}  # fmt: skip
     return json.dumps(found, indent=1, allow_nan=False) + "\n"
@@ -35,10 +39,6 @@ def layout(shown: Shown) -> str:
 
 def _title(view: ReplayView) -> str:
     return view.prefix[1:] or view.recording.name
-
-
-def _tabs(tabs: list[Json]) -> Json:
-    return {"activeTabIdx": 0, "tabs": tabs}
 
 
 def _add(panels: dict[str, Json], kind: str, config: Json) -> str:

@@ -35,7 +35,7 @@ from validate.recording.mcap.protobuf_messages import protobuf_schema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL
 from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
 from validate.report.replay import foxglove
-from validate.report.replay.layout import Shown, layout
+from validate.report.replay.layout import layout
 from validate.report.replay.signals import images, signals
 from validate.report.replay.space import markers, outlines, surface, transforms
 from validate.report.replay.view import ReplayView, Track, over_time
@@ -59,20 +59,16 @@ def write_replay(result: Result, path: Path) -> None:
     coarse = 1
     while True:
         shown = [(view, tracks(view)) for view in views(result, coarse)]
-        _write(result, path, shown, coarse)
+        found = tuple(t for _, tracks in shown for t in tracks)
+        channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
+        metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
+        metadata |= {name: values for t in found for name, values in t.records}
+        write_channels(path, channels, _in_time(found), metadata)
         if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
             break
         coarse *= 2
     if shown:
         path.with_suffix(".layout.json").write_text(layout(shown), "utf-8")
-
-
-def _write(result: Result, path: Path, shown: Shown, coarse: int) -> None:
-    found = tuple(t for _, tracks in shown for t in tracks)
-    channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
-    metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
-    metadata |= {name: values for t in found for name, values in t.records}
-    write_channels(path, channels, _in_time(found), metadata)
 
 
 def views(result: Result, coarse: int = 1) -> tuple[ReplayView, ...]:

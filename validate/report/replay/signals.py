@@ -21,7 +21,13 @@ _IMAGE_BYTES = 1_500_000  # of one stream of images, about
 def signals(view: ReplayView) -> list[Track]:
     """What drives as measured; every signal as compared, and the run's trace that predicts it."""
     drives, seen = view.registered.drives, scalar_signals(view.registered)
-    names = _names([*(d.name.strip("/") for d in drives), *(s.quantity for s in seen)])
+    # "force.plate" is "force" when nothing else is a force, else "force/plate"
+    quantities = [*(d.name.strip("/") for d in drives), *(s.quantity for s in seen)]
+    first = [q.split(".")[0] for q in quantities]
+    names = [
+        f if first.count(f) == 1 else q.replace(".", "/")
+        for f, q in zip(first, quantities, strict=True)
+    ]
     found = [
         replace(
             _signal(view, f"/{name}/measured", s.t, s.y, s.unit, s.sd), given=s.role == "drives"
@@ -34,15 +40,6 @@ def signals(view: ReplayView) -> list[Track]:
             simulated = f"/{name}/simulated"
             found.append(_signal(view, simulated, t, trace.y[:, None], trace.unit, 0.0))
     return found
-
-
-def _names(quantities: list[str]) -> list[str]:
-    """ "force.plate" is "force" when nothing else is a force, else "force/plate"."""
-    first = [q.split(".")[0] for q in quantities]
-    return [
-        f if first.count(f) == 1 else q.replace(".", "/")
-        for f, q in zip(first, quantities, strict=True)
-    ]
 
 
 def _signal(view: ReplayView, topic: str, t: Floats, y: Floats, unit: str, sd: float) -> Track:

@@ -47,9 +47,13 @@ def _view(
     ax: Axes, mesh: Mesh, eye: Floats, sets: Mapping[str, Ints], named: Mapping[str, int]
 ) -> None:
     polygons, facets = facing(mesh, eye)
+    # Greys (f, 3): the lighter the more a facet looks at the eye
+    x = mesh.nodes[facets]
+    normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    light = 0.66 + 0.28 * (normals @ eye) / np.linalg.norm(normals, axis=1)
     ax.add_collection(
         PolyCollection(
-            list(polygons), facecolors=_shades(mesh, facets, eye), edgecolors="#30303040",
+            list(polygons), facecolors=[(v, v, v) for v in light.tolist()], edgecolors="#30303040",
             linewidths=0.3,
         )
     )  # fmt: skip
@@ -67,11 +71,3 @@ def _view(
     ax.set_aspect("equal")
     ax.set_axis_off()
     triad(ax, eye)
-
-
-def _shades(mesh: Mesh, facets: Ints, eye: Floats) -> list[tuple[float, float, float]]:
-    """Greys (f, 3): the lighter the more a facet looks at the eye."""
-    x = mesh.nodes[facets]
-    normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    light = 0.66 + 0.28 * (normals @ eye) / np.linalg.norm(normals, axis=1)
-    return [(v, v, v) for v in light.tolist()]

@@ -192,7 +192,13 @@ def _named(frames: Frames, hold: Held) -> str:
 
 
 def _image_axes(ax: Axes, frames: Frames, hold: Held, lines: list[_ImageLine]) -> None:
-    _image(ax, frames, nearest_sample(frames.t, hold.t, "images"))
+    # Pixel centres at their image metres; rows count downward
+    i = nearest_sample(frames.t, hold.t, "images")
+    x, y = (_MM * side for side in frames.m_per_px)
+    height, width = frames.images[i].shape
+    extent = (-0.5 * x, (width - 0.5) * x, (height - 0.5) * y, -0.5 * y)
+    ax.imshow(frames.images[i], cmap="gray", vmin=0, vmax=255, extent=extent, aspect="equal")
+    ax.grid(visible=False)
     for line in lines:
         _line(ax, line)
     ax.set(xlabel="image x / mm", ylabel="image y / mm")
@@ -208,15 +214,6 @@ def _line(ax: Axes, line: _ImageLine) -> None:
     label = line.label if line.label not in known else None
     ax.plot(*line.points, color="black", lw=2.8, alpha=0.6)
     ax.plot(*line.points, color=line.colour, ls=line.dash, lw=1.4, label=label)
-
-
-def _image(ax: Axes, frames: Frames, i: int) -> None:
-    """Pixel centres at their image metres; rows count downward."""
-    x, y = (_MM * side for side in frames.m_per_px)
-    height, width = frames.images[i].shape
-    extent = (-0.5 * x, (width - 0.5) * x, (height - 0.5) * y, -0.5 * y)
-    ax.imshow(frames.images[i], cmap="gray", vmin=0, vmax=255, extent=extent, aspect="equal")
-    ax.grid(visible=False)
 
 
 def _marked(mark: PlaceSaid) -> _ImageLine:

@@ -1,6 +1,5 @@
 """Figures of a cavity's outlines in the image, measured and simulated."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -137,29 +136,21 @@ def _panels(figure: Figure, measured: _Outlines, judged: _Sections, drawn: list[
         ax.plot(*rest.T, color=_GREY, lw=0.8, label="measured at rest")
         ax.plot(*(_MM * measured.measured[i]).T, ".", color=MEASURED, ms=3, label="measured")
         for d in drawn if i == count - 1 else [judged]:
-            _section(ax, d, i)
+            look = d.look
+            ax.plot(*closed(d.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
+                    label=d.method.label)  # fmt: skip
         for corner in measured.seen.corners:
             _ring(ax, corner, measured.measured[i], MEASURED)
             _ring(ax, corner, judged.sections[i], judged.look.colour)
-        _image_axes(ax, (_MM * o for o in (*measured.measured, *judged.sections)))
+        # Axes in image coordinates with some room about all outlines (k, 2) mm; rows of an image
+        # count downward
+        everything = np.vstack([_MM * o for o in (*measured.measured, *judged.sections)])
+        (left, upper), (right, lower) = everything.min(axis=0) - 3, everything.max(axis=0) + 3
+        ax.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
+        ax.set(xlabel="image x / mm", ylabel="image y / mm")
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
         ax.label_outer()
     legend_below(figure, axes[-1])
-
-
-def _image_axes(ax: Axes, outlines: Iterable[Floats]) -> None:
-    """Axes in image coordinates with some room about all outlines (k, 2) mm; rows of an image
-    count downward."""
-    everything = np.vstack(list(outlines))
-    (left, upper), (right, lower) = everything.min(axis=0) - 3, everything.max(axis=0) + 3
-    ax.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
-    ax.set(xlabel="image x / mm", ylabel="image y / mm")
-
-
-def _section(ax: Axes, drawn: _Sections, i: int) -> None:
-    look = drawn.look
-    ax.plot(*closed(drawn.sections[i]).T, color=look.colour, ls=look.dash, lw=look.width,
-            label=drawn.method.label)  # fmt: skip
 
 
 def _ring(ax: Axes, corner: Corner, points: Floats, colour: str) -> None:
@@ -167,13 +158,12 @@ def _ring(ax: Axes, corner: Corner, points: Floats, colour: str) -> None:
     ax.plot(*at, "o", mfc="none", mec=colour, ms=8)
 
 
-def _residual(method: MethodResult, corner: Corner, hold: Held) -> Residual | None:
-    return method.residuals.get(f"{corner.quantity}@{hold.label}")
-
-
 def _corner_table(result: Result, loaded: tuple[Held, ...], corner: Corner) -> NumberTable | None:
     """What every method says of a corner beside what was measured."""
-    found = {m.label: [_residual(m, corner, h) for h in loaded] for m in result.methods}
+    found = {
+        m.label: [m.residuals.get(f"{corner.quantity}@{h.label}") for h in loaded]
+        for m in result.methods
+    }
     rows = {label: row for label, row in found.items() if any(row)}
     if not rows:
         return None
@@ -200,7 +190,8 @@ def _moved(residual: Residual | None, who: Literal["measured", "simulated"]) -> 
 def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Chart:
     """Distances from the measured points around the outline."""
     points, two = measured.measured[-1], np.full(2, 2 * _MM * measured.seen.sd)
-    angle = _angles(points)
+    away = points - enclosed(points)[1]
+    angle = np.asarray(np.rad2deg(np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi)))
     order = np.argsort(angle)
     band = Series("± 2 sd of one point", np.array([0.0, 360.0]), -two, "band", two)
     return Chart(
@@ -213,9 +204,3 @@ def _at_last(measured: _Outlines, drawn: list[_Sections]) -> Chart:
                  for d in drawn)),
         caption="Outward positive. Models whose line coincides with another are left out.",
     )  # fmt: skip
-
-
-def _angles(points: Floats) -> Floats:
-    """Polar angles (k,) degrees in the image about the middle of the area inside."""
-    away = points - enclosed(points)[1]
-    return np.asarray(np.rad2deg(np.mod(np.arctan2(away[:, 1], away[:, 0]), 2 * np.pi)))

@@ -40,7 +40,11 @@ def skins(scene: AnyScene, most: int) -> tuple[SurfacePart, ...]:
     walls = {c.name: flat_triangles(mesh.facets[c.facets]) for c in scene.cavities}
     six = mesh.surface.shape[1] == 6
     outside = flat_triangles(mesh.surface) if six else boundary_facets(mesh.simplices, 3)
-    parts = {OUTSIDE: _without(outside, list(walls.values())), **walls}
+    # `facets` that are in none of the `others`, whatever the order of their corners
+    others = list(walls.values())
+    taken = {tuple(f) for other in others for f in np.sort(other, axis=1).tolist()}
+    kept = [tuple(f) not in taken for f in np.sort(outside, axis=1).tolist()]
+    parts = {OUTSIDE: np.asarray(outside[np.array(kept)]), **walls}
     total = sum(len(t) for t in parts.values())
     share = min(1.0, most / total)
     return tuple(_skin(mesh, name, t, share) for name, t in parts.items() if len(t))
@@ -53,13 +57,6 @@ def flat_triangles(facets: Ints) -> Ints:
     middle = {frozenset(edge): 3 + i for i, edge in enumerate(EDGES[2])}
     a, b, c = (middle[frozenset(e)] for e in ((0, 1), (1, 2), (0, 2)))
     return facets[:, [[0, a, c], [a, 1, b], [c, b, 2], [a, b, c]]].reshape(-1, 3)
-
-
-def _without(facets: Ints, others: list[Ints]) -> Ints:
-    """`facets` that are in none of the `others`, whatever the order of their corners."""
-    taken = {tuple(f) for other in others for f in np.sort(other, axis=1).tolist()}
-    kept = [tuple(f) not in taken for f in np.sort(facets, axis=1).tolist()]
-    return np.asarray(facets[np.array(kept)])
 
 
 def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> SurfacePart:

@@ -184,12 +184,6 @@ def picture(drawn: Sheet, width: float) -> Picture:
     rows = tuple(tuple(c for c in row if c in drawn.panels) for row in rows)
     layout = _Layout(drawn, tuple(filter(None, rows)), width / _INCH)
     pixels = layout.pixels()
-    caption = _caption(drawn)
-    name = "body_one_column" if narrow else "body"
-    return Picture(name, caption, f"Renders: {caption}", pixels, photo=True, dpi=DPI)
-
-
-def _caption(drawn: Sheet) -> str:
     scene = drawn.scene
     names = ", ".join(m.result.label for m in scene.methods)
     labels = ", ".join(scene.labels[f] for f in _moved(scene))
@@ -197,7 +191,9 @@ def _caption(drawn: Sheet) -> str:
     if drawn.coloured:
         found[0] += f"; {' and '.join(drawn.coloured)} at the largest displacement"
     found += [w for w in _notes(drawn) if w not in found]
-    return ". ".join(w.removesuffix(".") for w in found) + "."
+    caption = ". ".join(w.removesuffix(".") for w in found) + "."
+    name = "body_one_column" if narrow else "body"
+    return Picture(name, caption, f"Renders: {caption}", pixels, photo=True, dpi=DPI)
 
 
 def _notes(drawn: Sheet) -> list[str]:
@@ -335,26 +331,23 @@ class _Layout:
             for j, name in enumerate(both):
                 ramp: Colormap = ERRORS if name == _ERROR else mpl.colormaps[
                     "cividis" if name.startswith("difference") else "viridis"]  # fmt: skip
-                self._bar(figure, name, ramp, start * self.across + j * each, each, y)
+                wide = min(0.78 * each, 2.2)
+                left = (start * self.across + j * each) + 0.5 * (each - wide)
+                ax = figure.add_axes((left / self.width, (y + 0.3) / self.height, wide / self.width,
+                                      0.07 / self.height))  # fmt: skip
+                span = self.drawn.spans[name]
+                bar = figure.colorbar(ScalarMappable(Normalize(*span), ramp), cax=ax,
+                                      orientation="horizontal")  # fmt: skip
+                ends = np.linspace(*span, 3).tolist()
+                if sum(len(significant(e)) + 1 for e in ends) * _LETTER > wide:
+                    ends = [*span]  # the middle one would touch them
+                bar.set_ticks(ends, labels=[significant(e) for e in ends], fontsize=_POINTS - 0.5)
+                bar.ax.tick_params(length=2, pad=1)
+                first, *_, last = bar.ax.get_xticklabels()
+                first.set_horizontalalignment("left")
+                last.set_horizontalalignment("right")
+                quantity = (
+                    f"difference / {name.rpartition(' / ')[2]}" if name.startswith("diff") else name
+                )
+                bar.set_label(quantity, fontsize=_POINTS, labelpad=1)
             start += count
-
-    def _bar(
-        self, figure: Figure, name: str, ramp: Colormap, x: float, room: float, y: float
-    ) -> None:
-        wide = min(0.78 * room, 2.2)
-        left = x + 0.5 * (room - wide)
-        ax = figure.add_axes((left / self.width, (y + 0.3) / self.height, wide / self.width,
-                              0.07 / self.height))  # fmt: skip
-        span = self.drawn.spans[name]
-        bar = figure.colorbar(ScalarMappable(Normalize(*span), ramp), cax=ax,
-                              orientation="horizontal")  # fmt: skip
-        ends = np.linspace(*span, 3).tolist()
-        if sum(len(significant(e)) + 1 for e in ends) * _LETTER > wide:
-            ends = [*span]  # the middle one would touch them
-        bar.set_ticks(ends, labels=[significant(e) for e in ends], fontsize=_POINTS - 0.5)
-        bar.ax.tick_params(length=2, pad=1)
-        first, *_, last = bar.ax.get_xticklabels()
-        first.set_horizontalalignment("left")
-        last.set_horizontalalignment("right")
-        quantity = f"difference / {name.rpartition(' / ')[2]}" if name.startswith("diff") else name
-        bar.set_label(quantity, fontsize=_POINTS, labelpad=1)

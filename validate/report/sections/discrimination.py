@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from textwrap import fill
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from scipy.special import chdtri
@@ -26,22 +25,18 @@ _NAME = 32  # letters of a model's name in one line
 
 def discrimination(result: Result) -> Exhibit:
     """Errors over noise, and in words which effects the recording shows."""
-    effects = _recorded(result)
+    # The effects in what a sensor measured: a reference without noise separates everything
+    residuals = [r for m in result.methods for r in m.residuals.values()]
+    measured = {r.name for r in residuals if r.sd > 0}
+    effects = tuple(
+        replace(e, changes=tuple(c for c in e.changes if c.name in measured))
+        for e in result.effects
+    )
     return Exhibit(
         "discrimination",
         "Which effects this recording can distinguish",
         tuple(map(_sentence, effects)),
         pictures=over_noise(result),
-    )
-
-
-def _recorded(result: Result) -> tuple[Effect, ...]:
-    """The effects in what a sensor measured: a reference without noise separates everything."""
-    residuals = [r for m in result.methods for r in m.residuals.values()]
-    measured = {r.name for r in residuals if r.sd > 0}
-    return tuple(
-        replace(e, changes=tuple(c for c in e.changes if c.name in measured))
-        for e in result.effects
     )
 
 
@@ -137,7 +132,14 @@ def _fill(figure: Figure, rows: list[NoiseRow], methods: list[MethodResult]) -> 
     columns = _columns(rows)
     axes, lowest = panels(figure, len(rows), columns)
     for ax, row in zip(axes, rows, strict=True):
-        _dots(ax, row, methods)
+        ax.axvspan(*row.band, color=NOISE, lw=0)
+        ax.axvline(1, color=MEASURED, lw=0.8)
+        for method, ratio in row.ratios:
+            sign = "<" if ratio < _LOWEST else "o"
+            face = ACCEPTED if method.accepted else "white"
+            ax.plot(max(ratio, _LOWEST), methods.index(method), sign, ms=5.5, mfc=face,
+                    mec=ACCEPTED if method.accepted else MEASURED)  # fmt: skip
+        ax.set_title(f"{row.quantity}\nnoise {row.noise}", loc="left", fontsize=8.5)
     for ax in lowest:
         ax.set_xlabel("rms error / rms of noise", fontsize=9)
     for ax in axes[::columns]:
@@ -146,24 +148,9 @@ def _fill(figure: Figure, rows: list[NoiseRow], methods: list[MethodResult]) -> 
     names = [fill(m.label, _NAME) for m in methods]
     first.set_yticks(range(len(methods)), names)
     first.set_ylim(len(methods) - 0.5, -0.5)
-    _ratio_axis(first)
-
-
-def _dots(ax: Axes, row: NoiseRow, methods: list[MethodResult]) -> None:
-    ax.axvspan(*row.band, color=NOISE, lw=0)
-    ax.axvline(1, color=MEASURED, lw=0.8)
-    for method, ratio in row.ratios:
-        sign = "<" if ratio < _LOWEST else "o"
-        face = ACCEPTED if method.accepted else "white"
-        ax.plot(max(ratio, _LOWEST), methods.index(method), sign, ms=5.5, mfc=face,
-                mec=ACCEPTED if method.accepted else MEASURED)  # fmt: skip
-    ax.set_title(f"{row.quantity}\nnoise {row.noise}", loc="left", fontsize=8.5)
-
-
-def _ratio_axis(ax: Axes) -> None:
-    ax.set_xscale("log")
-    low, high = ax.get_xlim()
-    ax.set_xlim(max(min(low, 0.09), 0.8 * _LOWEST), max(high, 11))
-    ax.xaxis.set_major_locator(LogLocator(numticks=5))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    first.set_xscale("log")
+    low, high = first.get_xlim()
+    first.set_xlim(max(min(low, 0.09), 0.8 * _LOWEST), max(high, 11))
+    first.xaxis.set_major_locator(LogLocator(numticks=5))
+    first.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    first.xaxis.set_minor_formatter(NullFormatter())

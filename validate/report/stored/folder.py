@@ -226,7 +226,25 @@ def _taken(place: Path, folder: Path, *, shared: bool) -> int:
     if alone:
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, _holder(), 0)
-        _recover(folder)
+        # Puts back a folder between its two renames and what was kept of an old one; removes the
+        # rest. A folder that was being filled holds nothing that is kept, so that all left-overs
+        # are alike.
+        left = [*_left_overs(folder), *(_inside(folder) if folder.is_dir() else ())]
+        old = next((p for p in left if p.name.startswith(f".{folder.name}.old-")), None)
+        if old is not None and not folder.exists():
+            old.rename(folder)
+            left.remove(old)
+        for path in left:
+            home = path.with_name(path.name[1:].rpartition(".")[0])
+            if path.is_dir() and home.is_dir():
+                _bring_back(path, home)
+            elif path.is_dir() and any(_kept(e, _KEPT) for e in path.iterdir()):
+                path.rename(home)  # a study whose page was being made when its place was moved
+            else:
+                shutil.rmtree(path, ignore_errors=True)
+        if left:
+            what = "left-over" if len(left) == 1 else "left-overs"
+            LOG.warning(f"{folder.name}: {len(left)} {what} of interrupted commands removed")
     if shared:
         fcntl.flock(descriptor, fcntl.LOCK_SH)
     return descriptor
@@ -269,29 +287,6 @@ def _named(holder: str) -> str:
 
 
 # --- what interrupted processes left --------------------------------------------------------------
-
-
-def _recover(folder: Path) -> None:
-    """Puts back a folder between its two renames and what was kept of an old one; removes the rest.
-
-    A folder that was being filled holds nothing that is kept, so that all left-overs are alike.
-    """
-    left = [*_left_overs(folder), *(_inside(folder) if folder.is_dir() else ())]
-    old = next((p for p in left if p.name.startswith(f".{folder.name}.old-")), None)
-    if old is not None and not folder.exists():
-        old.rename(folder)
-        left.remove(old)
-    for path in left:
-        home = path.with_name(path.name[1:].rpartition(".")[0])
-        if path.is_dir() and home.is_dir():
-            _bring_back(path, home)
-        elif path.is_dir() and any(_kept(e, _KEPT) for e in path.iterdir()):
-            path.rename(home)  # a study whose page was being made when its place was moved
-        else:
-            shutil.rmtree(path, ignore_errors=True)
-    if left:
-        what = "left-over" if len(left) == 1 else "left-overs"
-        LOG.warning(f"{folder.name}: {len(left)} {what} of interrupted commands removed")
 
 
 def _left_overs(folder: Path) -> list[Path]:

@@ -15,7 +15,7 @@ from validate.arrays import Floats, rms
 from validate.compare.overall_verdict import Overall
 from validate.compare.published import Published
 from validate.compare.residual import Residual
-from validate.compare.result import Domain, MethodResult, Result, domains
+from validate.compare.result import MethodResult, Result, domains
 from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.identify.budget import IdentifiedValue
@@ -49,7 +49,14 @@ def schema() -> Json:
 
 def document(result: Result, created: str, made: Made | None = None) -> Json:
     """Return the content of results.json. Numbers that are not finite become null with a `why`."""
-    share = _share(result)
+    # What keeps all traces together at about `_VALUES`
+    runs = [r for m in result.methods for r in m.runs]
+    whole = sum(len(r.traces) * len(r.t) for r in runs)
+    framed = sum(len(r.traces) * len(r.at) for r in runs)
+    share = _Share(whole > _VALUES, max(1, -(-framed // _VALUES)))
+    # What the first accepted method covered, else the first one
+    method = next((m for m in result.methods if m.accepted), next(iter(result.methods), None))
+    names = tuple(r.name for r in result.recordings)
     return {
         "schema_version": SCHEMA_VERSION,
         "experiment": result.name,
@@ -78,7 +85,7 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
         "made": _made(made or Made()),
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],
-        "domain": recorded(_domains(result)),
+        "domain": recorded(domains(method, names, result.specimens) if method else ()),
         "effects": recorded(result.effects),
         "rest": [_rest(r) for r in result.rest],
         "identified": identified_members(result),
@@ -107,13 +114,6 @@ def _value(one: IdentifiedValue) -> Json:
         "parts": {name: recorded(u) for name, u in one.parts.items()},
         "by": one.by, "on": one.on, "correlation": one.correlation, "finding": one.finding,
     }  # fmt: skip
-
-
-def _domains(result: Result) -> tuple[Domain, ...]:
-    """What the first accepted method covered, else the first one."""
-    method = next((m for m in result.methods if m.accepted), next(iter(result.methods), None))
-    names = tuple(r.name for r in result.recordings)
-    return domains(method, names, result.specimens) if method else ()
 
 
 def _method(method: MethodResult, result: Result, share: _Share) -> Json:
@@ -155,14 +155,6 @@ def _traced(run: Run, share: _Share) -> Json:
         "t": numbers(run.t),
         "traces": {k: {"unit": t.unit, "y": numbers(t.y)} for k, t in run.traces.items()},
     }
-
-
-def _share(result: Result) -> _Share:
-    """What keeps all traces together at about `_VALUES`."""
-    runs = [r for m in result.methods for r in m.runs]
-    whole = sum(len(r.traces) * len(r.t) for r in runs)
-    framed = sum(len(r.traces) * len(r.at) for r in runs)
-    return _Share(whole > _VALUES, max(1, -(-framed // _VALUES)))
 
 
 def _score(score: Score) -> Json:

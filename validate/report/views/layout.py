@@ -69,7 +69,7 @@ def _widths(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> l
     """Of every column; sentences are cut down to one common width, the largest that fits."""
     natural, least = [], []
     for name, *cells in zip(head, *rows, strict=True):
-        words = max(_longest_word(text) for text in (name, *cells))
+        words = max(max(map(len, text.split()), default=0) for text in (name, *cells))
         longest = max(map(len, cells))
         natural.append(max(len(name), longest))
         least.append(max(words, _LEAST if _sentences(cells) else longest))
@@ -87,10 +87,6 @@ def _last_sentences(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int |
     """The last column that may go below its row; the first one names it and stays."""
     soft = [c for c in range(1, len(head)) if _sentences([row[c] for row in rows])]
     return soft[-1] if soft else None
-
-
-def _longest_word(text: str) -> int:
-    return max(map(len, text.split()), default=0)
 
 
 def _side_by_side(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:

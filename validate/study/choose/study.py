@@ -210,7 +210,12 @@ def _picked(
         if best is None or (r.time_s or 0.0) < (best.time_s or 0.0)
     ]  # fmt: skip
     for row in faster[:_TRIES]:
-        dt = _rate_step(trade, row, want)
+        # A step s no longer than a tick, where the row's own is longer and inertia matters
+        if not trade.trial.dynamic or row.dt * want.rate <= 1 + 1e-9:
+            dt = None
+        else:
+            apart = float(np.diff(trade.trial.frames).min())
+            dt = float(apart / np.ceil(apart * want.rate - 1e-9))
         tried = None if dt is None else again(trade, row, dt)
         if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
             return row, tried
@@ -218,14 +223,6 @@ def _picked(
     if len(faster) > _TRIES:
         rejected.append(f"{rung}: {len(faster) - _TRIES} slower cells were not run again")
     return None
-
-
-def _rate_step(trade: Trade, row: TradeRow, want: Wanted) -> float | None:
-    """A step s no longer than a tick, where the row's own is longer and inertia matters."""
-    if not trade.trial.dynamic or row.dt * want.rate <= 1 + 1e-9:
-        return None
-    apart = float(np.diff(trade.trial.frames).min())
-    return float(apart / np.ceil(apart * want.rate - 1e-9))
 
 
 def _refusal(trade: Trade, row: TradeRow, by: str) -> str:

@@ -21,7 +21,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.case_solution import placed, solve
 from validate.pipeline.run.job import Job
 from validate.pipeline.run.method_run import MethodRun
-from validate.pipeline.run.pipeline import PreparedRuns, set_out
+from validate.pipeline.run.pipeline import set_out
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.observation import Drawable, Observation
 from validate.study.coverage.plan import ReadingCell, TermsCell, in_world, numbered, true_method
@@ -138,7 +138,13 @@ def opened_here(job: Job, identify: Identify = here) -> tuple[CoverageBench, Ope
         return found[number]
 
     out = set_out(*_judged(job), identify=once)
-    _require_drawable(out)
+    # Raise `ComparisonError`, before anything is solved, for an observation whose noise cannot be
+    # drawn again
+    of, runs = out.experiment, out.runs
+    for name in of.accepted:
+        _, registered = placed(of, out.found.recordings, runs.settings[name], runs.parameters)
+        for observation in (o for seen in registered for o in seen.compared):
+            drawable(observation)
     out.runs.start(out.found.recordings)
     return CoverageBench(out.runs), Opening(key_of(job, "opening"), found)
 
@@ -150,16 +156,6 @@ def _judged(job: Job) -> tuple[Experiment, Options]:
     each = [*experiment.accepted, *(true_method(experiment, n) for n in experiment.accepted)]
     names = tuple(dict.fromkeys([*each, surrogate] if surrogate and each else each))
     return experiment, Options(dict(job.values), names, job.quick)
-
-
-def _require_drawable(out: PreparedRuns) -> None:
-    """Raise `ComparisonError`, before anything is solved, for an observation whose noise cannot be
-    drawn again."""
-    of, runs = out.experiment, out.runs
-    for name in of.accepted:
-        _, registered = placed(of, out.found.recordings, runs.settings[name], runs.parameters)
-        for observation in (o for seen in registered for o in seen.compared):
-            drawable(observation)
 
 
 def drawable(o: Observation) -> Drawable:

@@ -176,16 +176,15 @@ def _ranking(
     of_filters = {names[c.key]: v for c, v in order if v.nis is not None and not c.baseline}
     others = {names[c.key]: v for c, v in order if v.nis is None or c.baseline}
     chosen = nested(
-        of_filters, others, by if values and _segmented(order, by) else WITHHELD, blocks
+        of_filters,
+        others,
+        by if values and any(v.sums(by) is not None for _, v in order) else WITHHELD,
+        blocks,
     )
     return Ranking(condition, tuple(rows), (*failed, *other), blocks, chosen)
 
 
 ScoredCells = list[tuple[FilterCell, FilterScores]]
-
-
-def _segmented(order: ScoredCells, by: str) -> bool:
-    return any(v.sums(by) is not None for _, v in order)
 
 
 def _why_not(value: FilterScores, by: str, names: frozenset[str], most: frozenset[str]) -> str:

@@ -42,6 +42,9 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
         "Stable means that nothing grows, not that the motion is accurate. 'Too large to "
         "resolve' means fewer than ten steps in the slowest period.",
     )
+    pairs = ((c.variant, study.done.records[c.key].why) for c in study.cells)
+    columns = {**_variant("0"), "why": "1"}
+    shown = table("refused", "Refused schemes and reasons", (p for p in pairs if p[1]), columns)
     return (
         _claims(study),
         *((_papers(study),) if study.base.papers else ()),
@@ -49,7 +52,7 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
         _limits(study),
         _conditions(study),
         _drifts(study),
-        _refused(study),
+        Exhibit("refused", "Refused", (), (shown,)),
     )
 
 
@@ -260,13 +263,6 @@ def _drifts(study: Stability) -> Exhibit:
     title, drifts = "Energy after 1e5 steps over the initial energy", (r.drifts for r in study.ran)
     shown = table("drift", title, (d for found in drifts for d in found), columns)
     return Exhibit("drift", "Drift", words, (shown,))
-
-
-def _refused(study: Stability) -> Exhibit:
-    pairs = ((c.variant, study.done.records[c.key].why) for c in study.cells)
-    columns = {**_variant("0"), "why": "1"}
-    shown = table("refused", "Refused schemes and reasons", (p for p in pairs if p[1]), columns)
-    return Exhibit("refused", "Refused", (), (shown,))
 
 
 def told(study: Stability) -> Findings:
