@@ -4,6 +4,7 @@ import json
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import here
 
@@ -32,6 +33,17 @@ def test_a_study_is_the_one_of_the_command(pulled: Path, reports: Path) -> None:
     assert found.content["made"]["command"] == document["made"]["command"].replace(" --json", "")
     frame = found.to_pandas()
     assert len(frame) == len(found.cells()) - 1 > 1
+    errors, score = found.to_xarray(), str(frame.columns[3])
+    assert list(errors.sizes) == ["method", Q.partition("=")[0]]
+    # every cell where its columns say, nothing elsewhere
+    for row in frame.dropna(subset=list(errors.dims)).to_dict("records"):
+        at = errors[score].sel({d: row[d] for d in errors.dims})
+        assert np.array_equal(at, row[score], equal_nan=True)
+    assert int(errors[score].notnull().sum()) == int(frame[score].notna().sum())
+    with pytest.raises(UsageError, match="'methd'"):
+        found.to_xarray("methd")
+    with pytest.raises(UsageError, match="not told apart by method"):
+        found.to_xarray("method")
     assert pickle.loads(pickle.dumps(found)) == found
     assert len(repr(found).splitlines()) <= 24
     assert list(found.plot)

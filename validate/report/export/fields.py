@@ -18,6 +18,7 @@ from validate.installation import install_command
 from validate.parameters import nearest_names
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from xarray import Dataset
 
     from validate.solve.types import Run
@@ -60,6 +61,18 @@ def open_fields(folder: Path | str, method: str, recording: int = 1) -> "Dataset
             f"fields as a Dataset need xarray and h5netcdf: {install_command('tables')}"
         ) from None
     return open_dataset(file, engine="h5netcdf")
+
+
+def as_dataset(rows: "DataFrame", along: list[str]) -> "Dataset":
+    """Return the columns of a table as arrays over the columns `along`, NaN where no row is.
+
+    Raises `UsageError` without xarray.
+    """
+    try:
+        import xarray  # noqa: F401 (pandas makes the Dataset)
+    except ImportError:
+        raise UsageError(f"a Dataset needs xarray: {install_command('tables')}") from None
+    return rows.set_index(along).to_xarray()
 
 
 def _file(method: str, recording: int) -> str:
