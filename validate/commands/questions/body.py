@@ -1,40 +1,39 @@
 """Questions about a measured body of any shape, by the paths of its parameters."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.contact import of_the_indenter
-from validate.commands.questions.kind import (
-    NewKind,
-    accept_line,
-    limit_question,
-    quadratic_fits,
-    reason_question,
-)
 from validate.commands.questions.kinds import (
     NONE,
     NOTED,
     RECORDED,
     RELEASE,
     UNKNOWN,
+    NewKind,
     a_known_modulus,
     a_layout,
+    accept_line,
     by_path,
     by_topic,
     facets_of,
     known_size,
+    limit_question,
     named_place,
     parsed,
+    quadratic_fits,
+    reason_question,
     size_question,
     there,
     three_of,
     unit_of,
 )
-from validate.commands.questions.law import LINEAR, law_questions
 from validate.commands.questions.motion import (
     DYNAMIC,
     cells_for,
@@ -46,14 +45,16 @@ from validate.commands.questions.motion import (
 from validate.commands.questions.scene import CELLS, answered_mesh, imports, rendered, tree_of
 from validate.commands.recording_summary import beside
 from validate.errors import UsageError
+from validate.parameters import with_values
 from validate.pipeline.bodies.markers import AS_SEEN
-from validate.pipeline.bodies.mesh import unknowns_of
+from validate.pipeline.bodies.mesh import PLATES, sizes_of_mesh, unknowns_of
 from validate.pipeline.run.cost import FEWEST_STATES, RUNS, newton_seconds, states_within
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile
-from validate.scene.laws import law_kind
+from validate.scene.laws import LAWS, Coefficients, law_kind
 from validate.scene.mesh import Mesh
+from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.places import axis_of
 
@@ -344,3 +345,145 @@ BODY = NewKind(
     _used,
     _assumed,
 )
+
+
+# --- questions about the constitutive law of a material and its coefficients ---------------------
+
+LINEAR = "linear"
+
+
+def law_names() -> tuple[str, ...]:
+    """Return the names of all laws, those of plug-ins among them, the linear one last."""
+    return (*(kind.name for kind in LAWS), LINEAR)
+
+
+def law_questions(found: Answers, default: str, why: str) -> list[Question]:
+    """Return the question about the law, and those about the coefficients that it has beyond the
+    modulus and Poisson ratio."""
+    known = ", ".join(f"{kind.name} ({kind.title})" for kind in LAWS)
+    law = Question("law", f"law of the material: {LINEAR}, or at large strain {known}", default,
+                   why, choices=law_names())  # fmt: skip
+    names = law_kind(found.get("law", LINEAR)).coefficients
+    return [law, *(_of_coefficient(found, name, last=name == names[-1]) for name in names)]
+
+
+def coefficient_values(found: Answers) -> dict[str, str]:
+    """Return the answered coefficients of the law by path."""
+    names = law_kind(found.get("law", LINEAR)).coefficients
+    paths = [f"material.{name}" for name in names]
+    return {path: found[path] for path in paths if found.get(path)}
+
+
+def coefficients_of(found: Answers) -> type[Coefficients]:
+    """Return the class of the coefficients of the answered law."""
+    return law_kind(found.get("law", LINEAR)).holds or Coefficients
+
+
+def left_open(found: Answers) -> set[str]:
+    """Return the paths of the law's coefficients while one of them is not answered yet: they have
+    to agree."""
+    names = law_kind(found.get("law", LINEAR)).coefficients
+    paths = {f"material.{name}" for name in names}
+    return set() if paths <= found.keys() else paths
+
+
+def _of_coefficient(found: Answers, name: str, *, last: bool) -> Question:
+    (f,) = (f for f in fields(coefficients_of(found)) if f.name == name)
+    unit = f.metadata["unit"]
+    text = f"{f.metadata['doc']}{'' if unit == '1' else f'; {unit}'}"
+    may_be_empty = f.default == ()
+    return Question(
+        f"material.{name}", text + ("; empty: none" if may_be_empty else ""),
+        open=not may_be_empty, check=_checked(found, f, last=last),
+    )  # fmt: skip
+
+
+def _checked(found: Answers, f: Any, *, last: bool) -> Callable[[str], Any]:
+    """A check of one number; lists have to agree and are checked with the last one."""
+
+    def check(text: str) -> None:
+        values: Mapping[str, str] = {f.name: text}
+        if last:
+            own = coefficient_values(found)
+            values = {**{k.removeprefix("material."): v for k, v in own.items()}, **values}
+        if last or isinstance(f.default, float):
+            with_values(coefficients_of(found)(), values)
+
+    return check
+
+
+# --- questions about the mesh file of a specimen between plates ----------------------------------
+
+
+def mesh_questions(found: Answers, *, needed: bool) -> list[Question]:
+    """Return the questions about the mesh file, its unit and its unusual size."""
+    plates = " and ".join(f'"{plate}"' for plate in PLATES)
+    asked = [
+        Question(
+            "body.file",
+            f"mesh file of the specimen, axis z, with the facet sets {plates}"
+            + ("; it needs the wall of the inclusion, too" if needed else "; empty: a cylinder"),
+            open=needed, check=_readable, words=(),
+        )
+    ]  # fmt: skip
+    file = found.get("body.file", "")
+    if not _foreign(file):
+        return asked
+    asked.append(
+        Question("body.unit", "unit of the file's lengths, as mm", open=True,
+                 check=lambda unit: sizes_of_mesh(read_mesh(Path(file), unit), Path(file).name))
+    )  # fmt: skip
+    if unit := found.get("body.unit"):
+        asked += known_size("body.size", specimen_mesh(found), unit)
+    return asked
+
+
+def specimen_mesh(found: Answers) -> Mesh | None:
+    """Return the mesh that the answers name; None without one, or before its unit is known."""
+    file, unit = found.get("body.file", ""), found.get("body.unit")
+    if not file or (_foreign(file) and not unit):
+        return None
+    return _read(file, unit, Path(file).stat().st_mtime_ns)
+
+
+def mesh_sizes(found: Answers) -> dict[str, float]:
+    """Return height and diameter of equal area m of the mesh, by parameter; none without one."""
+    mesh = specimen_mesh(found)
+    return {} if mesh is None else sizes_of_mesh(mesh, Path(found["body.file"]).name)
+
+
+def declared_mesh(found: Answers, folder: Path) -> str:
+    """Return the mesh file as an experiment file in `folder` declares it; empty without one."""
+    if not found.get("body.file"):
+        return ""
+    file = beside(Path(found["body.file"]), folder / "x.py")
+    unit = f", unit={found['body.unit']!r}" if found.get("body.unit") else ""
+    halvings = f", halvings={found['body.halvings']}" if found.get("body.halvings") else ""
+    element = "linear" if linear_cells(found) else "quadratic"
+    return f'MeshFile({file!r}{unit}{halvings}, element="{element}"),'
+
+
+def linear_cells(found: Answers) -> str:
+    """Return why linear cells are proposed; empty where quadratic ones fit, or without a mesh."""
+    mesh = specimen_mesh(found)
+    if mesh is None or quadratic_fits(mesh):
+        return ""
+    return (
+        f"{found['body.file']} has {len(mesh.cells)} cells: linear ones are proposed "
+        "(element=linear), as quadratic ones do not fit into a first answer of 30 s"
+    )
+
+
+def _foreign(file: str) -> bool:
+    return Path(file).suffix.lower() in FOREIGN
+
+
+def _readable(file: str) -> None:
+    there(file)
+    if not _foreign(file):
+        sizes_of_mesh(read_mesh(Path(file)), Path(file).name)
+
+
+@lru_cache(maxsize=4)
+def _read(file: str, unit: str | None, changed: int) -> Mesh:
+    return read_mesh(Path(file), unit)

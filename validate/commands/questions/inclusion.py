@@ -8,7 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.commands.questions.answers import Answers, Question
-from validate.commands.questions.kind import NewKind, quantity_in
+from validate.commands.questions.kinds import NewKind, quantity_in
 from validate.pipeline.plates.inclusion import Streams
 from validate.recording.types import Recording, Signal
 

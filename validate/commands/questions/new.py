@@ -25,7 +25,7 @@ from validate.commands.questions.answers import (
 )
 from validate.commands.questions.body import BODY
 from validate.commands.questions.inclusion import INCLUSION
-from validate.commands.questions.kind import NewKind
+from validate.commands.questions.kinds import NewKind
 from validate.commands.questions.plates import PLATES
 from validate.commands.recording_summary import beside, channels, plain, topics
 from validate.commands.recordings import ask_back

@@ -6,14 +6,14 @@ from dataclasses import fields as attributes
 import numpy as np
 
 from validate.commands.questions.answers import Answers, Question
-from validate.commands.questions.kind import (
+from validate.commands.questions.body import linear_cells, specimen_mesh
+from validate.commands.questions.kinds import (
     accept_line,
+    facets_of,
     limit_question,
     quantity_in,
     reason_question,
 )
-from validate.commands.questions.kinds import facets_of
-from validate.commands.questions.mesh import linear_cells, specimen_mesh
 from validate.parameters import with_values
 from validate.pipeline.plates.choices import Compression
 from validate.recording.types import Recording

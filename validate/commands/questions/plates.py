@@ -9,20 +9,18 @@ import numpy as np
 
 from validate.commands.questions import outline as new_outline
 from validate.commands.questions.answers import Answers, Question
-from validate.commands.questions.kind import NewKind, quantity_in, reason_question
-from validate.commands.questions.law import (
+from validate.commands.questions.body import (
     LINEAR,
     coefficient_values,
     coefficients_of,
-    law_questions,
-)
-from validate.commands.questions.mesh import (
     declared_mesh,
+    law_questions,
     linear_cells,
     mesh_questions,
     mesh_sizes,
     specimen_mesh,
 )
+from validate.commands.questions.kinds import NewKind, quantity_in, reason_question
 from validate.identify.modulus import stated_test
 from validate.parameters import with_values
 from validate.pipeline.plates.choices import Compression, stated_sizes

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from validate.commands.questions.answers import Answers
+from validate.commands.questions.body import coefficient_values, left_open
 from validate.commands.questions.contact import CONTACT_WORDS, contact_settings, indented, reach_of
 from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, sides, unit_of
-from validate.commands.questions.law import coefficient_values, left_open
 from validate.errors import SceneError, UsageError
 from validate.parameters import describe, with_values
 from validate.pipeline.bodies.choices import MeasuredBody
