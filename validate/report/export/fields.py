@@ -72,7 +72,8 @@ def as_dataset(rows: "DataFrame", along: list[str]) -> "Dataset":
         import xarray  # noqa: F401 (pandas makes the Dataset)
     except ImportError:
         raise UsageError(f"a Dataset needs xarray: {install_command('tables')}") from None
-    return rows.set_index(along).to_xarray()
+    found: Dataset = rows.set_index(along).to_xarray()
+    return found
 
 
 def _file(method: str, recording: int) -> str:
