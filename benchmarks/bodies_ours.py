@@ -12,7 +12,7 @@ from validate.commands.questions.scene import geometry_of
 from validate.compare.convergence import GridConvergence
 from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import measured_body, solid
-from validate.pipeline.checks.numerical_uncertainty import Refined
+from validate.pipeline.checks.checks import Refined
 from validate.pipeline.experiment.experiment import Experiment, Variant
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.runs import ExperimentRuns

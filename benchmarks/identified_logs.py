@@ -39,8 +39,8 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.choices import BONDED_PLATES, Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
+from validate.pipeline.plates.scene import BONDED_PLATES, Compression, CompressionRanges
 from validate.pipeline.run.pipeline import set_out
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source

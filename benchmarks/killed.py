@@ -30,7 +30,7 @@ from validate.compare.verdict import Accept
 from validate.parameters import quantity
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import Role
-from validate.pipeline.plates.choices import Compression
+from validate.pipeline.plates.scene import Compression
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.scene.geometries.specification import Cylinder

@@ -10,7 +10,7 @@ from validate.pipeline.bodies.measured import measured_body
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.choices import Compression
+from validate.pipeline.plates.scene import Compression
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.scene.geometries.specification import Cylinder

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from validate.compare.effects import Change, Effect
+from validate.compare.effects import Change, Declared, Effect, Joint
 from validate.compare.exhibit import Exhibit
-from validate.compare.inputs import Declared, Joint
 from validate.compare.published import Published
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result

@@ -27,8 +27,7 @@ from validate.pipeline.run import runs
 from validate.pipeline.run.estimate import coarser
 from validate.pipeline.run.pipeline import compare
 from validate.scene.geometries.box import box, grid
-from validate.scene.geometries.cylinder import quarter_cylinder
-from validate.scene.geometries.specification import Box
+from validate.scene.geometries.specification import Box, quarter_cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Scene, Support
 

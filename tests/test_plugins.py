@@ -134,7 +134,7 @@ import json
 from pathlib import Path
 from validate.pipeline.experiment.declaration import classes, from_json, to_json
 from validate.pipeline.experiment.find import find
-from validate.pipeline.run.cached_runs import plug_ins_used
+from validate.pipeline.run.runs import plug_ins_used
 experiment = find("nudged_block", Path.cwd())
 methods = json.loads(to_json(experiment))["experiment"]["methods"]["items"]
 print(methods["nudged"]["settings"], methods["gent"]["scene"]["items"])

@@ -13,7 +13,7 @@ from validate.compare.overall_verdict import Expected
 from validate.compare.verdict import Accept
 from validate.pipeline.experiment.experiment import Experiment, Uncertainty, vary
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.plates.choices import stated_sizes
+from validate.pipeline.plates.scene import stated_sizes
 from validate.scene.geometries.specification import Cylinder
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support

@@ -8,7 +8,7 @@ from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
-from validate.report.scenes.node_sets import node_sets_picture
+from validate.report.scenes.points import node_sets_picture
 from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene
 

@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Frames
 from validate.register.observation import AnyDraw, Deviation, Role, Selection, Simulated
-from validate.register.outlines.round_outlines import Circle, fit_circle
+from validate.register.outlines.plane import Circle, fit_circle
 
 ENDS = ("left", "right")  # two points of the body, a diameter apart
 

@@ -7,7 +7,7 @@ from command_line import refused
 from study_samples import experiment_file
 
 from validate.commands import record as making
-from validate.library import run_report, studies
+from validate.library import single_run, studies
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def nothing_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("the place was to be tried first")
 
     for module, names in (
-        (run_report, ("compare",)),
+        (single_run, ("compare",)),
         (studies, ("study", "stability", "trade")),
         (making, ("stamped",)),
     ):

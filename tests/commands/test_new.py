@@ -20,7 +20,7 @@ from validate.errors import RecordingError
 from validate.identify.modulus import fit_modulus
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.find import load_file
-from validate.pipeline.plates.choices import stated_sizes
+from validate.pipeline.plates.scene import stated_sizes
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Recording, Signal, Source

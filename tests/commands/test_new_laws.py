@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command_line import here, refused
 
-from validate.commands.questions.body import law_names
+from validate.commands.questions.law import law_names
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.declaration import from_json, to_json
 from validate.pipeline.experiment.find import load_file

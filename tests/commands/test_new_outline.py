@@ -11,7 +11,7 @@ from command_line import here, refused
 
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of
-from validate.pipeline.plates.choices import Compression
+from validate.pipeline.plates.scene import Compression
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.scene.geometries.box import box

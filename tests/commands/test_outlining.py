@@ -17,8 +17,7 @@ from validate.recording.images.image import encode_png
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.outlines import third_party_outlines
-from validate.recording.outlines.outline import extract_outline
-from validate.recording.outlines.outline_tracking import EXPERTS
+from validate.recording.outlines.outline import EXPERTS, extract_outline
 from validate.recording.types import Frames, Recording, Source
 
 pytestmark = pytest.mark.usefixtures("decoded_here")

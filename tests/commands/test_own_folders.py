@@ -8,7 +8,7 @@ from command_line import here, refused
 
 from validate.commands import check as checking
 from validate.errors import RecordingError
-from validate.library import run_report
+from validate.library import single_run
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 
@@ -101,7 +101,7 @@ def test_of_all_each_ends_for_itself(own: Path, monkeypatch: pytest.MonkeyPatch)
         compared.append(experiment.name)
         raise RecordingError("no logs")
 
-    for command in (run_report, checking):
+    for command in (single_run, checking):
         monkeypatch.setattr(command, "compare", without_data)
     for arguments in (["run", "--all"], ["check"]):
         compared.clear()

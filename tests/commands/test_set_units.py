@@ -7,7 +7,7 @@ from command_line import here, refused
 
 from validate.commands import record as making
 from validate.errors import RecordingError
-from validate.library import run_report, studies
+from validate.library import single_run, studies
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, configure
@@ -46,7 +46,7 @@ def test_a_modulus_a_thousand_off_is_asked_about_wherever_it_is_set(
     def stop(*_: object, **__: object) -> None:
         raise RecordingError("stopped here")
 
-    monkeypatch.setattr(run_report, "compare", stop)
+    monkeypatch.setattr(single_run, "compare", stop)
     monkeypatch.setattr(studies, "study", stop)
     monkeypatch.setattr(making, "progress", stop)
     for command in (["run"], ["study", "filters"], ["record", "-o", str(tmp_path / "x.mcap")]):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.compare.inputs import difference, joint, joint_draws
+from validate.compare.effects import difference, joint, joint_draws
 from validate.compare.residual import Residual
 from validate.compare.verdict import Sensitivity
 from validate.errors import ComparisonError

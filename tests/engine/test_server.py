@@ -9,7 +9,7 @@ import pytest
 
 SCRIPT = """
 import os, psutil
-from validate.engine.server import serve
+from validate.engine.pool import serve
 serve(["validate.engine.cell"])
 for child in psutil.Process().children():
     if any("forkserver" in word for word in child.cmdline()):

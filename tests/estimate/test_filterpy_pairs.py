@@ -26,8 +26,7 @@ from validate.estimate.kalman.formulas import (
     ensemble_gaussian,
     ukf_predict,
 )
-from validate.estimate.reduced.linear_system import LinearModel
-from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.estimate.reduced.reduced_kf import LinearModel, ReducedKf
 from validate.testing.pulled_cube import case
 
 # private: _apart: replaced, to bring a case about.

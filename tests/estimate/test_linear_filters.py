@@ -9,16 +9,30 @@ from scipy.linalg import expm, solve_discrete_are
 
 from validate.errors import SceneError
 from validate.estimate.consistency import nees, nees_consistency, nis_consistency
-from validate.estimate.kalman.covariance import Decoupled, advance, mirrored
+from validate.estimate.kalman.covariance import (
+    Claims,
+    Decoupled,
+    Spaces,
+    advance,
+    gain_sequence,
+    mirrored,
+    observed,
+    schedule,
+)
 from validate.estimate.kalman.displacement_filter import Estimate, Structure
 from validate.estimate.kalman.formulas import Gaussian, best_gain, kf_predict, kf_update
-from validate.estimate.kalman.gains import Claims, Spaces, gain_sequence, observed, schedule
 from validate.estimate.kalman.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
-from validate.estimate.reduced.reduced_kf import ReducedKf, _doubled, dense_covariance, steady
+from validate.estimate.reduced.reduced_kf import (
+    LoadDoubt,
+    ReducedKf,
+    _doubled,
+    dense_covariance,
+    reduced_model,
+    steady,
+)
 from validate.estimate.reduced.small_state import CoreStepper
 from validate.fem.system import build
 from validate.scene.material import Region

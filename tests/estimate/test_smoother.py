@@ -18,10 +18,14 @@ from validate.estimate.filters import FILTERS, Filter
 from validate.estimate.kalman.covariance import Dense
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.kalman.modal_kf import ModalKf
-from validate.estimate.reduced.linear_system import LoadDoubt, reduced_model
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
 from validate.estimate.reduced.reduced_ekf import ReducedEKF, ShapesCore
-from validate.estimate.reduced.reduced_kf import ReducedKf, dense_covariance
+from validate.estimate.reduced.reduced_kf import (
+    LoadDoubt,
+    ReducedKf,
+    dense_covariance,
+    reduced_model,
+)
 from validate.estimate.smoother import Look, Note, Smoothed, smoothed
 from validate.testing.pulled_cube import DT, PulledCase, case
 

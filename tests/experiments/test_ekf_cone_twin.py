@@ -12,13 +12,12 @@ from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build, responses
-from validate.recording.digest import digest
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
+from validate.recording.reader import digest
 from validate.recording.types import Recording
 from validate.register.markers.markers import placed_markers
-from validate.scene.geometries.cylinder import quarter_cone
-from validate.scene.geometries.specification import Cone
+from validate.scene.geometries.specification import Cone, quarter_cone
 from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.solve.static.newton import StaticNewton
 

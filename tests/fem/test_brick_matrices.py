@@ -21,8 +21,13 @@ from experiments.bending_rod.body import GRAVITY, bending_rod
 from experiments.needle_block.body import needle_block
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import mass, shape_gradients, stiffness, stiffness_damping
-from validate.fem.assembly.loads import facet_integrals
+from validate.fem.assembly.assemble import (
+    facet_integrals,
+    mass,
+    shape_gradients,
+    stiffness,
+    stiffness_damping,
+)
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
 from validate.scene.geometries.box import grid

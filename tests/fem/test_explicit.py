@@ -10,7 +10,7 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.kernels.laws import principal
-from validate.fem.kernels.tensors import inverse_cube_root
+from validate.fem.kernels.points import inverse_cube_root
 from validate.fem.large_strain.explicit import ExplicitBody
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build

@@ -8,8 +8,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import stiffness
-from validate.fem.assembly.loads import facet_integrals
+from validate.fem.assembly.assemble import facet_integrals, stiffness
 from validate.fem.locking import locking_notes
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, centroids

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.assembly.loads import load_columns
+from validate.fem.assembly.assemble import load_columns
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material

@@ -9,7 +9,7 @@ from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, ph
 from validate.errors import SceneError
 from validate.fem.system import Responses, build, responses
 from validate.scene.geometries.box import box
-from validate.scene.geometries.cylinder import quarter_cylinder
+from validate.scene.geometries.specification import quarter_cylinder
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, cell_volumes, quadratic
 from validate.scene.scene import Cavity, Dilatation, Drive, Load, Pin, Scene, Support

@@ -12,11 +12,10 @@ from machine_logs import pressed_cylinder
 from validate.commands.main import run
 from validate.compare.verdict import Accept
 from validate.errors import RecordingError, UsageError
-from validate.identify.budget import by_specimen
-from validate.identify.repeats import averaged, labels_of
+from validate.identify.budget import averaged, by_specimen, labels_of
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.plates.choices import Compression
 from validate.pipeline.plates.compression import compression
+from validate.pipeline.plates.scene import Compression
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import REPEATS, SHARE, repeats_share

@@ -9,7 +9,7 @@ from test_consistency_tables import STEPS, followed
 
 from validate.errors import UsageError
 from validate.pipeline import load, run_in_memory
-from validate.pipeline.exhibits.gating import doubt, estimated_exhibit, sentences
+from validate.pipeline.exhibits.standard import doubt, estimated_exhibit, sentences
 from validate.pipeline.run.method_run import MethodRun
 from validate.solve.types import Trace
 

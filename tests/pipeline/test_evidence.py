@@ -18,7 +18,7 @@ from validate.compare.verdict import Accept
 from validate.engine.cell import Where
 from validate.engine.pool import Pool
 from validate.errors import ComparisonError, UsageError
-from validate.library.run_report import ReportedRun
+from validate.library.single_run import ReportedRun
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Experiment, Identified, Twin, Uncertainty, vary
 from validate.pipeline.experiment.options import Options

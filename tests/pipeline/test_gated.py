@@ -3,7 +3,7 @@
 import numpy as np
 from test_consistency_tables import STEPS, T, followed
 
-from validate.pipeline.exhibits.gating import gate_exhibit, gate_warnings
+from validate.pipeline.exhibits.standard import gate_exhibit, gate_warnings
 from validate.pipeline.run.method_run import MethodRun
 from validate.solve.types import Trace
 

@@ -23,8 +23,8 @@ from validate.pipeline.calibration.fitted_moduli import Moves, sentence
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.choices import Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
+from validate.pipeline.plates.scene import Compression, CompressionRanges
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.report.stored.store import document, schema

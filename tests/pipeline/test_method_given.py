@@ -11,7 +11,7 @@ from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.parameters import with_values
 from validate.pipeline.calibration import calibrated
-from validate.pipeline.checks import numerical_uncertainty
+from validate.pipeline.checks import checks
 from validate.pipeline.experiment.experiment import Variant
 from validate.pipeline.experiment.find import _executed, load_file
 from validate.pipeline.experiment.method import Method
@@ -22,9 +22,9 @@ from validate.pipeline.live import prepared as prepared_live
 from validate.pipeline.live.live_recording import as_given
 from validate.pipeline.plates import inclusion
 from validate.pipeline.plates import outline as pressed_outline
-from validate.pipeline.plates.choices import Compression, CompressionRanges
 from validate.pipeline.plates.compression import compression
 from validate.pipeline.plates.outline import PressedOutline
+from validate.pipeline.plates.scene import Compression, CompressionRanges
 from validate.pipeline.run import twin_record
 from validate.pipeline.run.method_run import MethodRun
 from validate.recording.types import Recording, Source
@@ -172,9 +172,9 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
 
     runs = SimpleNamespace(varied=refuse)
     own, other = Variant("m"), Variant("m", split=2)
-    assert numerical_uncertainty._solved(runs, other) is None  # type: ignore[arg-type]
+    assert checks._solved(runs, other) is None  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="a hole without a node"):
-        numerical_uncertainty._solved(runs, own)  # type: ignore[arg-type]
+        checks._solved(runs, own)  # type: ignore[arg-type]
 
 
 def test_an_inclusion_without_loads_compares_nothing() -> None:
@@ -219,12 +219,12 @@ def test_meshes_differ_in_size(sizes: tuple[float, ...], refused: bool) -> None:
     runs = SimpleNamespace(parameters=None)
     found = {"mesh": [change(size) for size in sizes]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(numerical_uncertainty, "variants", lambda *_: found)
+        patch.setattr(checks, "variants", lambda *_: found)
         if refused:
             with pytest.raises(ComparisonError, match="mesh: sizes 1, 1, 1; u_num"):
-                numerical_uncertainty.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
+                checks.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
         else:
-            sizes_found = numerical_uncertainty.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
+            sizes_found = checks.Refined._size_of(own, "mesh", runs, "fine")  # type: ignore[arg-type]
             assert sizes_found == [1.0, 2.0, 4.0]
 
 

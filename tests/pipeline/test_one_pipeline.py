@@ -10,9 +10,8 @@ import pytest
 from tiny import AT_HOLDS, LOADS, STEPS, TINY, Breaks, stiffer
 
 from validate.compare.convergence import convergence
-from validate.compare.effects import Sensor
+from validate.compare.effects import Declared, Sensor
 from validate.compare.exhibit import Chart, Exhibit, NumberTable, Series
-from validate.compare.inputs import Declared
 from validate.compare.published import Figure
 from validate.compare.result import MethodResult, Result
 from validate.compare.score import Score

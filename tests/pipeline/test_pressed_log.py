@@ -7,7 +7,7 @@ import pytest
 from machine_logs import pressed_cylinder
 
 from validate.parameters import describe
-from validate.pipeline.checks.numerical_uncertainty import Refined
+from validate.pipeline.checks.checks import Refined
 from validate.pipeline.plates.scene import pressed_log
 
 

@@ -18,17 +18,16 @@ from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.experiment import Experiment, Uncertainty
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.choices import Compression, PressedOutline
 from validate.pipeline.plates.compression import compression
 from validate.pipeline.plates.outline import with_outline
+from validate.pipeline.plates.scene import Compression, PressedOutline
 from validate.recording.types import Contours, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.geometries.cylinder import whole_cylinder
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
-from validate.scene.geometries.specification import MeshFile
+from validate.scene.geometries.specification import MeshFile, whole_cylinder
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.scene.scene import Cavity, Drive

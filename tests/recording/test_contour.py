@@ -10,7 +10,7 @@ import scipy.io
 from script_modules import module_of
 
 from validate.errors import RecordingError
-from validate.recording.outlines import outline_tracking
+from validate.recording.outlines import outline
 from validate.recording.outlines.outline import (
     Outline,
     _fitted,
@@ -295,7 +295,7 @@ def test_even_images_are_counted_and_the_first_is_named() -> None:
     with pytest.raises(RecordingError, match=r"2 of 2 images .*image 0 \(t = 0.000 s\)"):
         outlines_of(flat(2))
     with pytest.raises(RecordingError, match=r"3 of 3 images .*image 0 \(t = 0.000 s\)"):
-        outline_tracking.followed(flat(3), outline_tracking.Hint(None, None), "images")
+        outline.followed(flat(3), outline.Hint(None, None), "images")
 
 
 def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,13 +311,13 @@ def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.Mo
             return far
 
     with pytest.raises(RecordingError, match=r"4.1 mm from.*radius is 4"):
-        outline_tracking._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
-    monkeypatch.setattr(outline_tracking.RivalRegion, "words", "a region of 3 mm")
-    rival = outline_tracking.RivalRegion.__new__(outline_tracking.RivalRegion)
+        outline._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
+    monkeypatch.setattr(outline.RivalRegion, "words", "a region of 3 mm")
+    rival = outline.RivalRegion.__new__(outline.RivalRegion)
     with pytest.raises(RecordingError, match=r"confidence 0.52.*0.6.*3 mm; .*--confidence 0.51\)"):
-        outline_tracking._require_sure((rival,), 0.519, 0.6)
-    outline_tracking._require_sure((rival,), 0.6, 0.6)
-    outline_tracking._require_sure((), 0.1, 0.6)
+        outline._require_sure((rival,), 0.519, 0.6)
+    outline._require_sure((rival,), 0.6, 0.6)
+    outline._require_sure((), 0.1, 0.6)
 
 
 RING = np.array([[4e-3, 0.0], [0.0, 4e-3], [-4e-3, 0.0]])

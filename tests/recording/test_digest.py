@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from mcap_samples import sample_recording
 
-from validate.recording.digest import digest, to_text
 from validate.recording.mcap.read import read_recording
+from validate.recording.reader import digest, to_text
 from validate.recording.types import Markers, Signal
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"

@@ -8,7 +8,7 @@ from exports import D, F, T, rows
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.motion_capture.text_rows import ASSUMED
-from validate.recording.tables.direction import kind_of_test
+from validate.recording.tables.columns import kind_of_test
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.tables.vocabulary import (
     COMPRESSION,

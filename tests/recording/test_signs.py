@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validate.recording.tables.direction import kind_of_test, signs
+from validate.recording.tables.columns import kind_of_test, signs
 
 
 def pick(slope: float, sign: int | None = None) -> SimpleNamespace:

@@ -6,7 +6,7 @@ import pytest
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.tables import columns as stepped
-from validate.recording.tables import specimen_sizes, table
+from validate.recording.tables import specimens, table
 from validate.recording.tables.columns import Said
 from validate.recording.tables.table import is_data, is_row, is_unit_row
 
@@ -64,9 +64,9 @@ def test_a_number_of_a_header_has_either_sign_but_where_it_may_group(
     if expected is None:
         says = f"header: 'width' is '{re.escape(text)}', not a plain number; write it without"
         with pytest.raises(RecordingError, match=says):
-            specimen_sizes._number("width", text, decimal)
+            specimens._number("width", text, decimal)
     else:
-        assert specimen_sizes._number("width", text, decimal) == expected
+        assert specimens._number("width", text, decimal) == expected
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from report_samples import no_gl
 
 from experiments.bending_rod.body import bending_rod
 from validate.report.scenes import gl
-from validate.report.scenes.element_surface import surface_of
-from validate.report.scenes.skin import skins
+from validate.report.scenes.body import skins
+from validate.report.scenes.panels import surface_of
 from validate.scene.geometries.specification import Box
 from validate.scene.mesh import Kind, quadratic
 from validate.scene.shape_functions import LATTICE

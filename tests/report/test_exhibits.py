@@ -22,7 +22,7 @@ from validate.compare.exhibit import Chart, NodeMap, NumberTable, Series, plain
 from validate.compare.result import Result
 from validate.errors import ComparisonError
 from validate.recording.mcap.read import read_recording
-from validate.report.charts.encode import encoded
+from validate.report.charts.style import encoded
 from validate.report.exhibits import DrawnExhibit, draw_all, drawing
 from validate.report.export.fields import open_fields, write_fields
 from validate.report.export.tables import caption, sheet, word_columns
@@ -32,9 +32,9 @@ from validate.report.scenes import gl
 from validate.report.scenes.loads import at_times, held
 from validate.report.scenes.maps import ranges, values
 from validate.report.sections.observations import holds
-from validate.report.sections.verdicts import band
+from validate.report.sections.sections import band
 from validate.report.stored.exhibit_rows import rounded, thinned
-from validate.report.stored.json_values import write_json
+from validate.report.stored.folder import write_json
 from validate.report.stored.store import document, schema
 from validate.report.write import write_report
 from validate.scene.geometries.box import box

@@ -11,9 +11,9 @@ from report_samples import small_result
 from validate.checksums import sealed
 from validate.report import write
 from validate.report.export.table_file import CSV, PARQUET
+from validate.report.stored.environment import Commit, Made
 from validate.report.stored.folder import MARK
 from validate.report.stored.history import LINES, current, replaced
-from validate.report.stored.provenance import Commit, Made
 from validate.report.stored.run_changes import history, since
 from validate.report.write import write_report
 

@@ -9,8 +9,8 @@ from command_line import here, refused
 from report_samples import small_result
 
 from validate.parameters import Changed
-from validate.report.stored.json_values import write_json
-from validate.report.stored.provenance import Commit, Made
+from validate.report.stored.environment import Commit, Made
+from validate.report.stored.folder import write_json
 from validate.report.stored.store import document
 
 

@@ -14,8 +14,7 @@ from validate.report.exhibits import draw_all
 from validate.report.page.html import page
 from validate.report.sections.provenance import how
 from validate.report.stored import environment as module
-from validate.report.stored.environment import environment
-from validate.report.stored.provenance import Commit, Made, UsedFile, commit_of, made
+from validate.report.stored.environment import Commit, Made, UsedFile, commit_of, environment, made
 from validate.report.stored.store import document, schema
 
 # private: _memory, _version: called alone, case by case.

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from validate.report.scenes import node_sets
+from validate.report.scenes import points as drawing
 from validate.report.scenes.maps import TOWARD_EYE, facing, screen
-from validate.report.scenes.node_sets import node_sets_picture
+from validate.report.scenes.points import node_sets_picture
 from validate.scene.geometries.box import box
 
-# private: _fill: called alone, case by case.
+# private: _fill_sets: called alone, case by case.
 
 MESH = box((0.1, 0.1, 0.1), (2, 2, 2))
 TOP, BOTTOM = MESH.facet_nodes("z1"), MESH.facet_nodes("z0")
@@ -18,7 +18,7 @@ SETS = {"held": BOTTOM, "loaded": TOP}
 
 def drawn() -> Figure:
     figure = Figure()
-    node_sets._fill(figure, MESH, SETS, {"A": int(TOP[4])})
+    drawing._fill_sets(figure, MESH, SETS, {"A": int(TOP[4])})
     return figure
 
 

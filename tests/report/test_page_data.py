@@ -19,9 +19,7 @@ from tracking_samples import tracking_result
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, Intervals, Series
 from validate.report.exhibits import draw_all
-from validate.report.page.body_view import body_view
-from validate.report.page.html import first_pictures, forest
-from validate.report.page.plots import plot
+from validate.report.page.html import body_view, first_pictures, forest, plot
 from validate.report.scenes.body_scene import body_scene
 from validate.report.sections.observations import markers_seen
 from validate.scene.material import Material

@@ -5,7 +5,7 @@ from types import SimpleNamespace as Made
 import pytest
 
 from validate.compare.exhibit import TableCell
-from validate.report.views.records import chart, grouped, objects, sized, table
+from validate.report.views.view_filling import chart, grouped, objects, sized, table
 
 FAST = Made(name="fast", step=Made(p50=2e-6), error=1e-3, sizes=(4, 5), more={"K": 7.0}, unit="m")
 SLOW = Made(name="slow", step=None, error=3e-3, sizes=(6, 7), more={}, unit="m")

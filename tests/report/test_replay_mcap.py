@@ -34,7 +34,7 @@ from validate.recording.types import Frames
 from validate.register.outlines.outlines import normal_distances
 from validate.register.outlines.plane import from_image
 from validate.report.replay import mcap as replay_mcap
-from validate.report.replay import signals as replay_signals
+from validate.report.replay import space as replay_signals
 from validate.report.replay.mcap import tracks, views, write_replay
 from validate.report.replay.view import Track
 from validate.report.sections import observations

@@ -5,7 +5,7 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from report_samples import scene as cube_scene
 
-from validate.report.scenes.skin import SurfacePart, skins
+from validate.report.scenes.body import SurfacePart, skins
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene

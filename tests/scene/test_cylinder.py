@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.scene.geometries.cylinder import hexahedral_cylinder, quarter_cylinder
+from validate.scene.geometries.specification import hexahedral_cylinder, quarter_cylinder
 from validate.scene.mesh import boundary_facets, cell_volumes, require_positive_cells
 
 EXACT = np.pi * 0.05**2 / 16 * 0.03

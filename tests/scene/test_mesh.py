@@ -7,7 +7,7 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh
 
 from validate.errors import SceneError
-from validate.scene.geometries.cylinder import quarter_cylinder
+from validate.scene.geometries.specification import quarter_cylinder
 from validate.scene.mesh import (
     EDGES,
     Mesh,

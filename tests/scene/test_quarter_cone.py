@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.scene.geometries.cylinder import quarter_cone, quarter_cylinder
+from validate.scene.geometries.specification import quarter_cone, quarter_cylinder
 from validate.scene.mesh import boundary_facets, cell_volumes, quadratic
 
 BOTTOM, TOP, HEIGHT = 0.068, 0.058, 0.028

@@ -7,7 +7,7 @@ import pytest
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.loads import uniform_shares
+from validate.fem.assembly.assemble import uniform_shares
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.refinement import refined

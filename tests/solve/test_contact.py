@@ -39,10 +39,9 @@ from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import march
-from validate.solve.static.contact import ContactNewton, ContactStepper
+from validate.solve.static.contact import SLIP, STICK, ContactNewton, ContactStepper
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic
-from validate.solve.static.touching import SLIP, STICK
 
 # private: _correction: called alone, case by case.
 

@@ -27,8 +27,7 @@ from validate.solve.study_entries import (
     implicit_maps,
 )
 from validate.solve.types import Scheme, Stepper
-from validate.study.choose.climb import Climb
-from validate.study.choose.study import choose, wanted
+from validate.study.choose.study import Climb, choose, wanted
 from validate.study.stability.study import declared
 from validate.study.tradeoff.study import again
 

@@ -11,9 +11,8 @@ from study_samples import experiment_file
 
 from validate.compare.force_error import rmse, track_error
 from validate.engine.cell import Plan, Record, Where
-from validate.engine.execution import finish
+from validate.engine.execution import fingerprint, finish
 from validate.engine.store import read_records
-from validate.engine.worker_cache import fingerprint
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.kalman.coordinates import Batch
 from validate.estimate.kalman.displacement_filter import DisplacementStepper

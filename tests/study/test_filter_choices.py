@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from validate.engine.cell import Record
-from validate.study.filters.blocks import Blocks, blocks_of, cut, nested, score_difference
-from validate.study.filters.exhibits import consistency_words
+from validate.study.filters.page import consistency_words
 from validate.study.filters.plan import FilterCell
 from validate.study.filters.ranking import Ranked, picks, rankings
 from validate.study.filters.score import (
@@ -17,7 +16,12 @@ from validate.study.filters.score import (
     LOG_LOSS,
     POOLED,
     WITHHELD,
+    Blocks,
     FilterScores,
+    blocks_of,
+    cut,
+    nested,
+    score_difference,
     withheld_scores,
 )
 from validate.study.filters.study import Best, _best, _edges, usual_score

@@ -10,9 +10,8 @@ from study_samples import experiment_file
 from validate.engine.cell import Record, Where
 from validate.pipeline.experiment.find import load_file
 from validate.study.filters import page as filter_page
-from validate.study.filters.blocks import Blocks, cut
 from validate.study.filters.ranking import rankings
-from validate.study.filters.score import LOG_LOSS, FilterScores
+from validate.study.filters.score import LOG_LOSS, Blocks, FilterScores, cut
 from validate.study.filters.study import predictive_likelihood, study, with_likelihood
 from validate.study.filters.withheld_errors import PredictionErrors, Segments, prediction_errors
 

@@ -11,8 +11,8 @@ import pytest
 from validate.compare.published import Published
 from validate.report.stored.store import figure_members
 from validate.report.stored.tables import open_store
-from validate.study.stored_runs.predictions import stored_runs
 from validate.study.stored_runs.published_page import write_published
+from validate.study.stored_runs.summary import stored_runs
 
 Json = dict[str, Any]
 

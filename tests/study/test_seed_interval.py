@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.study.filters.blocks import score_difference
-from validate.study.filters.score import FilterScores, SeedInterval, interval
+from validate.study.filters.score import FilterScores, SeedInterval, interval, score_difference
 
 
 def test_the_95_percent_interval_of_five_numbers() -> None:

@@ -17,8 +17,16 @@ from validate.errors import UsageError
 from validate.report.export import parquet
 from validate.report.export.table_file import stored_table, write_long_table
 from validate.report.export.tables import shown
-from validate.study.stored_runs.predictions import predictions, stored_runs
-from validate.study.stored_runs.summary import _ROWS, Summary, _against, _points, document, summary
+from validate.study.stored_runs.summary import (
+    _ROWS,
+    Summary,
+    _against,
+    _points,
+    document,
+    predictions,
+    stored_runs,
+    summary,
+)
 
 # private: _ROWS: a limit or list of the code, which the test must meet exactly.
 # private: _against, _points: called alone, case by case.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from validate.pipeline.ladder.ladder import PaperSetting, Turned
-from validate.report.views.records import table
-from validate.study.filters.exhibits import _pareto_chart, _pareto_exhibit, _ranking_exhibit
+from validate.report.views.view_filling import table
+from validate.study.filters.page import _pareto_chart, _pareto_exhibit, _ranking_exhibit
 from validate.study.stability import page as stability_exhibits
 from validate.study.stability.gain import _cells
 from validate.study.stability.gain import _map as gain_map
@@ -32,7 +32,7 @@ def test_updates_of_a_loop_that_never_settles_are_none() -> None:
 def test_tables_of_a_front_are_numbered_from_one() -> None:
     empty = Made(rows=(), front=(), condition=())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("validate.study.filters.exhibits._under", lambda ranking: "")
+        patch.setattr("validate.study.filters.page._under", lambda ranking: "")
         made = _pareto_exhibit(Made(rankings=[empty, empty], unit="m"))
     assert [t.name for t in made.tables] == ["pareto_1", "pareto_2"]
 
@@ -41,7 +41,7 @@ def test_tables_of_a_front_are_numbered_from_one() -> None:
 def test_a_lone_ranking_shows_more_places(
     monkeypatch: pytest.MonkeyPatch, conditions: int, shown: int
 ) -> None:
-    module = "validate.study.filters.exhibits."
+    module = "validate.study.filters.page."
     monkeypatch.setattr(module + "_under", lambda ranking: "")
     monkeypatch.setattr(module + "_ranking_words", lambda study: ())
     monkeypatch.setattr(
@@ -59,7 +59,7 @@ def test_a_point_of_the_front_is_drawn_under_its_method(monkeypatch: pytest.Monk
 
     rows = (row("kf", 1e-3, 2e-3), row("ekf", 2e-3, 1e-3), row("kf", 4e-3, 3e-3),
             row("exact", 1e-3, 0.0), row("untimed", None, 1.0))  # fmt: skip
-    monkeypatch.setattr("validate.study.filters.exhibits._under", lambda ranking: "")
+    monkeypatch.setattr("validate.study.filters.page._under", lambda ranking: "")
     chart = _pareto_chart(Made(by="rmse", unit="m"), Made(rows=rows, front=rows[:2]), 1)
     drawn = {s.label: (s.x.tolist(), s.y.tolist()) for s in chart.series}
     assert drawn == {

@@ -16,9 +16,8 @@ from validate.pipeline.ladder.default import Divided, body_of, trial_of
 from validate.pipeline.ladder.ladder import RUNGS, Trial
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import StepTimes
-from validate.study.choose.climb import Climb, require_judged
 from validate.study.choose.facts import facts
-from validate.study.choose.study import Wanted, meeting, misses
+from validate.study.choose.study import Climb, Wanted, meeting, misses, require_judged
 from validate.study.tradeoff.exhibits import pays, regions_exhibit, trade_exhibits
 from validate.study.tradeoff.study import Trade, TradeRow
 

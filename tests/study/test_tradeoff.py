@@ -34,7 +34,7 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import StepTimes
-from validate.study.choose import climb
+from validate.study.choose import study as climb
 from validate.study.choose.exhibits import choose_exhibits
 from validate.study.choose.facts import principal_strains
 from validate.study.choose.study import Wanted, choose, wanted

@@ -22,11 +22,18 @@ from validate.register.outlines.outlines import observe_outlines
 from validate.register.outlines.plane import cavity_sampler
 from validate.scene.geometries.box import box
 from validate.study.filters.bench import Bench
-from validate.study.filters.blocks import cut, nested, score_interval
 from validate.study.filters.cell import folds_of, run_cell
-from validate.study.filters.exhibits import against_first, study_exhibits
+from validate.study.filters.page import against_first, study_exhibits
 from validate.study.filters.plan import FilterCell, plan
-from validate.study.filters.score import AHEAD, HELD_OUT, WITHHELD, FilterScores
+from validate.study.filters.score import (
+    AHEAD,
+    HELD_OUT,
+    WITHHELD,
+    FilterScores,
+    cut,
+    nested,
+    score_interval,
+)
 from validate.study.filters.study import study
 from validate.study.filters.withheld_errors import (
     Innovations,

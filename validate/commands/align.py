@@ -32,7 +32,7 @@ from validate.recording.merge import (
 from validate.recording.readers import read_recording
 from validate.recording.types import Signal
 from validate.report.charts.clock_alignment import aligned
-from validate.report.charts.encode import png
+from validate.report.charts.style import png
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ def detailed(command: Callable[..., Any]) -> Any:
 
     @wraps(command)
     def chosen(*, quiet: bool, verbose: bool, **given: Any) -> Any:
-        from validate.commands.progress import quiet as without_progress
+        from validate.commands.display import quiet as without_progress
 
         if quiet and verbose:
             raise UsageError("-q and --verbose exclude each other: give one")

@@ -5,8 +5,8 @@ from validate.commands.display import shown
 from validate.commands.screen import Passage, rows, sentences
 from validate.commands.study import StudyOptions, answer, listed, noted, printed
 from validate.library import studies
-from validate.study.identify import page as identify_page
-from validate.study.identify.page import units
+from validate.study.identify import study as identify_page
+from validate.study.identify.study import units
 
 _HEAD = ("", "value", "95 % from", "to", "identified")
 

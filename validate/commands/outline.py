@@ -7,18 +7,22 @@ from typing import Any
 import numpy as np
 
 from validate.commands.arguments import complain
-from validate.commands.display import say
-from validate.commands.progress import progress
+from validate.commands.display import progress, say
 from validate.errors import RecordingError, UsageError
 from validate.files import safe_name
 from validate.places import try_file
 from validate.recording.mcap.write import write_recording
-from validate.recording.outlines.outline import RivalRegion
-from validate.recording.outlines.outline_tracking import EXPERTS, FollowedOutline, Hint, followed
+from validate.recording.outlines.outline import (
+    EXPERTS,
+    FollowedOutline,
+    Hint,
+    RivalRegion,
+    followed,
+)
 from validate.recording.outlines.third_party_outlines import foreign_outlines
 from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Frames, Recording
-from validate.report.charts.encode import png
+from validate.report.charts.style import png
 from validate.report.scenes.outline_images import PlaceSaid, outlines_over
 from validate.report.sections.observations import Held
 from validate.units import in_si, split

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from validate.commands.arguments import pairs
-from validate.commands.progress import progress
+from validate.commands.display import progress
 from validate.commands.recordings import written as say
 from validate.commands.run import ask_about
 from validate.errors import UsageError
@@ -11,8 +11,8 @@ from validate.parameters import with_values
 from validate.pipeline.experiment.find import find
 from validate.pipeline.run.twin_record import stamped
 from validate.places import try_file, write_whole
-from validate.recording.digest import digest, to_text
 from validate.recording.mcap.write import write_recording
+from validate.recording.reader import digest, to_text
 from validate.recording.readers import read_recording
 
 

@@ -8,7 +8,7 @@ from validate.commands.arguments import complain, pairs
 from validate.commands.display import say
 from validate.errors import UsageError
 from validate.files import member, members
-from validate.identify.repeats import averaged, labels_of
+from validate.identify.budget import averaged, labels_of
 from validate.places import try_file
 from validate.recording.clocks.alignment import declared_offset, shift
 from validate.recording.images.image import AS_IT_IS

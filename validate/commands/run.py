@@ -8,12 +8,11 @@ from time import perf_counter
 
 from validate.catalogue import experiment_files
 from validate.commands.arguments import BAD_INPUT, FAILED, OK, Detail, command_line, complain, pairs
-from validate.commands.display import say
-from validate.commands.progress import progress
+from validate.commands.display import progress, say
 from validate.commands.run_screen import called, show_run
 from validate.engine.pool import Pool
 from validate.errors import UsageError, ValidateError
-from validate.library.run_report import reported_run
+from validate.library.single_run import reported_run
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.experiment.options import Options, configure, doubtful, folder_of

@@ -8,8 +8,7 @@ from typing import Any
 
 from validate.checksums import read_sealed
 from validate.commands.arguments import FAILED, OK, Detail, command_line, pairs
-from validate.commands.display import relative, say, table
-from validate.commands.progress import progress
+from validate.commands.display import progress, relative, say, table
 from validate.commands.screen import Passage, cut, rows, sentences, show
 from validate.compare.exhibit import Entry, TableCell, plain
 from validate.engine.cell import Where
@@ -24,7 +23,7 @@ from validate.study.choose.study import Choice, error_of
 from validate.study.coverage import page as coverage_page
 from validate.study.coverage.page import HEAD, interval, percent
 from validate.study.filters import page as filter_page
-from validate.study.filters.exhibits import chosen_line, ranking_table
+from validate.study.filters.page import chosen_line, ranking_table
 from validate.study.filters.ranking import Ranking
 from validate.study.filters.stability import sentence as ending_words
 from validate.study.filters.study import FilterStudy

@@ -17,10 +17,6 @@ _HOMES = {
         "Score",
         "scores_of",
     ),
-    "inputs": (
-        "Declared",
-        "Joint",
-    ),
     "verdict": (
         "Accept",
         "Check",
@@ -32,7 +28,9 @@ _HOMES = {
         "Published",
     ),
     "effects": (
+        "Declared",
         "Effect",
+        "Joint",
         "Sensor",
     ),
     "shapes.two_fields": ("compare_fields",),

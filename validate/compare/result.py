@@ -26,8 +26,7 @@ from validate.parameters import Changed, Parameter
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Stream
 
 if TYPE_CHECKING:
-    from validate.compare.effects import Effect
-    from validate.compare.inputs import Declared, Joint
+    from validate.compare.effects import Declared, Effect, Joint
     from validate.identify.budget import IdentifiedValue
     from validate.recording.types import Recording
     from validate.register.registration import Registered

@@ -1,13 +1,71 @@
-"""Pool of workers of one command: this process, local workers or a scheduler."""
+"""Pool of workers of one command and their queue of cells: this process, local or a scheduler."""
 
+import os
+import signal
+import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from multiprocessing import forkserver, set_forkserver_preload
+from pathlib import Path
 from typing import Any
 
+from validate.child_process import isolating_environment
 from validate.engine.cell import Where
 from validate.errors import UsageError
 from validate.fem.kernels.threads import idle_now
+
+# --- fork server of local workers: libraries are imported there once -----------------------------
+
+# One thread; freed memory of up to 256 MB is kept for the next array of a step (glibc): its pages
+# would be taken from the system anew each time, 1.1 million of them in a run of 310 implicit steps.
+_OF_WORKERS = {
+    "NUMBA_NUM_THREADS": "1",
+    "MALLOC_MMAP_THRESHOLD_": "32000000",
+    "MALLOC_TRIM_THRESHOLD_": "256000000",
+}
+
+
+def serve(preload: Sequence[str]) -> None:
+    """Start the process where it does not run yet; what it cannot import each worker imports."""
+    set_forkserver_preload(["distributed", *preload])
+    with isolating_environment(), _deaf_to_interrupts(), _without_output():
+        os.environ.update(_OF_WORKERS)
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _without_output() -> Iterator[None]:
+    """Standard output and error of what is started here lead nowhere."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [(fd, os.dup(fd)) for fd in (1, 2)]
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            for fd, _ in kept:
+                os.dup2(nowhere.fileno(), fd)
+        yield
+    finally:
+        for fd, copy in kept:
+            os.dup2(copy, fd)
+            os.close(copy)
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes started here leave Ctrl-C to their parent, which ends them in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# --- pool of workers of one command: this process, local workers or a scheduler ------------------
 
 
 class Pool:
@@ -59,7 +117,7 @@ class Pool:
     def prepare(self) -> None:
         """Has what workers need imported, in a process that they are forked from later."""
         if self.workers and not self.address:
-            from validate.engine.server import serve
+            from validate.engine.pool import serve
 
             serve(self._preload)
 
@@ -106,3 +164,62 @@ class Pool:
             self._client = self._stack.enter_context(connected(self._where, self._count))
         except BaseException as error:
             self._error = error
+
+
+# --- queue of waiting cells, shared by workers and the calling process ---------------------------
+
+Batch = tuple[Any, ...]
+
+
+class Queue:
+    """Cells in order. While one that is timed runs, at most `beside` batches run in all."""
+
+    def __init__(self, cells: Sequence[Any], beside: int = 1) -> None:
+        self._waiting = deque(cells)
+        self._beside = beside
+        self._running: list[Batch] = []
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    @property
+    def running(self) -> int:
+        return len(self._running)
+
+    @property
+    def first(self) -> Any:
+        """The next cell; None where none waits."""
+        with self._lock:
+            return self._waiting[0] if self._waiting else None
+
+    def take(self, most: int = 1) -> Batch:
+        """At most so many of the next cells, timed ones singly; () where none may start now."""
+        with self._lock:
+            if not self._waiting or not self._may_start(self._waiting[0]):
+                return ()
+            batch: Batch = (self._waiting.popleft(),)
+            while len(batch) < most and self._waiting:
+                if batch[0].timed or self._waiting[0].timed:
+                    break
+                batch += (self._waiting.popleft(),)
+            self._running.append(batch)
+            return batch
+
+    def ended(self, batch: Batch) -> None:
+        with self._lock:
+            self._running.remove(batch)
+
+    def again(self, cell: Any) -> None:
+        """A cell whose result was lost is the next one."""
+        with self._lock:
+            self._waiting.appendleft(cell)
+
+    def close(self) -> None:
+        """Nothing is taken any more."""
+        with self._lock:
+            self._waiting.clear()
+
+    def _may_start(self, cell: Any) -> bool:
+        timed = cell.timed or any(c.timed for batch in self._running for c in batch)
+        return not timed or len(self._running) < self._beside

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from validate.engine.execution import fingerprint
 from validate.engine.identity import PACKAGE
-from validate.engine.worker_cache import fingerprint
 
 _OURS = PACKAGE.name
 _PYTHON = sys.stdlib_module_names - {"__main__"}

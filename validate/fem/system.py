@@ -17,9 +17,15 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.assemble import lumped, mass, stiffness, stiffness_damping
+from validate.fem.assembly.assemble import (
+    hung_masses,
+    load_columns,
+    lumped,
+    mass,
+    stiffness,
+    stiffness_damping,
+)
 from validate.fem.assembly.assemble import mass as mass_matrix
-from validate.fem.assembly.loads import hung_masses, load_columns
 from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
 from validate.fem.linear_solvers.factor import Factor, Fronts, factorise, require_assembly
 from validate.scene.mesh import Mesh

@@ -14,8 +14,7 @@ from validate.errors import ComparisonError
 from validate.files import safe_name
 from validate.report.charts import chart as charts
 from validate.report.charts import heat, intervals, regime_map
-from validate.report.charts.encode import encoded
-from validate.report.charts.style import HasMethods
+from validate.report.charts.style import HasMethods, encoded
 from validate.report.export.tables import write_chart, write_table
 from validate.report.scenes import gl
 from validate.report.scenes.maps import Range, drawn, legible, ranges

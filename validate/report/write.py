@@ -21,11 +21,10 @@ from validate.report.export.fields import write_fields
 from validate.report.export.table_file import write_long_table
 from validate.report.long_table import LongTable, long_table, traces_of
 from validate.report.sections.observations import signals
-from validate.report.sections.verdicts import band
-from validate.report.stored.folder import MARK, STUDIES, replace_folder
+from validate.report.sections.sections import band
+from validate.report.stored.environment import Made
+from validate.report.stored.folder import MARK, STUDIES, Json, replace_folder, write_json
 from validate.report.stored.history import carried, write_lines
-from validate.report.stored.json_values import Json, write_json
-from validate.report.stored.provenance import Made
 from validate.report.stored.store import document
 
 if TYPE_CHECKING:  # what draws is imported when something is drawn
@@ -112,8 +111,7 @@ def _fill(
 ) -> None:
     # What draws is imported when something is drawn: matplotlib takes half a second.
     from validate.report.exhibits import drawing, in_turn, write_files
-    from validate.report.page.body_view import body_view
-    from validate.report.page.html import page
+    from validate.report.page.html import body_view, page
     from validate.report.replay.mcap import write_replay
     from validate.report.sections.provenance import how
     from validate.report.sections.sections import SECTIONS, parts

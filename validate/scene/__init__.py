@@ -26,7 +26,7 @@ _HOMES = {
     "meshless": ("MaterialPoint", "RigidBody"),
     "geometries.box": ("grid",),
     "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
-    "geometries.cylinder": ("quarter_cylinder",),
+    "geometries.specification": ("quarter_cylinder",),
     "geometries.inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "geometries.refinement": ("refined",),
     "prescribed_motion": ("Prescribed",),

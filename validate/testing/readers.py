@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.recording.digest import digest
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.text_rows import LEFT_OUT
-from validate.recording.reader import Options, Reader
+from validate.recording.reader import Options, Reader, digest
 from validate.recording.types import Recording
 from validate.testing.requirements import refusal, require
 

@@ -1,10 +1,9 @@
 """Questions about a measured body of any shape, by the paths of its parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -34,6 +33,7 @@ from validate.commands.questions.kinds import (
     three_of,
     unit_of,
 )
+from validate.commands.questions.law import LINEAR, law_questions
 from validate.commands.questions.motion import (
     DYNAMIC,
     cells_for,
@@ -45,14 +45,13 @@ from validate.commands.questions.motion import (
 from validate.commands.questions.scene import CELLS, answered_mesh, imports, rendered, tree_of
 from validate.commands.recording_summary import beside
 from validate.errors import UsageError
-from validate.parameters import with_values
 from validate.pipeline.bodies.markers import AS_SEEN
 from validate.pipeline.bodies.mesh import PLATES, sizes_of_mesh, unknowns_of
-from validate.pipeline.run.cost import FEWEST_STATES, RUNS, newton_seconds, states_within
+from validate.pipeline.run.estimate import FEWEST_STATES, RUNS, newton_seconds, states_within
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile
-from validate.scene.laws import LAWS, Coefficients, law_kind
+from validate.scene.laws import law_kind
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
@@ -345,71 +344,6 @@ BODY = NewKind(
     _used,
     _assumed,
 )
-
-
-# --- questions about the constitutive law of a material and its coefficients ---------------------
-
-LINEAR = "linear"
-
-
-def law_names() -> tuple[str, ...]:
-    """Return the names of all laws, those of plug-ins among them, the linear one last."""
-    return (*(kind.name for kind in LAWS), LINEAR)
-
-
-def law_questions(found: Answers, default: str, why: str) -> list[Question]:
-    """Return the question about the law, and those about the coefficients that it has beyond the
-    modulus and Poisson ratio."""
-    known = ", ".join(f"{kind.name} ({kind.title})" for kind in LAWS)
-    law = Question("law", f"law of the material: {LINEAR}, or at large strain {known}", default,
-                   why, choices=law_names())  # fmt: skip
-    names = law_kind(found.get("law", LINEAR)).coefficients
-    return [law, *(_of_coefficient(found, name, last=name == names[-1]) for name in names)]
-
-
-def coefficient_values(found: Answers) -> dict[str, str]:
-    """Return the answered coefficients of the law by path."""
-    names = law_kind(found.get("law", LINEAR)).coefficients
-    paths = [f"material.{name}" for name in names]
-    return {path: found[path] for path in paths if found.get(path)}
-
-
-def coefficients_of(found: Answers) -> type[Coefficients]:
-    """Return the class of the coefficients of the answered law."""
-    return law_kind(found.get("law", LINEAR)).holds or Coefficients
-
-
-def left_open(found: Answers) -> set[str]:
-    """Return the paths of the law's coefficients while one of them is not answered yet: they have
-    to agree."""
-    names = law_kind(found.get("law", LINEAR)).coefficients
-    paths = {f"material.{name}" for name in names}
-    return set() if paths <= found.keys() else paths
-
-
-def _of_coefficient(found: Answers, name: str, *, last: bool) -> Question:
-    (f,) = (f for f in fields(coefficients_of(found)) if f.name == name)
-    unit = f.metadata["unit"]
-    text = f"{f.metadata['doc']}{'' if unit == '1' else f'; {unit}'}"
-    may_be_empty = f.default == ()
-    return Question(
-        f"material.{name}", text + ("; empty: none" if may_be_empty else ""),
-        open=not may_be_empty, check=_checked(found, f, last=last),
-    )  # fmt: skip
-
-
-def _checked(found: Answers, f: Any, *, last: bool) -> Callable[[str], Any]:
-    """A check of one number; lists have to agree and are checked with the last one."""
-
-    def check(text: str) -> None:
-        values: Mapping[str, str] = {f.name: text}
-        if last:
-            own = coefficient_values(found)
-            values = {**{k.removeprefix("material."): v for k, v in own.items()}, **values}
-        if last or isinstance(f.default, float):
-            with_values(coefficients_of(found)(), values)
-
-    return check
 
 
 # --- questions about the mesh file of a specimen between plates ----------------------------------

@@ -15,7 +15,7 @@ from validate.commands.questions.kinds import (
     reason_question,
 )
 from validate.parameters import with_values
-from validate.pipeline.plates.choices import Compression
+from validate.pipeline.plates.scene import Compression
 from validate.recording.types import Recording
 from validate.scene.places import axis_of
 

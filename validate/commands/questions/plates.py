@@ -10,20 +10,22 @@ import numpy as np
 from validate.commands.questions import outline as new_outline
 from validate.commands.questions.answers import Answers, Question
 from validate.commands.questions.body import (
-    LINEAR,
-    coefficient_values,
-    coefficients_of,
     declared_mesh,
-    law_questions,
     linear_cells,
     mesh_questions,
     mesh_sizes,
     specimen_mesh,
 )
 from validate.commands.questions.kinds import NewKind, quantity_in, reason_question
+from validate.commands.questions.law import (
+    LINEAR,
+    coefficient_values,
+    coefficients_of,
+    law_questions,
+)
 from validate.identify.modulus import stated_test
 from validate.parameters import with_values
-from validate.pipeline.plates.choices import Compression, stated_sizes
+from validate.pipeline.plates.scene import Compression, stated_sizes
 from validate.recording.types import Recording
 from validate.scene.body_facts import SAME
 from validate.scene.laws import law_kind
@@ -184,7 +186,7 @@ def _imports(found: Answers) -> set[str]:
     body = "MeshFile" if found.get("body.file") else "Cylinder"
     return laws | {f"from validate.solve.{line}" for line in solver} | {
         "from validate.compare.verdict import Accept",
-        "from validate.pipeline.plates.choices import BONDED_PLATES, Compression, "
+        "from validate.pipeline.plates.scene import BONDED_PLATES, Compression, "
         f"CompressionRanges{outline}",
         "from validate.pipeline.experiment.experiment import Experiment",
         "from validate.pipeline.experiment.method import Method",

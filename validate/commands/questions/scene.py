@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from validate.commands.questions.answers import Answers
-from validate.commands.questions.body import coefficient_values, left_open
 from validate.commands.questions.contact import CONTACT_WORDS, contact_settings, indented, reach_of
 from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, sides, unit_of
+from validate.commands.questions.law import coefficient_values, left_open
 from validate.errors import SceneError, UsageError
 from validate.parameters import describe, with_values
+from validate.pipeline.bodies.body_dynamics import WATER
 from validate.pipeline.bodies.choices import MeasuredBody
-from validate.pipeline.bodies.first_modes import WATER
 from validate.pipeline.bodies.mesh import grid_unknowns
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording

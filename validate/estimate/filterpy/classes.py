@@ -16,7 +16,7 @@ from filterpy.kalman import (
 )
 
 from validate.arrays import Floats
-from validate.estimate.reduced.linear_system import LinearModel
+from validate.estimate.reduced.reduced_kf import LinearModel
 
 __all__ = [
     "Ensemble",

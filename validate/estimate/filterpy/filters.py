@@ -24,14 +24,14 @@ from validate.estimate.gating import (
 )
 from validate.estimate.kalman.formulas import Innovation, best_gain, innovation, nothing
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.linear_system import (
+from validate.estimate.reduced.reduced_kf import (
     LinearModel,
     LoadDoubt,
     ReducedModel,
+    dense_covariance,
     reduced_model,
     require_symmetric,
 )
-from validate.estimate.reduced.reduced_kf import dense_covariance
 from validate.estimate.reduced.small_state import CoreStepper
 from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System

@@ -27,7 +27,7 @@ from validate.estimate.kalman.formulas import (
     ukf_predict,
     ukf_update,
 )
-from validate.estimate.reduced.linear_system import LinearModel
+from validate.estimate.reduced.reduced_kf import LinearModel
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from validate.arrays import Floats, Ints
-from validate.estimate.kalman.covariance import Decoupled, Dense
+from validate.estimate.kalman.covariance import Decoupled, Dense, GainSequence
 from validate.estimate.kalman.formulas import Gain, log_likelihood
-from validate.estimate.kalman.gains import GainSequence
 from validate.fem.modes import modes_of
 from validate.fem.system import System, once
 from validate.solve.dynamic.linear import Excitation

@@ -25,7 +25,15 @@ from validate.estimate.kalman.coordinates import (
     in_modes,
     stacked_gains,
 )
-from validate.estimate.kalman.covariance import Claim, Covariance, Dense, walked
+from validate.estimate.kalman.covariance import (
+    Claim,
+    Claims,
+    Covariance,
+    Dense,
+    GainSequence,
+    shared_gains,
+    walked,
+)
 from validate.estimate.kalman.formulas import (
     Gain,
     Innovation,
@@ -34,7 +42,6 @@ from validate.estimate.kalman.formulas import (
     innovation_units,
     nothing,
 )
-from validate.estimate.kalman.gains import Claims, GainSequence, shared_gains
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, look_of, smoothed
 from validate.fem.system import System

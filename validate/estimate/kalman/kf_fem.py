@@ -25,7 +25,14 @@ from validate.estimate.kalman.coordinates import (
     excitation_in,
     in_modes,
 )
-from validate.estimate.kalman.covariance import Covariance, Decoupled, Dense
+from validate.estimate.kalman.covariance import (
+    Covariance,
+    Decoupled,
+    Dense,
+    GainSequence,
+    schedule,
+    shared_gains,
+)
 from validate.estimate.kalman.displacement_filter import (
     DisplacementStepper,
     Recursion,
@@ -33,7 +40,6 @@ from validate.estimate.kalman.displacement_filter import (
     Structure,
     load_shapes,
 )
-from validate.estimate.kalman.gains import GainSequence, schedule, shared_gains
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.smoother import smooth_setting
 from validate.fem.system import System, once

@@ -8,8 +8,8 @@ dense in amplitudes: shapes are orthonormal in M, not in the unknowns).
 from dataclasses import dataclass
 
 from validate.estimate.kalman.coordinates import InModes, in_modes
+from validate.estimate.kalman.covariance import shared_gains
 from validate.estimate.kalman.displacement_filter import DisplacementStepper
-from validate.estimate.kalman.gains import shared_gains
 from validate.estimate.kalman.kf_fem import DisplacementNoise, Gains, modal_covariance, stepper_of
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System

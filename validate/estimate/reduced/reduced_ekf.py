@@ -30,9 +30,8 @@ from validate.estimate.extended.explicit_filter import (
     explicit_step,
 )
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
-from validate.estimate.kalman.covariance import Claim, Dense, Recursion
+from validate.estimate.kalman.covariance import Claim, Dense, Event, Recursion, events, schedule
 from validate.estimate.kalman.formulas import Gain, Innovation, innovation
-from validate.estimate.kalman.gains import Event, events, schedule
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced.reduced_kf import steady
 from validate.estimate.smoother import (

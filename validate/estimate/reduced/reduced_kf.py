@@ -1,4 +1,4 @@
-"""Kalman filter on few modes with a load bias; gains precomputed or steady.
+"""Few modes with an unknown load: the state-space model and its Kalman filter.
 
 The gains of a linear filter need no data, so a step costs what the model's step costs and one small
 product. The steady gain comes from the discrete Riccati equation.
@@ -11,10 +11,19 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are
 
-from validate.arrays import Floats
-from validate.errors import ComparisonError
+from validate.arrays import Floats, checked
+from validate.errors import ComparisonError, SceneError
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
-from validate.estimate.kalman.covariance import Claim, Dense, Recursion, Steady, claimed
+from validate.estimate.kalman.covariance import (
+    Claim,
+    Claims,
+    Dense,
+    Recursion,
+    Steady,
+    claimed,
+    gain_sequence,
+    schedule,
+)
 from validate.estimate.kalman.formulas import (
     Gain,
     Innovation,
@@ -23,14 +32,7 @@ from validate.estimate.kalman.formulas import (
     nothing,
     propagated,
 )
-from validate.estimate.kalman.gains import Claims, gain_sequence, schedule
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.linear_system import (
-    LinearModel,
-    LoadDoubt,
-    ReducedModel,
-    reduced_model,
-)
 from validate.estimate.reduced.small_state import CoreStepper
 from validate.estimate.smoother import (
     Look,
@@ -40,9 +42,125 @@ from validate.estimate.smoother import (
     require_exact,
     smooth_setting,
 )
+from validate.fem.modes import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.solve.dynamic.modal import exact_walk, left_out
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
+
+# --- linear state-space model of few modes with unknown load -------------------------------------
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x' = F x + B f + w, z = H x + r with covariances Q of w and R of r; first x0, P0.
+
+    F, Q, P0 (n, n), B (n, l), H (m, n), R (m, m), x0 (n,); f (l,) are the inputs of the step's
+    end in N. Letters are filterpy's: F is the transition here. Raises `ComparisonError` for shapes
+    that do not fit each other, and for covariances that are not symmetric.
+    """
+
+    F: Floats
+    B: Floats
+    H: Floats
+    Q: Floats
+    R: Floats
+    x0: Floats
+    P0: Floats
+
+    def __post_init__(self) -> None:
+        n, m = len(self.F), len(self.H)
+        shapes = {"F": (n, n), "B": (n, None), "H": (m, n), "Q": (n, n), "R": (m, m)}
+        for name, shape in (shapes | {"x0": (n,), "P0": (n, n)}).items():
+            value = checked(getattr(self, name), f"model {name}", shape, error=ComparisonError)
+            object.__setattr__(self, name, value)
+        for name in ("Q", "R", "P0"):
+            require_symmetric(getattr(self, name), f"model {name}")
+
+    @property
+    def size(self) -> int:
+        return len(self.F)
+
+
+def require_symmetric(P: Floats, name: str) -> None:
+    """Raise `ComparisonError` when P differs from its transpose by more than rounding."""
+    off, scale = float(np.abs(P - P.T).max()), float(np.abs(P).max())
+    if off > 1e-9 * scale:
+        raise ComparisonError(f"{name}: differs from its transpose by {off:.1e} of {scale:.1e}")
+
+
+@dataclass(frozen=True)
+class LoadDoubt:
+    """Uncertainty of the loads: `start` N (sd) at the first step, `walk` N per sqrt(s) from then.
+
+    `jitter` N (sd) is force noise of each step on its own.
+    """
+
+    start: float
+    walk: float
+    jitter: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("start", "walk", "jitter"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise SceneError(
+                    f"uncertainty of the load, {name} = {value:g}: expected a number >= 0"
+                )
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """`model` of x (n,); the free unknowns are `lift` (m, n) x; the last `loads` states are biases
+    in N."""
+
+    model: LinearModel
+    lift: Floats
+    loads: int
+
+
+def reduced_model(
+    system: System, measurements: Measurements, dt: float, modes: int, doubt: LoadDoubt, R: Floats
+) -> ReducedModel:
+    """Return the model of the lowest `modes` modes in steps of dt s, R (m_z,) m^2.
+
+    Raises `SceneError` for damping that couples the modes.
+    """
+    lowest = modes_of(system, min(modes, len(system.free)))
+    rest = left_out(system, lowest, np.ascontiguousarray(system.loads[system.free]))
+    # Share (l,) of the rests that stays over a step: exp(-dt k / c), 0 without damping
+    K, C = (X[system.free][:, system.free] for X in (system.K, system.C))
+    k, c = (np.einsum("ij,ij->j", rest, X @ rest) for X in (K, C))
+    creeps = (c > 0) & (k > 0)
+    kept = np.where(creeps, np.exp(-dt * k / np.where(creeps, c, 1.0)), 0.0)
+    F, B = _transition(system, lowest, kept, dt)
+    l = rest.shape[1]
+    lift = np.hstack([lowest.shapes, np.zeros_like(lowest.shapes), rest, np.zeros_like(rest)])
+    H, n = measurements.free(system.free) @ lift, lift.shape[1]
+    P0 = np.zeros((n, n))
+    P0[-l:, -l:] = doubt.start**2 * np.eye(l)
+    Q = doubt.jitter**2 * (B @ B.T)
+    Q[-l:, -l:] += doubt.walk**2 * dt * np.eye(l)
+    return ReducedModel(LinearModel(F, B, H, Q, np.diag(R), np.zeros(n), P0), lift, l)
+
+
+def _transition(system: System, modes: Modes, kept: Floats, dt: float) -> tuple[Floats, Floats]:
+    """F (n, n) and B (n, l): modes exact for a force held in the step, rests, biases."""
+    walk = exact_walk(modes, dt, "constant")
+    assert walk.rate is not None
+    (qq, qv, _, _, qf), (vq, vv, _, _, vf) = walk.q, walk.rate
+    forces = modes.shapes.T @ system.loads[system.free]
+    r, l = forces.shape
+    B = np.vstack([qf[:, None] * forces, vf[:, None] * forces, np.diag(1 - kept), np.zeros((l, l))])
+    F = np.zeros((len(B), len(B)))
+    F[: 2 * r, : 2 * r] = np.block([[np.diag(qq), np.diag(qv)], [np.diag(vq), np.diag(vv)]])
+    F[2 * r : 2 * r + l, 2 * r : 2 * r + l] = np.diag(kept)
+    F[:, -l:] = B  # a bias is a load
+    F[-l:, -l:] = np.eye(l)
+    return F, B
+
+
+# --- Kalman filter on few modes with a load bias; gains precomputed or steady --------------------
 
 _SIZING = 50  # steps after which sizes of states are taken: orders of magnitude are enough
 _DIES = 1 - 1e-6  # of an error, from one look to the next: what never dies has no steady gain

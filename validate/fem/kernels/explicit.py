@@ -20,7 +20,6 @@ from validate.fem.kernels import cells as cell_kernels
 from validate.fem.kernels import lanes
 from validate.fem.kernels import laws as law_kernels
 from validate.fem.kernels import points as point_kernels
-from validate.fem.kernels import tensors as kernel_tensors
 from validate.fem.kernels import tetrahedra_in_lanes as lane_kernels
 from validate.fem.kernels.cells import (
     add_brick_forces,
@@ -31,21 +30,20 @@ from validate.fem.kernels.cells import (
     bricks_looked_at,
     cells_looked_at,
 )
-from validate.fem.kernels.jit_cache import compiled
 from validate.fem.kernels.lanes import BLOCK, FOUR
-from validate.fem.kernels.points import INVARIANTS
-from validate.fem.kernels.tensors import FAST, inlined
+from validate.fem.kernels.points import FAST, INVARIANTS, inlined
 from validate.fem.kernels.tetrahedra_in_lanes import (
     add_lane_blocks,
     add_lane_forces,
     add_lane_products,
 )
+from validate.fem.kernels.threads import compiled
 
 Cells = NDArray[np.int32]
 
 #: Whose functions are in the code of these loops.
 MODULES = (
-    cell_kernels, kernel_tensors, lane_kernels, lanes, law_kernels, point_kernels,
+    cell_kernels, lane_kernels, lanes, law_kernels, point_kernels,
 )  # fmt: skip
 _compiled = compiled(*MODULES, nogil=True, fastmath=FAST, error_model="numpy")
 _threaded = compiled(*MODULES, nogil=True, parallel=True, error_model="numpy")

@@ -2,7 +2,7 @@
 """Vector lanes: several cells at once in compiled loops, and their nodes.
 
 `Lanes` holds 8 doubles or 16 floats and knows + - * / and minus; with it the tensor functions of
-`fem.kernels.tensors` and the laws at a point, written for one cell, do 8 or 16 in the same time. It
+`fem.kernels.points` and the laws at a point, written for one cell, do 8 or 16 in the same time. It
 comes from `load` and from the loads of nodes below. The compiler does not find these registers by
 itself: it cannot rule out that arrays overlap, and gathers number by number.
 

@@ -9,7 +9,7 @@ strains are near such a state.
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.kernels.tensors import (
+from validate.fem.kernels.points import (
     Nine,
     Six,
     Three,

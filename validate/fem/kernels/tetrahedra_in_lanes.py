@@ -25,15 +25,20 @@ from validate.fem.kernels.points import (
     INVARIANTS,
     NEO_HOOKE,
     SVK,
+    Nine,
+    Six,
+    Three,
     along_neo_hooke,
     along_svk,
     first_of_stretched,
     first_svk,
+    inlined,
     nodes_neo_hooke,
     nodes_svk,
+    product,
     stretched,
+    transposed,
 )
-from validate.fem.kernels.tensors import Nine, Six, Three, inlined, product, transposed
 
 
 @inlined

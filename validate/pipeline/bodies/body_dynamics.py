@@ -1,4 +1,4 @@
-"""Dynamics of a measured body: methods, damping and uncertain parameters.
+"""Dynamics of a measured body: first frequencies, methods, damping, uncertain parameters.
 
 One scene, one registration and one error budget for everything that moves a body: a release, a
 weight, a force, a pressure or a displacement over time. What differs is the load alone.
@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.score import Score
-from validate.errors import ComparisonError, UsageError, ValidateError
+from validate.errors import ComparisonError, SceneError, UsageError, ValidateError
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.filterpy.filters import FilterpyFilter
@@ -25,6 +25,8 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.estimate.reduced.reduced_kf import ReducedKf
+from validate.fem.modes import modes_of
+from validate.fem.system import build
 from validate.identify.recorded_motion import (
     FRACTION,
     RecordedMotion,
@@ -33,7 +35,7 @@ from validate.identify.recorded_motion import (
     spectrum,
 )
 from validate.numbers import scale, shown_unit
-from validate.pipeline.bodies.choices import SeenOf
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.bodies.dynamics_registration import (
     FIRST,
     moving_markers,
@@ -42,14 +44,7 @@ from validate.pipeline.bodies.dynamics_registration import (
     started,
     without_rest,
 )
-from validate.pipeline.bodies.first_modes import (
-    Changes,
-    assumed_density,
-    first_frequencies,
-    is_quadratic,
-    law_of,
-    model_of,
-)
+from validate.pipeline.bodies.own_body import with_law
 from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
@@ -63,14 +58,84 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
 from validate.register.registration import Registered
-from validate.report.sections.motion_words import motion_words, rests
+from validate.report.sections.sections import motion_words, rests
 from validate.scene.material import LawName
-from validate.scene.scene import Probe, Scene
+from validate.scene.scene import Probe, Scene, Weight
 from validate.solve.dynamic.implicit import FromEquilibrium
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.static.quasi_static import QuasiStatic
+
+# --- first natural frequencies of a supported body -----------------------------------------------
+
+# --- What a method changes of a measured body's scene: its law, and the element of its cells.
+
+Changes = Mapping[str, Any]  # values by path, as a method's `scene`
+_QUADRATIC = ("quadratic", "hex27", "tet10")
+
+
+def model_of(law: LawName, element: str = "") -> dict[str, str]:
+    """Return the changes by path; without an element that of the declared body."""
+    return {"material.law": law, **({"body.element": element} if element else {})}
+
+
+def law_of(method: Method, p: Tree) -> str:
+    """Return the law that a method has of the declared scene's material."""
+    return str((method.scene or {}).get("material.law", p.scene.material.law))
+
+
+def element_of(method: Method, p: Tree) -> str:
+    """Return the element of the cells that a method is solved in."""
+    return str((method.scene or {}).get("body.element", p.scene.body.element))
+
+
+def is_quadratic(element: str) -> bool:
+    return element in _QUADRATIC
+
+
+# -------------------------------------------------------------------------------------------------
+
+COUNT = 3
+WATER = 1000.0  # kg/m3: the density of a body of which nobody said one
+_MOST = 60_000  # unknowns
+_RIGID = 1e-3  # Hz: below it a motion is one of the whole body
+
+
+def assumed_density(p: Any) -> str:
+    """Words on a density that nobody stated, of a measured body; empty of one that counts in what
+    is simulated, or that was set, and of other experiments."""
+    if not isinstance(p, Tree) or not isinstance(p.settings, MeasuredBody):
+        return ""
+    rho, weighed = p.scene.material.rho, any(isinstance(x, Weight) for x in p.scene.loads)
+    if p.settings.motion.how == "dynamic" or weighed or rho != WATER:
+        return ""
+    return f"with an assumed density of {rho:g} kg/m3, near that of water"
+
+
+def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:
+    """Hz of the lowest modes of the undeformed body, undamped, without its fluid.
+
+    Raises `SceneError` for a body that can move as a whole, has no density, or more unknowns than
+    are worth a look at its modes.
+    """
+    if scene.mesh.nodes.size > _MOST:
+        raise SceneError(
+            f"{scene.mesh.nodes.size} unknowns; modes are computed for at most {_MOST}"
+        )
+    bare = replace(scene, cavities=(), material=replace(scene.material, stiffness_damping=0.0))
+    system = build(with_law(bare, "linear"))
+    try:
+        modes = modes_of(system, min(count, len(system.free)))
+    except (np.linalg.LinAlgError, RuntimeError) as singular:
+        raise SceneError(f"no natural frequencies: {singular}; is the body held?") from None
+    found = modes.omega[:count] / (2 * np.pi)
+    if not found[0] > _RIGID:
+        raise SceneError(f"a natural frequency of {found[0]:.2g} Hz: the body can move as a whole")
+    return tuple(found.tolist())
+
+
+# --- dynamics of a measured body: methods, damping and uncertain parameters ----------------------
 
 # --- The recorded motion as a report shows it: over time along where it is largest, its
 # spectrum, and its facts beside the body's first modes.

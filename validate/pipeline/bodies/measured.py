@@ -15,11 +15,19 @@ import numpy as np
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
-from validate.pipeline.bodies.body_dynamics import doubting, following, in_motion
+from validate.pipeline.bodies.body_dynamics import (
+    Changes,
+    doubting,
+    element_of,
+    following,
+    in_motion,
+    is_quadratic,
+    law_of,
+    model_of,
+)
 from validate.pipeline.bodies.body_registration import place
 from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.drive import drive_kind, mover, placed_points, pressing
-from validate.pipeline.bodies.first_modes import Changes, element_of, is_quadratic, law_of, model_of
 from validate.pipeline.bodies.mesh import (
     costs_of,
     even_axes,
@@ -43,7 +51,7 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import CellSize, Tree, beside, changed_by
 from validate.pipeline.plates.machine_compliance import doubt, yielding
-from validate.pipeline.run.cost import (
+from validate.pipeline.run.estimate import (
     INPUTS,
     MESHES,
     affordable,

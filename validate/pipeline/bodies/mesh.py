@@ -12,7 +12,7 @@ import numpy as np
 from validate.errors import SceneError, UsageError
 from validate.files import modified
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.cost import NODAL_MEAN
+from validate.pipeline.run.estimate import NODAL_MEAN
 from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.geometries.specification import Box, Cylinder, Geometry, MeshFile
 from validate.scene.mesh import Mesh, cell_volumes, quadratic

@@ -1,16 +1,15 @@
 """Verdicts of the accepted methods: u_num from meshes and steps, u_input from declared inputs."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.compare.convergence import Numerical
-from validate.compare.effects import Effect, effect
-from validate.compare.inputs import Joint, difference, joint, joint_draws
+from validate.compare.convergence import GridConvergence, Numerical, convergence
+from validate.compare.effects import Effect, Joint, difference, effect, joint, joint_draws
 from validate.compare.residual import Residual
 from validate.compare.result import MethodResult
 from validate.compare.verdict import (
@@ -23,14 +22,154 @@ from validate.compare.verdict import (
     judge,
     nothing_compared,
 )
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, SceneError
 from validate.fem.assembly.locate import probe_rows
+from validate.numbers import text, with_unit
 from validate.pipeline.checks.consistency import claims_hold
-from validate.pipeline.checks.numerical_uncertainty import Refined, mesh_errors, variants
-from validate.pipeline.experiment.experiment import EffectSpec, Input, Uncertainty, Variant
+from validate.pipeline.experiment.experiment import (
+    EffectSpec,
+    Experiment,
+    Input,
+    Uncertainty,
+    Variant,
+)
+from validate.pipeline.experiment.method import Method
 from validate.pipeline.run.method_run import MethodRun
-from validate.pipeline.run.runs import ExperimentRuns
+from validate.pipeline.run.runs import ExperimentRuns, Varied
+from validate.recording.types import Recording
 from validate.register.outlines.outlines import OutlineObservation
+from validate.register.registration import Registered
+from validate.register.signals import SignalObservation
+from validate.scene.meshless import AnyScene, RigidBody
+from validate.scene.prescribed_motion import Prescribed
+from validate.scene.scene import Scene
+
+# --- numerical uncertainty u_num of the accepted methods, from their declared meshes and steps ---
+
+# Below, differences need no order, and the largest is u: of the largest number compared (rounding),
+# or of the limit (solvers, and points that meshes interpolate apart).
+_ROUNDING, _IMMATERIAL = 1e-9, 1e-3
+
+
+def variants(uncertainty: Uncertainty, name: str) -> dict[str, list[Variant]]:
+    """By part of u_num: the method (or its stand-in) as it is, and on every level."""
+    own = Variant(uncertainty.stand_in.get(name, name))
+    found = {}
+    if uncertainty.mesh:
+        found["mesh"] = [own, *(replace(own, change=c) for c in uncertainty.mesh.levels)]
+    if uncertainty.steps:
+        own = Variant(name)
+        found["time step"] = [own, *(replace(own, split=n) for n in uncertainty.steps.splits)]
+    return found
+
+
+class Refined:
+    """Convergence of a method's residuals, by part of u_num; of the meshes and steps that ran."""
+
+    def __init__(self, runs: ExperimentRuns, uncertainty: Uncertainty, name: str) -> None:
+        self._uncertainty = uncertainty
+        self._stands_in = uncertainty.stand_in.get(name, "")
+        self._runs = {
+            part: [_solved(runs, v) for v in levels]
+            for part, levels in variants(uncertainty, name).items()
+        }
+        self._sizes = {part: self._size_of(part, runs, name) for part in self._runs}
+
+    def of(self, residual: Residual, limit: float) -> dict[str, GridConvergence | None]:
+        """By part; None where fewer than two meshes or steps compare the same points."""
+        immaterial = _IMMATERIAL * limit if isfinite(limit) else 0.0
+        ends = (residual.simulated or 0.0, residual.measured or 0.0)
+        rounding = max(_ROUNDING * float(max(rms(residual.values), *np.abs(ends))), immaterial)
+        return {part: self._converged(part, residual, rounding) for part in self._runs}
+
+    def numerical(self, residual: Residual, limit: float = inf) -> Numerical:
+        """Return the parts of u_num, how each was found, and what would decide within `limit`."""
+        found = self.of(residual, limit)
+        deciding = {part: self._deciding(part, c, limit) for part, c in found.items() if c}
+        lost = [part for part, c in found.items() if c is None or not c.asymptotic]
+        words = [f"{part}: {self._words(part, c)}" for part, c in found.items()]
+        words += [f"{deciding[part]} would decide" for part in lost if part in deciding]
+        parts = {part: c.u if c else inf for part, c in found.items()}
+        return Numerical(parts, "; ".join(words), deciding)
+
+    def _size_of(self, part: str, runs: ExperimentRuns, name: str) -> list[float]:
+        """m or s of every level, as it is first."""
+        mesh = self._uncertainty.mesh
+        if part == "mesh" and mesh:
+            changed = [v.change(runs.parameters) for v in variants(self._uncertainty, name)[part]]
+            sizes = [mesh.size(p) for p in changed]
+        else:
+            own = self._nominal(part)
+            sizes = [
+                own.until / (own.steps * v.split)
+                for v in variants(self._uncertainty, name)["time step"]
+            ]
+        if len(set(sizes)) < min(2, len(sizes)):
+            raise ComparisonError(
+                f"{name}, {part}: sizes {', '.join(f'{s:.3g}' for s in sizes)}; u_num needs two "
+                "different sizes; declare more mesh or step sizes"
+            )
+        return sizes
+
+    def _nominal(self, part: str) -> Varied:
+        found = self._runs[part][0]
+        assert found is not None
+        return found
+
+    def _converged(self, part: str, residual: Residual, rounding: float) -> GridConvergence | None:
+        answers: dict[float, Floats] = {}
+        meshes: set[int] = set()
+        for size, run in zip(self._sizes[part], self._runs[part], strict=True):
+            mine = run.residuals.get(residual.name) if run else None
+            if run is None or mine is None or mine.values.shape != residual.values.shape:
+                continue
+            # A method whose own settings fix its mesh is no ladder, whatever the sizes say.
+            nodes = run.nodes if part == "mesh" else len(meshes)
+            if nodes not in meshes:
+                answers.setdefault(size, mine.values)
+            meshes.add(nodes)
+        if len(answers) < 2 or self._sizes[part][0] not in answers:
+            return None
+        ladder = self._uncertainty.mesh if part == "mesh" else self._uncertainty.steps
+        assert ladder is not None
+        return convergence(list(answers), list(answers.values()), 0, ladder.order, rounding)
+
+    def _words(self, part: str, found: GridConvergence | None) -> str:
+        if found is None:
+            if len(self._runs[part]) == 1:
+                return "no second mesh fits into the time of a first answer; add --refine"
+            return "fewer than two different sizes compare the same points"
+        by = f" by {self._stands_in} in its place" if part == "mesh" and self._stands_in else ""
+        # A mesh file that is too large to be halved is filled anew with larger cells.
+        only = found.conduct == "two sizes" and found.finest == 1 and part == "mesh"
+        return found.words + by + (", one of them coarser" if only else "")
+
+    def _deciding(self, part: str, found: GridConvergence, limit: float) -> str:
+        share = found.deciding(limit)
+        size = share * self._sizes[part][0]
+        if part != "mesh":
+            return f"a step of {1e3 * size:.2g} ms"
+        own = self._nominal(part)
+        unknowns = float(f"{own.nodes * own.dimension / share**own.dimension:.1g}")
+        return f"cells of {1e3 * size:.2g} mm (about {text(unknowns)} unknowns)"
+
+
+def _solved(runs: ExperimentRuns, variant: Variant) -> Varied | None:
+    """None for a mesh too coarse to hold the body's shape."""
+    try:
+        return runs.varied(variant)
+    except SceneError:
+        if variant == Variant(variant.method):
+            raise
+        return None
+
+
+def mesh_errors(refined: Refined | None, residuals: Mapping[str, Residual]) -> dict[str, float]:
+    """u_num of every residual, its unit; zero where nothing is discretised anew."""
+    return {k: refined.numerical(r).u if refined else 0.0 for k, r in residuals.items()}
+
+
+# --- verdicts of the accepted methods ------------------------------------------------------------
 
 _NO_UNIT = "-"  # of a quantity that no observation has
 
@@ -293,3 +432,70 @@ def _shared(
         for key, u_num in errors.items():
             squares[key] = squares.get(key, 0.0) + u_num**2
     return {key: float(np.sqrt(square)) for key, square in squares.items()}
+
+
+# --- standard deviations of drives as uncertain inputs of a verdict ------------------------------
+
+
+def with_uncertain_drives(
+    experiment: Experiment,
+    methods: Mapping[str, Method],
+    recordings: tuple[Recording, ...],
+    parameters: Any,
+) -> Experiment:
+    """Return the experiment with an input for every drive whose standard deviation is known.
+
+    Unchanged where it declares no uncertainty (a twin of the same model), or accepts no method.
+    """
+    declared = experiment.uncertainty
+    names = [name for name in experiment.accepted if name in methods]
+    if declared is None or not names:
+        return experiment
+    by = declared.surrogate or names[0]
+    scene = experiment.build(recordings[0], parameters, experiment.methods[by].scene)
+    if isinstance(scene, RigidBody):  # poses have no standard deviation of their own
+        return experiment
+    inputs = drive_inputs(scene, experiment.place(recordings[0], parameters, scene))
+    if not inputs:
+        return experiment
+    more = replace(declared, inputs=(*declared.inputs, *inputs), surrogate=by)
+    return replace(experiment, uncertainty=more)
+
+
+def drive_inputs(scene: AnyScene, seen: Registered) -> tuple[Input, ...]:
+    """Return the inputs of all drives that have a standard deviation, in order."""
+    count = sum(drive.y.shape[1] for drive in seen.drives)
+    found: list[Input] = []
+    first = 0
+    for drive in seen.drives:
+        wide = drive.y.shape[1]
+        rows = list(_deviations(scene, drive, first))
+        for k, row in enumerate(rows, 1):
+            off = np.zeros(count)
+            off[first : first + wide] = row
+            which = f", {k} of {len(rows)}" if len(rows) > 1 else ""
+            words = (
+                f"{drive.name} shifted by its standard deviation, {with_unit(drive.sd, drive.unit)}"
+            )
+            name = f"sd of {drive.name}{which}"
+            found.append(Input(name, _as_it_is, words, "recorded", off=tuple(off.tolist())))
+        first += wide
+    return tuple(found)
+
+
+def _deviations(scene: AnyScene, drive: SignalObservation, first: int) -> Iterator[Floats]:
+    """Errors (columns of the drive,) of one standard deviation each, independent of each other."""
+    wide = drive.y.shape[1]
+    # The set of nodes whose tracked points are these inputs
+    follower: Prescribed | None = None
+    if isinstance(scene, Scene):
+        own = scene.inputs[first : first + wide]
+        follower = next((p for p in scene.tracked if p.inputs == own), None)
+    if follower is not None:
+        yield from follower.deviations(drive.sd)
+    elif drive.sd > 0:
+        yield from drive.sd * np.eye(wide)
+
+
+def _as_it_is(parameters: Any, z: float) -> Any:
+    return parameters

@@ -1,18 +1,22 @@
-"""Standard report items: displacements, errors, other cases, speed of each method."""
+"""Standard report items: displacements, errors, speed, external simulators, rejected data."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
+from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series, TableCell
 from validate.compare.force_error import TrackError, nrmse, track_error
 from validate.compare.row import LongRow, RowBlock
+from validate.pipeline.checks.checks import Terms, terms_of
 from validate.pipeline.checks.consistency import consistency_exhibit, nis_of
-from validate.pipeline.exhibits.gating import estimated_exhibit, gate_exhibit
 from validate.pipeline.experiment.experiment import Experiment
+from validate.pipeline.experiment.options import external_methods
 from validate.pipeline.run.method_run import Cases, MethodRun
+from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.markers.markers import MarkerObservation
+from validate.solve.external.scheme import ExternalSimulator, changes
 
 _MM = 1e3
 _ROUNDING = 1e-9  # of the displacements: a map of less would show the computer's arithmetic
@@ -195,3 +199,264 @@ def _maps(shown: Mapping[str, MethodRun]) -> Exhibit | None:
     if not maps:
         return None
     return Exhibit("error-maps", "Errors by node", maps=tuple(maps[:_MAPS]))
+
+
+# --- table of external simulators and internal methods: error, verdict, rate and memory ----------
+
+_HEAD = ("method", "program", "check", "error E", "2 u_val", "margin", "acceptance",
+         "validation", "rate / Hz", "memory / MB", "ended")  # fmt: skip
+_NAME = "external_simulators"
+_OURS = "this one"
+_MB = 1e-6
+_WORDS = (
+    "All use the u_val of the accepted method: its measurement, inputs and mesh error. The "
+    "mesh error of an external simulator is part of its E. Only accepted methods set the exit "
+    "code. A rate is that of one step (statics: one equilibrium) on one thread. Memory is the "
+    "peak of the external simulator's largest process; for our methods it is the peak of the "
+    "whole process until then."
+)
+
+
+def external_exhibits(runs: ExperimentRuns, main: Mapping[str, MethodRun]) -> tuple[Exhibit, ...]:
+    """Return the table and the deviations; empty if no external simulator ran."""
+    simulators = external_methods({n: m for n, m in runs.methods.items() if n in main})
+    if not simulators:
+        return ()
+    accepted = [n for n in runs.experiment.accepted if n in main][:1]
+    terms = {k: t for n in accepted for _, one in terms_of(runs, main[n]) for k, t in one.items()}
+    made = {n: _rows(f, runs.methods[n].settings, terms) for n, f in main.items()}
+    checks = {row[2] for n in simulators for row in made[n]}  # ours are shown beside theirs alone
+    rows = [row for own in made.values() for row in own if row[2] in checks]
+    said = []
+    for name in simulators:
+        lines = dict.fromkeys(line for run in main[name].runs for line in run.said)
+        said += [(main[name].label, s) for s in lines if not s.startswith("external: ")]
+    tables = [NumberTable(_NAME, "External simulators and our methods", _HEAD, tuple(rows))]
+    if said:
+        head = ("simulator", "deviations and failures")
+        tables.append(NumberTable("external_findings", "Findings", head, tuple(said)))
+    return (Exhibit(_NAME, "External simulators", (_WORDS,), tables=tuple(tables)),)
+
+
+def _rows(
+    f: MethodRun, settings: Any, terms: Mapping[str, Terms]
+) -> list[tuple[TableCell | float | str | None, ...]]:
+    """A row a check; one alone where an external one was not run, or has nothing checked."""
+    run, external = f.run, isinstance(settings, ExternalSimulator)
+    named = [line.removeprefix("external: ") for line in run.said if line.startswith("external: ")]
+    program = next(iter(named), "-") if external else _OURS
+    rate = _rate(f, settings)
+    memory = _MB * run.memory or None
+    end = run.outcome.state + (f": {run.outcome.why}" if run.outcome.why else "")
+    cost = (rate, memory, end)
+    judged = [t.judge(f.residuals[k]) for k, t in terms.items() if k in f.residuals]
+    if not judged and not external:
+        return []
+    if not judged or not run.finished:
+        return [(f.label, program, "-", None, None, None, "-", "-", *cost)]
+    return [
+        (f.label, program, c.name,
+         *(TableCell(number, c.unit) for number in (c.value, 2 * c.u_val, c.margin)),
+         c.acceptance, c.validation, *cost)
+        for c in judged
+    ]  # fmt: skip
+
+
+def _rate(f: MethodRun, settings: Any) -> float | None:
+    """Steps a second; of statics only those whose inputs are new count: others are answered by
+    what is there."""
+    run, handles = f.run, getattr(settings, "handles", None)
+    if run.step_s is None:
+        return None
+    still = handles is not None and not handles.inertia
+    if not still or run.seconds is None or f.seen.inputs.shape[0] < len(run.seconds):
+        return run.step_s.rate_hz
+    new = changes(f.seen.t[: len(run.seconds)], f.seen.inputs[: len(run.seconds)])
+    at = np.searchsorted(f.seen.t, new.t)
+    return 1 / float(np.median(run.seconds[at]))
+
+
+# --- measurements that a filter's gate rejected: number, marker, time and distance ---------------
+
+# --- What filters found of the model itself: stiffness, supports and loads over time, and
+# whether the markers that they were given can tell them.
+
+# Share of the start's sd: with more left, less than three quarters of what is known were measured.
+LEFT = 0.5
+TIED = 0.95  # |correlation| from which two parameters are known together only
+_AXIS = {"Pa": ("kPa", 1e-3)}
+_OF, _BETWEEN = "estimate.", "correlation."
+
+
+def estimated_exhibit(main: Mapping[str, MethodRun], others: Cases) -> Exhibit | None:
+    """None where no filter estimates parameters."""
+    runs = [f for f in (*main.values(), *(f for c in others.values() for f in c.values()))
+            if parameters_of(f)]  # fmt: skip
+    if not runs:
+        return None
+    table = NumberTable(
+        "estimates",
+        "Parameters at the end of the run with their 95 % intervals, as the filter claims them, "
+        "and the remaining share of the initial sd (of a scale's logarithm).",
+        ("case", "filter", "parameter", "value", "95 % from", "to", "sd left / 1", "finding"),
+        tuple(_row(f, name) for f in runs for name in parameters_of(f)),
+        "Intervals hold if the truth is of the model's kind: check NIS and its alarm, too.",
+        below="finding",
+    )
+    told = tuple(s for f in main.values() for s in sentences(f))
+    charts = tuple(_chart(f, name) for f in main.values() for name in parameters_of(f))
+    title = "Stiffness, supports and loads estimated by filters"
+    return Exhibit("estimates", title, told, (table,), charts)
+
+
+def parameters_of(f: MethodRun) -> tuple[str, ...]:
+    """Return the names of what a filter's run estimated."""
+    ends = [n for n in f.run.traces if n.startswith(_OF) and n.endswith(".left")]
+    found = [n.removeprefix(_OF).removesuffix(".left") for n in ends]
+    return tuple(found) if len(f.run.t) else ()
+
+
+def sentences(f: MethodRun) -> tuple[str, ...]:
+    """One on every parameter that the markers could not tell."""
+    return tuple(
+        f"{f.label}, {name}: {said}" for name in parameters_of(f) if (said := doubt(f, name))
+    )
+
+
+def doubt(f: MethodRun, name: str) -> str:
+    """Why a parameter is not identifiable, or its interval does not hold; empty where both do."""
+    nis = nis_of(f)
+    if nis and nis.mean > nis.band_999.high:
+        return (
+            f"the interval does not hold: NIS {nis.mean:.3g} per degree of freedom, at most "
+            f"{nis.band_999.high:.3g} by chance: the model differs in kind from the truth"
+        )
+    # The parameter that this one moves with most, if it does
+    found = [("", 0.0)]
+    for trace in f.run.traces:
+        pair = trace.removeprefix(_BETWEEN).split("~")
+        if trace.startswith(_BETWEEN) and name in pair:
+            found.append((next(p for p in pair if p != name), _last(f, trace)))
+    most = max(found, key=lambda pair: abs(pair[1]))
+    other, tie = most if abs(most[1]) >= TIED else ("", 0.0)
+    left = _last(f, f"{_OF}{name}.left")
+    if left <= LEFT:
+        return ""
+    words = f"not identifiable from these markers: {left:.2g} of the sd at the start is left"
+    return f"{words}; known only together with {other}, correlation {tie:.3f}" if other else words
+
+
+def _last(f: MethodRun, trace: str) -> float:
+    return float(f.run.traces[trace].y[-1])
+
+
+def _row(f: MethodRun, name: str) -> tuple[TableCell | str | float, ...]:
+    unit = f.run.traces[_OF + name].unit
+    numbers = (_last(f, f"{_OF}{name}{end}") for end in ("", ".low", ".high"))
+    axis, factor = _AXIS.get(unit, (unit, 1.0))
+    end = "" if axis == "1" else f" {axis}"
+    # Five digits: an interval may be narrow.
+    shown = (TableCell(v, unit, text=f"{factor * v:.5g}{end}") for v in numbers)
+    said = doubt(f, name) or "identified"
+    left = _last(f, f"{_OF}{name}.left")
+    return (f.case or "recorded", f.label, name, *shown, left, said)
+
+
+def _chart(f: MethodRun, name: str) -> Chart:
+    unit = f.run.traces[_OF + name].unit
+    axis, factor = _AXIS.get(unit, (unit, 1.0))
+
+    def over_time(end: str) -> Floats:
+        return np.asarray(factor * f.run.traces[f"{_OF}{name}{end}"].y)
+
+    series = (
+        Series("95 % interval", f.own_time, over_time(".low"), "band", over_time(".high")),
+        Series(f.label, f.own_time, over_time("")),
+    )
+    return Chart(
+        f"estimate_{f.method}_{name.replace('.', '_')}", f"{name}, by {f.label}",
+        "recorded time / s", f"{name} / {axis}", series,
+    )  # fmt: skip
+
+
+# -------------------------------------------------------------------------------------------------
+
+_FAR = "gate.far."
+_DRAWN = 3  # rejected looks from which a picture says more than the table
+_MOST = 0.5  # share of rejected looks from which a filter follows itself, not the recording
+
+
+def gate_exhibit(main: Mapping[str, MethodRun], others: Cases) -> Exhibit | None:
+    """None where no filter has a gate."""
+    every = [*main.values(), *(f for case in others.values() for f in case.values())]
+    gated = [f for f in every if "gate.rejected" in f.run.traces and len(f.run.t)]
+    if not gated:
+        return None
+    table = NumberTable(
+        "gate",
+        "Samples of a marker with an innovation beyond the gate of the filter; they were treated "
+        "as missing. Expected: number for a filter whose claimed errors hold. Far: largest "
+        "rejected innovation, in its standard deviations.",
+        ("case", "filter", "marker", "samples", "rejected", "expected / 1", "first / s", "last / s",
+         "far / 1"),
+        tuple(_gated_row(f, marker) for f in gated for marker in _markers(f)),
+        "NIS and whiteness above use the accepted samples.",
+    )  # fmt: skip
+    words = gate_warnings(main)
+    charts = tuple(_gated_chart(f) for f in gated if _rejected(f) >= _DRAWN)
+    return Exhibit("gate", "Rejected measurements", words, (table,), charts)
+
+
+def gate_warnings(main: Mapping[str, MethodRun]) -> tuple[str, ...]:
+    """Return a sentence on every filter whose gate rejected more looks than it let pass."""
+    found = []
+    for f in main.values():
+        tested = int(_sum(f, "gate.tested"))
+        rejected = _rejected(f)
+        if tested and rejected > _MOST * tested:
+            found.append(
+                f"{f.label}: its gate rejected {rejected} of {tested} samples, "
+                f"{_sum(f, 'gate.expected'):.2g} expected: it follows its model, not the "
+                f"recording; increase R or the process noise, or remove the gate"
+            )
+    return tuple(found)
+
+
+def _markers(f: MethodRun) -> list[str]:
+    return [n.removeprefix(_FAR) for n in f.run.traces if n.startswith(_FAR)]
+
+
+def _sum(f: MethodRun, name: str) -> float:
+    trace = f.run.traces.get(name)
+    return 0.0 if trace is None else float(trace.y.sum())
+
+
+def _rejected(f: MethodRun) -> int:
+    return int(_sum(f, "gate.rejected"))
+
+
+def _gated_row(f: MethodRun, marker: str) -> tuple[Entry, ...]:
+    far, t = f.run.traces[_FAR + marker].y, f.own_time
+    off = far > 0
+    # At which steps (nt,) a sample of the marker reached the filter
+    names = [f"innovation.{marker}.{c}.sd" for c in "xyz"]
+    found = [f.run.traces[name].y > 0 for name in names if name in f.run.traces]
+    looks = int((np.any(found, axis=0) | off).sum())
+    share = _sum(f, "gate.expected") / max(_sum(f, "gate.tested"), 1.0)
+    when: tuple[Entry, ...] = (None, None, None)
+    if off.any():
+        when = (float(t[off][0]), float(t[off][-1]), float(far.max()))
+    return (f.case or "recorded", f.label, marker, looks, int(off.sum()), share * looks, *when)
+
+
+def _gated_chart(f: MethodRun) -> Chart:
+    series = []
+    for marker in _markers(f):
+        far = f.run.traces[_FAR + marker].y
+        if (far > 0).any():
+            series.append(Series(marker, f.own_time[far > 0], far[far > 0], "points"))
+    return Chart(
+        "_".join(("gate", f.method, *filter(None, [f.case]))),
+        ", ".join((f"Rejected samples of {f.label}", *filter(None, [f.case]))), "recorded time / s",
+        "standard deviations off / 1", tuple(series), log="y", scale=1.0,
+    )  # fmt: skip

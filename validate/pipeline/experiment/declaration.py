@@ -41,9 +41,9 @@ def kinds() -> Mapping[type, Callable[..., Experiment]]:
     are imported where one is asked for."""
     from validate.pipeline.bodies.choices import MeasuredBody
     from validate.pipeline.bodies.measured import measured_body
-    from validate.pipeline.plates.choices import Compression
     from validate.pipeline.plates.compression import compression
     from validate.pipeline.plates.inclusion import InclusionTest, inclusion_test
+    from validate.pipeline.plates.scene import Compression
 
     return MappingProxyType({
         MeasuredBody: measured_body,

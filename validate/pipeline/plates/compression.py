@@ -35,7 +35,6 @@ from validate.pipeline.experiment.tree import (
     changed_by,
     mesh_of,
 )
-from validate.pipeline.plates.choices import stated_sizes
 from validate.pipeline.plates.modulus import identify_pressed
 from validate.pipeline.plates.outline import MODULI, OUTLINE_INPUTS, stiffer, with_outline
 from validate.pipeline.plates.scene import (
@@ -44,8 +43,9 @@ from validate.pipeline.plates.scene import (
     kind_of_test,
     pressed_log,
     pressed_size,
+    stated_sizes,
 )
-from validate.pipeline.run.cost import INPUTS, NODAL_MEAN, affordable, linear_seconds
+from validate.pipeline.run.estimate import INPUTS, NODAL_MEAN, affordable, linear_seconds
 from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.register.registration import Registered

@@ -27,8 +27,7 @@ from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import Sampling, Together, placed_markers
 from validate.register.observation import nearest_sample
 from validate.register.outlines.outlines import Corner, observe_outlines
-from validate.register.outlines.plane import cavity_sampler
-from validate.register.outlines.round_outlines import outlined_capsule
+from validate.register.outlines.plane import cavity_sampler, outlined_capsule
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.register.registration import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating

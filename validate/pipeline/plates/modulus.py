@@ -37,9 +37,9 @@ from validate.pipeline.calibration.fitted_moduli import (
 from validate.pipeline.experiment.experiment import Identified, Input, MeshLadder
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree, changed_by, require_used
-from validate.pipeline.plates.choices import Compression
 from validate.pipeline.plates.scene import (
     BuiltPressed,
+    Compression,
     Ends,
     between,
     ends_of,

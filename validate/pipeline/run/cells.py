@@ -14,10 +14,9 @@ from typing import Any
 from uuid import uuid4
 
 from validate.engine.cell import Plan, Record
-from validate.engine.execution import CELLS, finish
+from validate.engine.execution import CELLS, fingerprint, finish
 from validate.engine.pool import Pool
 from validate.engine.store import key_of, oldest_removed
-from validate.engine.worker_cache import fingerprint
 from validate.errors import SceneError
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.experiment.experiment import Experiment, ReportAdditions

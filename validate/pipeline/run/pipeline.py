@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
+from validate.compare.effects import Declared
 from validate.compare.exhibit import captioned
 from validate.compare.force_error import track_scores
-from validate.compare.inputs import Declared
 from validate.compare.published import Published
 from validate.compare.residual import rest_residuals, unanswered
 from validate.compare.result import Kind, MethodResult, Result
@@ -24,22 +24,31 @@ from validate.parameters import Changed, Parameter, changed, describe, value_at
 from validate.pipeline.calibration.calibrated import (
     Identify,
     calibrated,
+    fitted_sentence,
     here,
     identified_by,
     middle,
     with_inputs,
 )
 from validate.pipeline.calibration.problem import Calibrated
-from validate.pipeline.calibration.sentences import fitted_sentence
-from validate.pipeline.checks.checks import checks_of, effects_of, joint_inputs, variants_of
+from validate.pipeline.checks.checks import (
+    checks_of,
+    effects_of,
+    joint_inputs,
+    variants_of,
+    with_uncertain_drives,
+)
 from validate.pipeline.checks.consistency import consistency_scores
 from validate.pipeline.checks.likely_causes import Difference, Failed, difference_of, explained_by
 from validate.pipeline.checks.plausibility import doubts
 from validate.pipeline.checks.sentence import figures_sentence, verdict_sentence
-from validate.pipeline.checks.uncertain_drives import with_uncertain_drives
-from validate.pipeline.exhibits.external import external_exhibits
-from validate.pipeline.exhibits.gating import gate_warnings
-from validate.pipeline.exhibits.standard import error_at, speed_rows, standard_exhibits
+from validate.pipeline.exhibits.standard import (
+    error_at,
+    external_exhibits,
+    gate_warnings,
+    speed_rows,
+    standard_exhibits,
+)
 from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,

@@ -21,32 +21,37 @@ from validate.recording.motion_capture.text_rows import ASSUMED, told_left
 from validate.recording.reader import Reader, head
 from validate.recording.tables.blocks import parse_tables, without_repeats
 from validate.recording.tables.columns import (
+    ASK,
     NEEDED,
     OPTIONS,
+    Kind,
     MissingColumnError,
     Pick,
     Said,
+    Signs,
     derived_pick,
+    kind_of_test,
     left_columns,
     parse_mapping,
     role_of,
+    signs,
     timed_pick,
 )
-from validate.recording.tables.direction import ASK, Kind, Signs, kind_of_test, signs
 from validate.recording.tables.encoding import whole_file
 from validate.recording.tables.point_layout import field_columns
-from validate.recording.tables.specimen_sizes import (
+from validate.recording.tables.specimens import (
     Sized,
     Sizes,
+    chosen,
     derived,
     is_derived,
     loaded_area,
     require_left,
     sizes_of,
     specimen_of,
+    specimen_tables,
     with_sizes,
 )
-from validate.recording.tables.specimens import chosen, specimen_tables
 from validate.recording.tables.table import Table, decimals
 from validate.recording.tables.vocabulary import tells_a_stop
 from validate.recording.types import Record, Recording, Signal, Source, clock_of

@@ -32,8 +32,7 @@ from validate.files import LARGEST, json_value, read_bytes
 from validate.report.export import parquet
 from validate.report.long_table import LongTable, long_table, traces_of
 from validate.report.stored.exhibit_rows import exhibit_rows
-from validate.report.stored.folder import MARK
-from validate.report.stored.json_values import Json
+from validate.report.stored.folder import MARK, Json
 
 PARQUET, CSV = "results.parquet", "results.csv.gz"
 _LAST = (POINT, SAMPLE)  # parts that are read only where they are asked for

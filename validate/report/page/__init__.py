@@ -1,5 +1,5 @@
 """Page of a report: templates, style, the script, and what the script shows.
 
-`html` fills the templates; `body_view` and `plots` give the numbers that `page.js` draws with the
-libraries in `vendor/` (`manifest.toml`: versions, licences, hashes). Read `html` first.
+`html` fills the templates, and gives the numbers that `page.js` draws with the libraries in
+`vendor/` (`manifest.toml`: versions, licences, hashes).
 """

@@ -1,34 +1,46 @@
-"""HTML page of a report, by jinja2, with what `page.js` makes of its figures and tables."""
+"""HTML page of a report, by jinja2, with charts and a body for `page.js`."""
 
+import base64
 import json
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from itertools import count
+from itertools import count, pairwise
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from validate.arrays import Floats, Ints
 from validate.compare.exhibit import (
+    Chart,
     Entry,
     ImageSeries,
     Intervals,
     Picture,
+    Series,
     TableCell,
     plain,
 )
-from validate.compare.result import Result
+from validate.compare.result import MethodResult, Result
 from validate.files import safe_name
 from validate.numbers import duration, with_unit
-from validate.report.charts.encode import uri
+from validate.report.charts.axes import beneath, floor_of, levels
 from validate.report.charts.intervals import order, reach, shares
-from validate.report.charts.style import DPI
+from validate.report.charts.line_styles import TOGETHER, band_of, is_given, is_jagged, styled
+from validate.report.charts.style import DPI, HasMethods, uri
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import caption, sheet, shown, word_columns
-from validate.report.page.plots import plot
+from validate.report.scenes.body import SurfacePart, skins
+from validate.report.scenes.body_scene import (
+    ShownMethod,
+    body_scene,
+    fields,
+    shown_methods,
+)
 from validate.report.sections.observations import timed, where_shown
 from validate.report.views.view_filling import WORDS
 
@@ -243,3 +255,184 @@ def _sort_key(entry: Entry | TableCell) -> Markup:
     value = plain(entry)
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return Markup(f' data-sort="{value!r}"' if number else "")
+
+
+# --- charts that zoom and show values: their numbers as uPlot takes them -------------------------
+
+_MOST = 600  # points of a series; of more, the lowest and the highest of equal parts
+_WAYS = 24  # of a line to and fro
+_DIGITS = 5
+_NAMES = 12  # of a legend; of more, the curves of one label have one name
+_SHOWN = 4  # digits of y: as many as the page shows
+
+
+def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
+    """Return series of a chart in the colours of its figure, and its named levels.
+
+    A line that goes to and fro along x is one series for each way: uPlot needs x to rise. A series
+    of more than `_MOST` points keeps the lowest and the highest of equal parts, so that no peak is
+    lost; a line that turns more than `_WAYS` times is shown by its points. Of more than `TOGETHER`
+    lines those of the checked methods and the first others are shown, the rest at a click. What is
+    rounding on a logarithmic axis is left out, as in the figure.
+    """
+    least, lost = (0.0, ()) if chart.linear else (floor_of(chart), beneath(chart))
+    xs: list[list[float | None]] = []  # each once: most series of a chart have the same
+    series: list[dict[str, Any]] = []
+    drawable = [d for d in styled(run, chart.series) if d.series.name not in lost]
+    checked = {name for m in run.methods if m.accepted for name in (m.name, m.label)}
+    lines = [d.series for d in drawable if d.series.style == "line" and not is_given(d.series)]
+    labels = sorted(dict.fromkeys(s.label for s in lines), key=lambda label: label not in checked)
+    later = tuple(labels[TOGETHER:])
+    apart = len({d.series.name for d in drawable}) <= _NAMES
+    for drawn in drawable:
+        of, jagged = drawn.series.label, is_jagged(drawn.series) and not drawn.one_of
+        look = {"label": drawn.series.name if apart else of, "colour": drawn.look.colour,
+                "dash": [] if jagged else _dash(drawn.look.dash),
+                "width": 0.9 if jagged else drawn.look.width or 1.0,
+                "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
+        style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
+        if style == "line" and len(found := _ways(drawn.series.x)) > 1:
+            style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
+        for way in ways:
+            x, columns = _points(drawn.series, way, least)
+            if x not in xs:
+                xs.append(x)
+            series.append({**look, "style": style, "x": xs.index(x), **columns})
+    return {
+        "x": chart.x, "y": chart.y, "log": chart.log, "linear": chart.linear, "xs": xs,
+        "series": series,
+        "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
+    }  # fmt: skip
+
+
+def _dash(given: Any) -> list[float]:
+    return [] if given == "-" else [3 * float(length) for length in given[1]]
+
+
+def _ways(x: Floats) -> list[Ints]:
+    """Indices of the parts of x (k,) between its turns, each in rising x; neighbours share ends."""
+    sense = np.sign(np.diff(x))
+    moving = np.flatnonzero(sense)
+    turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
+    ends = [0, *turns.tolist(), len(x) - 1]
+    parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+    return [part[np.argsort(x[part], kind="stable")] for part in parts]
+
+
+def _points(
+    series: Series, order: Ints, least: float
+) -> tuple[list[float | None], dict[str, list[float | None]]]:
+    keep = order[_peaks(series.y[order])]
+    columns = {"y": series.y} | ({} if series.upper is None else {"upper": series.upper})
+    found = {
+        name: _numbers(np.where(least and y[keep] < least, np.nan, y[keep]), _SHOWN)
+        for name, y in columns.items()
+    }
+    return _numbers(series.x[keep]), found
+
+
+def _peaks(y: Floats) -> Ints:
+    """Indices of the lowest and the highest of equal parts of y (k,), and of both ends."""
+    if len(y) <= _MOST:
+        return np.arange(len(y))
+    parts = np.array_split(np.arange(len(y)), _MOST // 2)
+    found = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
+    return np.unique([0, *found, len(y) - 1])
+
+
+def _numbers(values: Floats, digits: int = _DIGITS) -> list[float | None]:
+    return [_number(v, digits) for v in values.tolist()]
+
+
+def _number(value: float, digits: int = _DIGITS) -> float | None:
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+
+
+# --- the body that turns: surfaces, displacements, measured points as JSON -----------------------
+
+_MOST_TRIANGLES = 6000  # of one method's surface
+_MOST_FRAMES, _FEWEST_FRAMES = 24, 3
+_BYTES = 450_000  # of all displacements and cell fields, before base 64
+_STEPS = 32767  # of a displacement: it is stored as a share of the largest one
+
+
+def body_view(result: Result) -> dict[str, Any] | None:
+    """Return what `page.js` draws of up to four methods that finished, the accepted one first; None
+    where none of them has a mesh.
+
+    Methods are shown at the instants of the first one, each at its own nearest output frame. Of
+    several recordings the first is shown.
+    """
+    surfaces = [_surface(m) for m in shown_methods(result)]
+    if not surfaces:
+        return None
+    per_frame = sum(8 * len(np.unique(np.concatenate([p.nodes for p in s]))) + 1 for s in surfaces)
+    scene = body_scene(result, int(np.clip(_BYTES / per_frame, _FEWEST_FRAMES, _MOST_FRAMES)))
+    if scene is None:
+        return None
+    coloured = fields(scene.methods, range(len(scene.labels)))
+    return {
+        "labels": list(scene.labels),
+        "size": scene.size,
+        "flat": scene.flat,
+        "camera": {name: np.ravel(value).tolist() for name, value in vars(scene.camera).items()},
+        "part": scene.part,
+        "left_out": list(scene.left_out),
+        "methods": [_method(*of) for of in zip(scene.methods, surfaces, coloured, strict=True)],
+        "tools": [
+            {"nodes": _packed(t.nodes, "<f4"), "triangles": _packed(t.triangles, "<u4"),
+             "shifts": _packed(t.shifts, "<f4")}
+            for t in scene.tools
+        ],
+        "cut": scene.cut and {"normal": scene.cut.normal.tolist(), "at": scene.cut.at,
+                              "words": scene.cut.words},
+    }  # fmt: skip
+
+
+def _surface(method: MethodResult) -> tuple[SurfacePart, ...]:
+    """The parts that are drawn: outside and walls, or all triangles of a planar mesh."""
+    mesh = method.scene.mesh
+    if mesh.dimension == 3:
+        return skins(method.scene, _MOST_TRIANGLES)
+    nodes, local = np.unique(mesh.simplices, return_inverse=True)
+    return (SurfacePart("body", nodes, local.reshape(-1, 3), len(mesh.simplices)),)
+
+
+def _method(
+    shown: ShownMethod, parts: Sequence[SurfacePart], coloured: Mapping[str, Floats]
+) -> dict[str, Any]:
+    nodes = np.unique(np.concatenate([part.nodes for part in parts]))
+    seen = shown.markers
+    return {
+        "label": shown.result.label,
+        "nodes": _packed(shown.nodes[nodes], "<f4"),
+        "parts": [
+            {"name": p.name, "triangles": _packed(np.searchsorted(nodes, p.nodes)[p.triangles],
+                                                  "<u4")}
+            for p in parts
+        ],
+        "u": _shares(shown.u(nodes)),
+        "fields": {name: _shares(values[:, nodes]) for name, values in coloured.items()},
+        "markers": seen and {
+            "names": list(seen.names), "rest": _packed(seen.rest, "<f4"),
+            "measured": _packed(seen.measured, "<f4"),
+            "simulated": _packed(seen.simulated, "<f4"), "inside": seen.inside,
+        },
+        "probes": shown.probes and {
+            "rest": _packed(shown.probes[0], "<f4"), "moved": _packed(shown.probes[1], "<f4"),
+        },
+        "outlines": [
+            {"measured": _packed(measured, "<f4"), "simulated": _packed(simulated, "<f4")}
+            for measured, simulated in shown.outlines
+        ] or None,
+    }  # fmt: skip
+
+
+def _shares(values: Floats) -> Mapping[str, Any]:
+    """Values as 16-bit shares of their largest size."""
+    top = float(np.abs(values).max(initial=0.0)) or 1.0
+    return {"top": top, "shares": _packed(np.round(values / top * _STEPS), "<i2")}
+
+
+def _packed(values: Any, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

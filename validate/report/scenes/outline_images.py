@@ -14,7 +14,7 @@ from validate.errors import RegistrationError
 from validate.numbers import spaced, with_unit
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
-from validate.register.outlines.round_outlines import Circle, fit_circle
+from validate.register.outlines.plane import Circle, fit_circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.sections.observations import Held
 

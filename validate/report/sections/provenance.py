@@ -7,8 +7,7 @@ from validate.compare.result import Result
 from validate.numbers import text, with_unit
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.types import Recording
-from validate.report.stored.environment import environment, file_name, without_folder
-from validate.report.stored.provenance import Commit, Made
+from validate.report.stored.environment import Commit, Made, environment, file_name, without_folder
 
 _STREAMS = (
     "topic", "kind", "unit", "noise", "samples", "rate / Hz", "duration / s", "gaps",

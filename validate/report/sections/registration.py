@@ -14,7 +14,7 @@ from validate.register.markers.markers import MarkerObservation
 from validate.register.markers.quality import AsDeclared, Registration
 from validate.report.scenes.residual_arrows import residual_arrows
 from validate.report.sections.observations import markers
-from validate.report.views.records import Shown, sized, table
+from validate.report.views.view_filling import Shown, sized, table
 
 _DECLARED = ("Nothing was fitted: the markers were recorded in the body's frame, as declared.",)
 _CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)

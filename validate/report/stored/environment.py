@@ -1,10 +1,17 @@
-"""Machine and versions behind a result, without user, host or path."""
+"""Machine, versions, command and input files behind a result, without user, host or path."""
 
 import contextlib
+import hashlib
 import os
 import platform
+import shlex
+import subprocess
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from validate.engine.identity import PACKAGE, code_sha256
 
 _PACKAGES = (
     ("validate", "validate-tissue"),
@@ -80,3 +87,105 @@ def without_folder(value: object) -> object:
     ):
         return file_name(value)
     return value
+
+
+# --- provenance of a run: its command, the commit of its code, and its input files ---------------
+
+_PATIENCE = 10.0  # s that git may take: a run is worth more than its commit's name
+_LEFT_OUT = "…/"  # of an absolute path in a command: reports name files, not places
+
+
+@dataclass(frozen=True)
+class Commit:
+    """The commit that files were taken from; `dirty`: they are not as it has them."""
+
+    sha: str
+    dirty: bool
+
+    def __str__(self) -> str:
+        return f"{self.sha[:10]}, with changes" if self.dirty else self.sha[:10]
+
+
+@dataclass(frozen=True)
+class UsedFile:
+    """A file that a run read beside its recordings: `role` is experiment, mesh, layout (of
+    markers), case: the recording of another truth, or calibrates: one that only calibrates."""
+
+    role: str
+    path: str
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Made:
+    """Command ("" from Python), commit of this package's clone and, where that is another one, of
+    the experiment's (None: no clone, or git does not say), hash of code and libraries, files,
+    plug-ins that it used (package and version)."""
+
+    command: str = ""
+    commit: Commit | None = None
+    project: Commit | None = None
+    code_sha256: str = ""
+    files: tuple[UsedFile, ...] = ()
+    plug_ins: tuple[str, ...] = ()
+
+
+def made(
+    arguments: Sequence[str] = (), sources: Sequence[Path] = (), meshes: Iterable[Path] = ()
+) -> Made:
+    """`arguments` of the command line, `sources` the experiment's file and its helpers, `meshes`
+    with layouts of markers."""
+    command = shlex.join(["validate", *map(_told, arguments)]) if arguments else ""
+    ours, theirs = commit_of([PACKAGE]), commit_of(sources)
+    same = theirs is None or (ours is not None and theirs.sha == ours.sha and not theirs.dirty)
+    files = (*(("experiment", f) for f in sources), *((_role(f), f) for f in meshes))
+    return Made(
+        command, ours, None if same else theirs, code_sha256(),
+        tuple(_used(role, path) for role, path in files),
+    )  # fmt: skip
+
+
+def _told(argument: str) -> str:
+    """An argument without the folders of an absolute path, alone or behind its `=`."""
+    before, equals, after = argument.partition("=")
+    key, sign, value = (before, equals, after) if equals else ("", "", argument)
+    short = str(without_folder(value))
+    return argument if short == value else f"{key}{sign}{_LEFT_OUT}{short}"
+
+
+def _role(path: Path) -> str:
+    return "layout" if path.suffix.lower() in (".fcsv", ".json") else "mesh"
+
+
+def _used(role: str, path: Path) -> UsedFile:
+    with path.open("rb") as stream:
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+    return UsedFile(role, file_name(str(path)), sha256, path.stat().st_size)
+
+
+def commit_of(paths: Sequence[Path]) -> Commit | None:
+    """Return the commit of files or folders that lie in one clone; None where git tracks the first
+    not."""
+    if not paths:
+        return None
+    folder = paths[0] if paths[0].is_dir() else paths[0].parent
+    names = [str(p.resolve()) for p in paths]
+    tracked = _git(folder, "ls-files", "--error-unmatch", "--", names[0])
+    sha = _git(folder, "rev-parse", "HEAD") if tracked else None
+    changes = _git(folder, "status", "--porcelain", "--", *names) if sha else None
+    return None if sha is None or changes is None else Commit(sha.strip(), bool(changes.strip()))
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    """What git says; None where there is none, or it fails."""
+    around = {k: v for k, v in os.environ.items() if not k.startswith("GIT_")}
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments],
+            capture_output=True, text=True, timeout=_PATIENCE, check=True, encoding="utf-8",
+            errors="replace", env={**around, "GIT_OPTIONAL_LOCKS": "0"},
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout

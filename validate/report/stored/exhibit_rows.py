@@ -11,7 +11,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series, plain
 from validate.compare.row import CHART, TABLE, LongRow
-from validate.report.stored.json_values import Json, members, recorded
+from validate.report.stored.folder import Json, members, recorded
 from validate.units import si_of
 
 #: Condition on `part` for all rows but those of tables and charts.

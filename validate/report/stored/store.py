@@ -20,10 +20,9 @@ from validate.compare.score import Score
 from validate.compare.verdict import Check
 from validate.identify.budget import IdentifiedValue
 from validate.report.sections.observations import timed
-from validate.report.stored.environment import environment, file_name
+from validate.report.stored.environment import Made, environment, file_name
 from validate.report.stored.exhibit_rows import exhibits, rounded
-from validate.report.stored.json_values import Json, members, recorded
-from validate.report.stored.provenance import Made
+from validate.report.stored.folder import Json, members, recorded
 from validate.solve.types import Run
 
 SCHEMA_VERSION = 2

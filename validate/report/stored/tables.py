@@ -1,26 +1,35 @@
-"""Queries over the tables of all stored runs below a folder, one run in memory at a time.
+"""Stored runs: their views by name, and queries over the tables of all, one run at a time.
 
 from validate.report import open_store
 open_store("reports").where(part="score", quantity="marker.*", statistic="rms").to_pandas()
 """
 
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from validate.catalogue import experiment_files, name_of, reports_of
+from validate.checksums import read_sealed
+from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals
 from validate.compare.row import LongRow, Wanted, require_columns
+from validate.compare.view import View
 from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, frame
+from validate.report.stored.exhibit_rows import stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.stored.history import current
+from validate.report.views.drawers import drawable
+from validate.report.views.standard import VIEWS
+from validate.report.views.view_filling import explained, filled_views
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
 
 LOG = logging.getLogger(__name__)
 
@@ -116,3 +125,80 @@ def is_called(folder: Path, name: str) -> bool:
     """Whether a folder of results holds the run of that name, or a variation of it."""
     varied = (f"{name}+", f"{name}-") if "+" in name else (f"{name}+",)  # - is before the hash
     return folder.name == name or folder.name.startswith(varied)
+
+
+# --- views, tables and charts of a stored run by name --------------------------------------------
+
+PICTURE = "picture"  # the form of what is there as an image only
+_DRAWN = re.compile("^(chart|intervals|heat)_")  # of files of what is drawn from numbers
+Shown = Mapping[str, tuple[str, Exhibit]]  # form and content by name
+
+
+def plain_name(text: str) -> str:
+    """Return a name without signs that an attribute of Python cannot have."""
+    return re.sub(r"\W", "_", text)
+
+
+def stored_views(folder: Path, table: LongTable) -> Iterator[tuple[str, str, Exhibit]]:
+    """Yield name, form and content of views that have rows, then of the run's own tables and
+    charts; `folder` may be a results.json."""
+    for view, found in filled_views(table, _own(table)):
+        if found.words or found.tables or drawable(found):
+            yield plain_name(view.name), view.form, found
+    file = folder / MARK if folder.is_dir() else folder
+    for exhibit in stored_exhibits(read_sealed(file)):
+        names = set()
+        for one in exhibit.tables:
+            names.add(name := plain_name(one.name or exhibit.anchor))
+            yield name, "table", Exhibit(one.name, one.title, tables=(one,))
+        for chart in exhibit.charts:
+            name = plain_name(chart.name)
+            name = f"chart_{name}" if name in names else name
+            yield name, "chart", Exhibit(chart.name, chart.title, charts=(chart,))
+
+
+def shown_by_name(folder: Path, table: LongTable) -> Shown:
+    """Return what `stored_views` yields, each chart of a view `each`, and pictures."""
+    found: dict[str, tuple[str, Exhibit]] = {}
+    for name, form, exhibit in stored_views(folder, table):
+        found[name] = form, exhibit
+        parts = ((plain_name(part.name), part) for part in drawable(exhibit))
+        found |= {part: (form, _alone(one)) for part, one in parts if part != name}
+    for name, file in pictures(folder).items():
+        found.setdefault(name, (PICTURE, Exhibit(name, f"Picture {name}", (f"File: {file}",))))
+    return found
+
+
+def _alone(part: Chart | Heat | Intervals) -> Exhibit:
+    one = Exhibit(part.name, part.title)
+    match part:
+        case Chart():
+            return replace(one, charts=(part,))
+        case Heat():
+            return replace(one, heats=(part,))
+        case Intervals():
+            return replace(one, intervals=(part,))
+
+
+def pictures(folder: Path) -> Mapping[str, Path]:
+    """Return the files of a stored run's pictures, by their names."""
+    files = sorted((folder / "figures").glob("*.png"))
+    return {plain_name(_DRAWN.sub("", file.stem)): file for file in files}
+
+
+def exhibit_of(name: str, folder: Path, table: LongTable) -> Exhibit:
+    """Return what a stored run shows by that name; of a view without rows a sentence why.
+
+    Raises `UsageError` with the nearest names for an unknown one.
+    """
+    views = {plain_name(view.name): view for view in (*VIEWS, *_own(table))}
+    if (name := plain_name(name)) in views:
+        return explained(views[name], table)
+    found = shown_by_name(folder, table)
+    if name not in found:
+        raise UsageError(f"no view '{name}'; {nearest_names(name, {*views, *found})}")
+    return found[name][1]
+
+
+def _own(table: LongTable) -> list[View]:
+    return [View.from_json(view) for view in table.head.get("views", ())]

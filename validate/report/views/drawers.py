@@ -3,6 +3,8 @@
 Each takes an exhibit, and the run whose methods have their colours.
 """
 
+import math
+import sys
 from collections.abc import Iterable
 from itertools import cycle
 from pathlib import Path
@@ -16,7 +18,6 @@ from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals, NumberTabl
 from validate.errors import UsageError
 from validate.numbers import significant
 from validate.report.export.tables import Row, chart_rows, sheet, write_csv
-from validate.report.views.bars import bar, legend
 from validate.report.views.layout import laid, wrapped
 
 if TYPE_CHECKING:
@@ -205,3 +206,35 @@ def _bars(one: Intervals, width: int) -> list[str]:
     ]
     rows = [list(row) for row in zip(one.labels, bars, one.texts, one.answers, strict=True)]
     return [legend("limit, or 2 u_val without one"), *laid([""] * 4, rows, width)]
+
+
+# --- error, uncertainty and limit as one bar of characters ---------------------------------------
+
+_BAR = 14  # characters of a bar
+_LIMIT = 10  # of them up to the limit
+
+
+def bar(error: float, doubt: float, limit: float) -> str:
+    """Return an error, `doubt` above it, and a limit, all in one unit, as characters.
+
+    The limit always stands at the same place; what goes beyond the bar ends in ">". An error or a
+    doubt that is not finite fills the bar.
+    """
+    full, soft, mark = _characters()
+    size = abs(error) if math.isfinite(error) else math.inf
+    reach = size + (doubt if math.isfinite(doubt) else math.inf)
+    places = [(i + 0.5) * limit / _LIMIT for i in range(_BAR)]
+    text = "".join(full if x < size else soft if x < reach else " " for x in places)
+    text = f"{text[:_LIMIT]}{mark}{text[_LIMIT:]}"
+    return f"{text[:-1]}>" if reach > _BAR / _LIMIT * limit else text
+
+
+def legend(limit: str) -> str:
+    """What the characters of a bar are."""
+    full, soft, mark = _characters()
+    return f"{full} error, {soft} 2 u_val, {mark} {limit}"
+
+
+def _characters() -> tuple[str, str, str]:
+    unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().startswith("utf")
+    return ("█", "░", "│") if unicode else ("#", "-", "|")

@@ -1,189 +1,220 @@
-"""One step of Newmark's family over the free unknowns, as a state equation of the displacement.
+"""Linear dynamics by Newmark's family: M a + C v + K u = f, one solve a step (paper 001).
 
-Every rule here reads u' = u + h v + h^2 (b0 a + b1 a'), v' = v + h (g0 a + g1 a'), with balance
+u' = J^-1 (A u + L v + M a + f'), then v' and a' by the rule (paper 001, eqs 8-14); J is factorised
+once. The paper solves anew at every step by Gaussian elimination: that is a named solver here.
 
-    (1 - am) M a' + am M a + (1 - af) (C v' + K u') + af (C v + K u) = (1 - af) f' + af f
+Paper 002 prints the same rule with u' = u + h v' + h^2/4 (a + a'), v' for v: a misprint, which is
+an update here to show that it is unstable from w h = 1.155 (undamped; 1.29 at xi .1, 1.55 at .3).
 
-so that u' = J^-1 (A u + L v + M_a a + f_w) as in paper 001, eqs 8-14 (where am = af = 0).
-
-Departures: the paper has average acceleration only. Backward Euler (first order, L-stable) and
-generalised alpha (Chung & Hulbert 1993; second order, spectral radius rho_inf at high frequency)
-do not ring as it does. Prescribed unknowns enter as forces on the free ones (`Excitation`).
+Departures: average acceleration is not L-stable: with a0 = M^-1 f velocities and accelerations
+ring for ever. Show none of them; take backward Euler or generalised alpha, or ramp the load.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from scipy import sparse
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.system import DampingTerms, MassName, System, damping_of, mass_of
-from validate.solve.static.linear_solvers import TOLERANCE, Solver, SolverName, solver_of
+from validate.fem.system import DampingTerms, MassName, System
+from validate.parameters import quantity
+from validate.solve.dynamic.linear import (
+    DriveRates,
+    Moving,
+    MovingStepper,
+    StartName,
+    excitation,
+    reactions,
+)
+from validate.solve.dynamic.newmark_rule import (
+    Propagation,
+    RuleName,
+    propagation,
+    require_start,
+    rule_of,
+)
+from validate.solve.explicit.linear import highest_frequency
+from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
+from validate.solve.static.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
+from validate.solve.study_entries import (
+    LOOSE,
+    Asked,
+    Rates,
+    Rival,
+    Rung,
+    Stepping,
+    SwingingBody,
+    implicit_maps,
+    newmark_maps,
+)
+from validate.solve.types import Ending, Scheme, State, Stepper
 
-RuleName = Literal["average", "backward_euler", "generalised_alpha"]
+# --- Paper 002's Newmark update as it is printed, and the step up to which it is stable.
+
+
+def misprinted_maps(r: Rates) -> Floats:
+    """Return the step map of the printed update."""
+    return newmark_maps(rule_of("average", 1.0), r.c("full"), r.x**2, misprinted=True)
+
+
+def misprint_limit(w: float, c: float) -> float:
+    """Largest stable step s of the misprinted update for a mode of w 1/s, damped by c 1/s.
+
+    Jury's criterion on its cubic leaves 3 w^4 h^3 - c w^2 h^2 - (4 w^2 + 2 c^2) h - 4 c <= 0, which
+    is w h = 2/sqrt(3) undamped.
+    """
+    y = c / w  # of x = w h
+    roots = np.roots([3.0, -y, -(4 + 2 * y * y), -4 * y])
+    return float(roots.real.max()) / w
+
+
+def misprint_step(system: System) -> float:
+    """Largest stable step s, by the highest frequency of consistent masses."""
+    w = highest_frequency(system, "consistent")
+    m = system.scene.material
+    return misprint_limit(w, m.mass_damping + m.stiffness_damping * w * w)
+
+
+# -------------------------------------------------------------------------------------------------
+
+UpdateName = Literal["newmark", "misprinted"]
 
 
 @dataclass(frozen=True)
-class Rule:
-    """Step h s, the weights of the old and new acceleration in u' and v', and the alphas."""
+class Newmark:
+    """Settings: one of three rules, one linear solve a step.
 
-    h: float
-    b0: float
-    b1: float
-    g0: float
-    g1: float
-    am: float = 0.0
-    af: float = 0.0
+    `a0`: "equilibrium" starts from M a0 = f with the first step's loads, as for a load that is
+    switched on at t = 0; "zero" starts without them (where damping rules, the first step of average
+    acceleration is then half as long; paper 001 leaves it open). `drive_rates`: velocities and
+    accelerations of prescribed unknowns by backward differences of the drives, or by the rule,
+    which makes average acceleration ring with growing amplitude on a ramp.
+    """
 
-    def rates(self, u_new: Floats, u: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
-        """v', a' that lead to u' (paper 001, eqs 8 and 9, solved for them)."""
-        h = self.h
-        a_new = (u_new - u - h * v - (h * h * self.b0) * a) / (h * h * self.b1)
-        return v + (h * self.g0) * a + (h * self.g1) * a_new, a_new
+    handles: ClassVar[Handles] = LINEAR_DYNAMICS
 
-    def weighted(self, new: Floats, old: Floats) -> Floats:
-        """Return a force, u or v at the instant of the balance: `new` itself unless af > 0."""
-        return new if self.af == 0 else (1 - self.af) * new + self.af * old
+    dt: float = quantity(0.002, "s", "time step")
+    rule: RuleName = quantity("average", "1", "how v and a are derived from u within a step")
+    a0: StartName = quantity("equilibrium", "1", "acceleration at t = 0: M^-1 f, or zero")
+    solver: SolverName = quantity("prefactored", "1", "solver of the linear system of a step")
+    mass: MassName = quantity("consistent", "1", "mass matrix")
+    rho_inf: float = quantity(0.8, "1", "spectral radius at infinity; generalised alpha alone")
+    drive_rates: DriveRates = quantity("difference", "1", "v and a of prescribed unknowns")
+    damping_terms: DampingTerms = quantity("full", "1", "alpha M + beta K, or alpha M alone")
+    update: UpdateName = quantity("newmark", "1", "of u: Newmark's, or as paper 002 prints it")
+    tolerance: float = quantity(
+        TOLERANCE, "1", "iterative solvers: residual relative to the right-hand side"
+    )
 
-    def weighted_a(self, new: Floats, old: Floats) -> Floats:
-        """Return an acceleration at the instant of the balance: `new` itself unless am != 0."""
-        return new if self.am == 0 else (1 - self.am) * new + self.am * old
+    @staticmethod
+    def steppings() -> tuple[Stepping, ...]:
+        """Return the rules, average acceleration with lumped masses, too, and paper 002's printed
+        one."""
+        average = "average acceleration, {} mass"
+        return (
+            Stepping(
+                "newmark_average", average.format("consistent"), "consistent",
+                implicit_maps("average"), conserves=True, rounding=LOOSE,
+            ),
+            Stepping(
+                "newmark_lumped", average.format("lumped"), "lumped", implicit_maps("average"),
+                conserves=True, rounding=LOOSE,
+            ),
+            Stepping(
+                "backward_euler", "backward Euler", "consistent", implicit_maps("backward_euler"),
+                rounding=LOOSE, order=1.0,
+            ),
+            Stepping(
+                "generalised_alpha", "generalised alpha, rho_inf .8", "consistent",
+                implicit_maps("generalised_alpha"), rounding=LOOSE,
+            ),
+            Stepping(
+                "newmark_misprinted", "paper 002's update as printed", "consistent",
+                misprinted_maps, misprint_step, order=1.0,
+            ),
+        )  # fmt: skip
 
+    @staticmethod
+    def candidates(asked: Asked) -> tuple[Rival, ...]:
+        if not isinstance(asked, SwingingBody):
+            return ()
+        prefactored: Rung = "prefactored"
+        return (
+            Rival("implicit, prefactored", prefactored, _with()),
+            Rival("backward Euler, prefactored", prefactored, _with(rule="backward_euler"),
+                   order=1.0),
+            Rival("generalised alpha, prefactored", prefactored,
+                   _with(rule="generalised_alpha", a0="zero")),
+            Rival("implicit, dense inverse", prefactored, _with(solver="dense_inverse"),
+                   finest=asked.medium),
+            Rival("implicit, lumped mass", prefactored, _with(mass="lumped")),
+            Rival("implicit, conjugate gradients", prefactored, _with(solver="cg")),
+            Rival("implicit, Gauss-Seidel", prefactored, _with(solver="gauss_seidel")),
+            Rival("implicit, sparse LU every step", prefactored, _with(solver="sparse_lu"),
+                   finest=asked.small),
+            Rival("implicit, Gaussian elimination every step", prefactored,
+                   _with(solver="gaussian_elimination"), finest=asked.small),
+        )  # fmt: skip
 
-def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
-    """Return the rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside
-    0..1."""
-    if not (np.isfinite(dt) and dt > 0):
-        raise SceneError(f"time step {dt:g} s: expected a positive number")
-    if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
-        raise SceneError(
-            f"time step {dt:g} s: its square underflows in double precision; take at least 1e-150"
+    def __post_init__(self) -> None:
+        rule_of(self.rule, self.dt, self.rho_inf)
+        if self.update == "misprinted" and self.rule != "average":
+            raise SceneError(
+                "the misprinted update belongs to the average rule of paper 002, "
+                f"not to {self.rule}"
+            )
+        if not 0 < self.tolerance < 1:
+            raise SceneError(
+                f"tolerance {self.tolerance:g} of the residual: expected a number in 0..1"
+            )
+
+    def prepare(self, system: System) -> Stepper:
+        """Raise `SceneError` for a law at large strain, cavities, or missing densities."""
+        require_handled(system.scene, self)
+        rule = rule_of(self.rule, self.dt, self.rho_inf)
+        terms = self.damping_terms
+        if self.a0 == "equilibrium" and system.scene.loads:
+            require_start(system, rule, self.mass, terms)
+        return NewmarkStepper(
+            system,
+            reactions(system, self.mass, terms),
+            excitation(system, rule, self.mass, self.drive_rates, terms, self.a0),
+            propagation(system, rule, self.mass, self.solver, terms, self.tolerance),
+            self.update == "misprinted",
         )
-    if not 0 <= rho_inf <= 1:
-        raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
-    if name == "average":
-        return Rule(dt, 0.25, 0.25, 0.5, 0.5)
-    if name == "backward_euler":
-        return Rule(dt, 0.0, 1.0, 0.0, 1.0)
-    am, af = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
-    beta, gamma = (1 - am + af) ** 2 / 4, 0.5 - am + af
-    return Rule(dt, 0.5 - beta, beta, 1 - gamma, gamma, am, af)
 
 
 @dataclass(frozen=True)
-class Propagation:
-    """The step of a rule; all vectors (m,) and matrices (m, m) are over the `free` unknowns."""
+class NewmarkStepper(MovingStepper):
+    propagation: Propagation
+    misprinted: bool = False
 
-    rule: Rule
-    free: Ints
-    M: sparse.csr_array
-    C: sparse.csr_array
-    K: sparse.csr_array
-    solver: Solver
-
-    def predict(self, u: Floats, v: Floats, a: Floats, f: Floats) -> Floats:
-        """u' (m,) m of the next step under forces f (m,) N: one solve (paper 001, eq 11).
-
-        f acts at the instant of the balance: f' of the step's end, except that generalised alpha
-        takes `rule.weighted(f', f)`.
-        """
-        return self.solver.solve(self.history(u, v, a) + f)
-
-    def history(self, u: Floats, v: Floats, a: Floats) -> Floats:
-        """Return a u + L v + M_a a (m,) N, by one product with M and one with C."""
-        (mu, mv, ma), (cu, cv, ca), ku = of_history(self.rule)
-        damped = cu * u + cv * v if ca == 0 else cu * u + cv * v + ca * a
-        total = self.M @ (mu * u + mv * v + ma * a) + self.C @ damped
-        return np.asarray(total if ku == 0 else total + self.K @ (ku * u))
-
-    def rates(self, u_new: Floats, u: Floats, v: Floats, a: Floats) -> tuple[Floats, Floats]:
-        """v', a' (m,) that belong to u' whatever made it: a solution or a filter's estimate."""
-        return self.rule.rates(u_new, u, v, a)
-
-    def transition(self) -> Floats:
-        """J^-1 A (m, m), dense: what paper 001 takes as the filter's transition."""
-        return self.solver.solve(self.A.toarray())
-
-    @cached_property
-    def A(self) -> sparse.csr_array:
-        """Paper 001, eq 12."""
-        (mu, _, _), (cu, _, _), ku = of_history(self.rule)
-        return sparse.csr_array(mu * self.M + cu * self.C + ku * self.K)
-
-    @cached_property
-    def J(self) -> sparse.csr_array:
-        """Paper 001, eq 13."""
-        return _system_matrix(self.rule, self.M, self.C, self.K)
+    def step(self, state: State, inputs: Floats) -> State:
+        """Return the state at the end of a step; `inputs` are those there, loads included."""
+        last: Moving = state.inner
+        u, v, k = last.u, last.v, state.k + 1
+        f, moved, a = self.excitation.step(k, inputs, last.inputs, last.a)
+        b, solver = self.propagation.history(u, v, a) + f, self.propagation.solver
+        if isinstance(solver, Iterative):
+            solved = solver.solve_from(b, u)
+        else:
+            solved = Solved(solver.solve(b), 0, True)
+        u_new = solved.x
+        v_new, a_new = self.propagation.rates(u_new, u, v, a)
+        if self.misprinted:
+            u_new = u_new + self.propagation.rule.h * (v_new - v)
+        numbers = self.forces(u_new, v_new, a_new, moved)
+        new = Moving(u_new, v_new, a_new, moved)
+        failure: tuple[Ending, str] | None = None
+        if not np.isfinite(new.a.sum()):
+            failure = "diverged", f"accelerations are not finite at step {k}"
+        elif not solved.converged:
+            why = f"{solved.iterations} iterations leave the residual above the tolerance"
+            failure = "not_converged", f"step {k}: {why}"
+        return State(k, new, failure, solved.iterations, numbers)
 
 
-def propagation(
-    system: System,
-    rule: Rule,
-    mass: MassName = "consistent",
-    solver: SolverName = "prefactored",
-    terms: DampingTerms = "full",
-    tolerance: float = TOLERANCE,
-) -> Propagation:
-    """Return the step's matrices over the free unknowns, with J factorised or as the solver takes
-    it.
-
-    Raises `SceneError` for missing densities, or a J that is not positive definite.
-    """
-    free = system.free
-    matrices = mass_of(system, mass), damping_of(system, mass, terms), system.K
-    M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)
-    J, mesh = _system_matrix(rule, M, C, K), system.scene.mesh
-    ready = solver_of(solver, J, free // mesh.dimension, mesh.nodes, tolerance)
-    return Propagation(rule, free, M, C, K, ready)
-
-
-def _system_matrix(
-    rule: Rule, M: sparse.csr_array, C: sparse.csr_array, K: sparse.csr_array
-) -> sparse.csr_array:
-    m, c, k = of_system(rule)
-    return sparse.csr_array(m * M + c * C + k * K)
-
-
-def of_system(rule: Rule) -> tuple[float, float, float]:
-    """Weights of M, C and K in J (paper 001, eq 13)."""
-    m = (1 - rule.am) / (rule.h**2 * rule.b1)
-    return m, (1 - rule.af) * rule.g1 / (rule.h * rule.b1), 1 - rule.af
-
-
-def require_start(system: System, rule: Rule, mass: MassName, terms: DampingTerms = "full") -> None:
-    """Refuse a0 = M^-1 f with generalised alpha where damping acts within the step.
-
-    The rule then carries the vanished a0 on for 1/(1 - rho_inf) steps, which leaves an offset in u:
-    10 % of the static displacement of paper 001's block at rho_inf = .8, five times it at 0.
-    Raises `SceneError` with the ratio, from below, of the step to the fastest decay.
-    """
-    free = system.free
-    C = damping_of(system, mass, terms)
-    fastest = (C.diagonal()[free] / mass_of(system, mass).diagonal()[free]).max()
-    if rule.am != rule.af and fastest * rule.h > 1:
-        raise SceneError(
-            "generalised alpha from a0 = equilibrium: damping acts within "
-            f"1/{fastest * rule.h:.3g} of a step and would leave an offset; use a0 = zero, a "
-            "smaller dt or rule average"
-        )
-
-
-def per_mode(rule: Rule, c: Floats, k: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Factors (m,) of q, q', q'' and force in the next q, for q'' + c q' + k q = f per mode."""
-    masses, dampings, ku = of_history(rule)
-    h, w = rule.h, 1 - rule.af
-    J = (1 - rule.am) / (h * h * rule.b1) + w * rule.g1 / (h * rule.b1) * c + w * k
-    q, v, a = ((m + d * c) / J for m, d in zip(masses, dampings, strict=True))
-    return q + ku * k / J, v, a, 1 / J
-
-
-def of_history(r: Rule) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Weights of M and of C in A, L, M_a, and of K in A (paper 001, eqs 12 and 14): of u, v, a."""
-    c, d = 1 / (r.h**2 * r.b1), r.g1 / (r.h * r.b1)
-    m, w = 1 - r.am, 1 - r.af
-    masses = (m * c, m * c * r.h, m * r.b0 / r.b1 - r.am)
-    dampings = (w * d, w * (r.h * d - 1) - r.af, w * r.h * (r.h * r.b0 * d - r.g0))
-    return masses, dampings, -r.af
+def _with(**settings: Any) -> Callable[[float], Scheme]:
+    return lambda dt: Newmark(dt, **settings)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.errors import RecordingError, SceneError, UsageError, ValidateError
-from validate.fem.assembly.loads import hung_masses
+from validate.fem.assembly.assemble import hung_masses
 from validate.fem.system import System, build
 from validate.files import npz_arrays
 from validate.recording.formats.subprocess_decoder import decoded

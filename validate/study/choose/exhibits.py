@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable
-from validate.report.views.records import chart, grouped, table
+from validate.report.views.view_filling import chart, grouped, table
 from validate.study.choose.study import Choice, error_of, meeting, misses
 from validate.study.filters.ranking import SAME_TIME
 from validate.study.tradeoff.exhibits import TIME, pays, trade_exhibits

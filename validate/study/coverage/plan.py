@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from validate.arrays import Floats
-from validate.compare.inputs import REACH, joint_draws
+from validate.compare.effects import REACH, joint_draws
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
 from validate.parameters import Parameter, describe, with_values

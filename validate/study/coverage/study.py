@@ -36,8 +36,19 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.job import job_of
 from validate.pipeline.run.named_run import study_folder
-from validate.study.coverage.bench import AllStated, ExactReading, Stated, opened_here, run_terms
-from validate.study.coverage.cell import PERFECT, DrawBench, Draws, Given, Judged, run_draws
+from validate.study.coverage.bench import (
+    PERFECT,
+    AllStated,
+    DrawBench,
+    Draws,
+    ExactReading,
+    Given,
+    Judged,
+    Stated,
+    opened_here,
+    run_draws,
+    run_terms,
+)
 from validate.study.coverage.plan import (
     BLOCK,
     CHECKS,

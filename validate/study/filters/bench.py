@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.engine.worker_cache import Kept, fingerprint
+from validate.engine.execution import Kept, fingerprint
 from validate.errors import ComparisonError
 from validate.estimate.measurements import Measurements
 from validate.fem.system import System

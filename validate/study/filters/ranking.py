@@ -5,23 +5,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from validate.engine.cell import Record
-from validate.study.filters.blocks import (
-    Blocks,
-    Nested,
-    blocks_of,
-    nested,
-    score_difference,
-    score_interval,
-)
 from validate.study.filters.plan import FilterCell
 from validate.study.filters.score import (
     LOG_LOSS,
     POOLED,
     WITHHELD,
+    Blocks,
     FilterScores,
+    Nested,
     SeedInterval,
+    blocks_of,
     interval,
+    nested,
     of_score,
+    score_difference,
+    score_interval,
 )
 from validate.study.sweep import named
 

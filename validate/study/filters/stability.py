@@ -18,7 +18,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.case_solution import KeptFields
 from validate.pipeline.run.named_run import study_folder
 from validate.register.markers.markers import MarkerObservation
-from validate.report.views.records import Shown, objects, table
+from validate.report.views.view_filling import Shown, objects, table
 from validate.study.filters.bench import Bench, Ready, open_bench
 from validate.study.filters.plan import FilterCell, plan
 from validate.study.study_page import Findings

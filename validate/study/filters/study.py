@@ -21,11 +21,20 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.named_run import study_folder
 from validate.study.filters.bench import open_bench
-from validate.study.filters.blocks import Blocks, blocks_of, score_difference
 from validate.study.filters.cell import run_cell
 from validate.study.filters.plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
 from validate.study.filters.ranking import Ranked, Ranking, TruthPick, picks, rankings, tied
-from validate.study.filters.score import AHEAD, HELD_OUT, LOG_LOSS, POOLED, WITHHELD, FilterScores
+from validate.study.filters.score import (
+    AHEAD,
+    HELD_OUT,
+    LOG_LOSS,
+    POOLED,
+    WITHHELD,
+    Blocks,
+    FilterScores,
+    blocks_of,
+    score_difference,
+)
 from validate.study.filters.withheld_errors import Innovations, PredictionErrors
 from validate.study.sweep import axes
 

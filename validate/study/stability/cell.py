@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import eigh, eigvalsh
 
 from validate.arrays import Floats
-from validate.engine.worker_cache import Kept
+from validate.engine.execution import Kept
 from validate.errors import ComparisonError, ValidateError
 from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.locking import locking_of

@@ -24,7 +24,7 @@ from validate.pipeline.bodies.own_body import own_body, with_law
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.run.job import Job, job_of
 from validate.pipeline.run.named_run import study_folder
-from validate.report.views.records import Shown, table
+from validate.report.views.view_filling import Shown, table
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.fluid.pressure_curve import tuned_gain
 from validate.solve.fluid.pressure_loop import PressureLoop

@@ -18,8 +18,8 @@ from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, long_table
 from validate.report.stored.folder import MARK
 from validate.report.stored.store import SCHEMA_VERSION
-from validate.report.views.records import table
-from validate.study.loose_page import write_loose
+from validate.report.views.view_filling import table
+from validate.study.study_page import write_loose
 
 T = TypeVar("T")
 

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable
 from validate.pipeline.ladder.ladder import SHOWN
-from validate.report.views.records import Shown, chart, grouped, table
+from validate.report.views.view_filling import Shown, chart, grouped, table
 from validate.study.filters.ranking import SAME_TIME
 from validate.study.tradeoff.cell import DEFINITION
 from validate.study.tradeoff.study import ERRORS, ParetoFront, Refinement, Trade, TradeRow
