@@ -26,10 +26,9 @@ from types import ModuleType
 TYPE_CHECKING = False  # as typing has it, which is not loaded here: every command imports this
 if TYPE_CHECKING:
     from validate.library.comparison import compare
-    from validate.library.files import load, open_recording
     from validate.library.named_study import study
     from validate.library.run_result import open_run
-    from validate.library.single_run import run
+    from validate.library.single_run import load, open_recording, run
 
 __version__ = "0.1.0"
 __all__ = ["compare", "load", "open_recording", "open_run", "run", "study"]

@@ -56,7 +56,7 @@ FORMER = {
     "report.fields": "report.export.fields",
     "report.stored_tables": "report.stored.tables",
     "scene.box": "scene.geometries.box",
-    "scene.cylinder": "scene.geometries.cylinder",
+    "scene.cylinder": "scene.geometries.specification",
     "scene.geometry": "scene.geometries.specification",
     "scene.hollow_block": "scene.geometries.hollow_block",
     "scene.inclusion": "scene.geometries.inclusion",

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.fem.modes import modes_of
+from validate.fem.critical import modes_of
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
 from validate.solve.dynamic.newmark import Newmark

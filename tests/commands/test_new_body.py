@@ -16,8 +16,7 @@ from validate.errors import RegistrationError, UsageError
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.job import Job, job_of
-from validate.pipeline.run.named_run import run_name
+from validate.pipeline.run.job import Job, job_of, run_name
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
 from validate.scene.geometries.box import box, grid

@@ -6,17 +6,18 @@ from phantoms import grid_mesh
 
 from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.arrays import Floats
-from validate.compare.shapes.boundary import (
+from validate.compare.shapes.pair import (
     Boundary,
+    Field,
     Soundness,
     crossings,
     deformed_boundary,
     enclosed,
     inverted_cells,
     outline_boundary,
+    pair,
     require_comparable,
 )
-from validate.compare.shapes.pair import Field, pair
 from validate.compare.shapes.shape_error import (
     Boundaries,
     _beyond_booleans,

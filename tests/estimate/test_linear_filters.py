@@ -26,6 +26,7 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import Measurements, timetable
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
 from validate.estimate.reduced.reduced_kf import (
+    CoreStepper,
     LoadDoubt,
     ReducedKf,
     _doubled,
@@ -33,7 +34,6 @@ from validate.estimate.reduced.reduced_kf import (
     reduced_model,
     steady,
 )
-from validate.estimate.reduced.small_state import CoreStepper
 from validate.fem.system import build
 from validate.scene.material import Region
 from validate.scene.scene import Drive

@@ -36,8 +36,7 @@ from experiments.needle_block.sensitivity import (
     slope,
     solve,
 )
-from validate.fem.critical import lanczos_step
-from validate.fem.modes import modes_of
+from validate.fem.critical import lanczos_step, modes_of
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 

@@ -9,8 +9,17 @@ from scipy.optimize import brentq
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.identify.identification import InTurn, identify
-from validate.identify.least_squares import CalledOnce, Fit, Range, Residual, Space, fit
-from validate.identify.profile import RISE, Side, side
+from validate.identify.least_squares import (
+    RISE,
+    CalledOnce,
+    Fit,
+    Range,
+    Residual,
+    Side,
+    Space,
+    fit,
+    side,
+)
 from validate.identify.scaled_curve import linear_fit
 
 TWO = Space((Range("a", -1.0, 3.0), Range("b", 0.0, 5.0)))

@@ -14,7 +14,7 @@ from validate.compare.verdict import Accept
 from validate.errors import UsageError
 from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.parameters import describe
-from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.body_dynamics import MeasuredBody
 from validate.pipeline.bodies.measured import solid
 from validate.pipeline.experiment.declaration import from_json, to_json
 from validate.pipeline.experiment.experiment import Experiment
@@ -126,7 +126,7 @@ def test_other_json_is_no_declaration(text: str, tmp_path: Path) -> None:
 
 OLDER = '''"""A test of older days."""
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.bodies.choices import HeldAt, MeasuredBody
+from validate.pipeline.bodies.body_dynamics import HeldAt, MeasuredBody
 
 PARAMETERS = MeasuredBody("log.mcap", held=HeldAt(all="zmin"))
 EXPERIMENT = Experiment(name="older", title="older", source="mine", parameters=PARAMETERS)

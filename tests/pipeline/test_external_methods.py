@@ -19,7 +19,7 @@ from validate.pipeline.experiment.options import (
     external_methods,
     with_simulators,
 )
-from validate.pipeline.run.named_run import run_name
+from validate.pipeline.run.job import run_name
 from validate.pipeline.run.pipeline import compare
 from validate.solve.external.scheme import ExternalLetGo, ExternalSimulator
 

@@ -8,7 +8,7 @@ import pytest
 from command_line import called
 
 from validate.commands.run import _refined
-from validate.pipeline.bodies.mesh import unknowns_of
+from validate.pipeline.bodies.own_body import unknowns_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options, folder_of

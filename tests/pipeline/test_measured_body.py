@@ -33,15 +33,14 @@ from validate.pipeline.bodies import (
 from validate.pipeline.bodies import (
     markers as measured_outline,
 )
-from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody, SeenOf
+from validate.pipeline.bodies.body_dynamics import BodyRanges, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import solid
-from validate.pipeline.bodies.mesh import mesh_of
+from validate.pipeline.bodies.own_body import mesh_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.ladder import default as ladder_default
 from validate.recording.types import Contours, Markers, Recording, Signal, Source
-from validate.report.scenes.body_scene import body_scene
-from validate.report.scenes.loads import held
+from validate.report.scenes.body_scene import body_scene, held
 from validate.report.scenes.markers import markers as drawn_markers
 from validate.report.sections.observations import shown_loads
 from validate.report.sections.registration import registration
@@ -50,8 +49,7 @@ from validate.scene.geometries.specification import Box, MeshFile
 from validate.scene.material import Material
 from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.scene.places import axis_of, facets_of, place_of, point_of
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Drive, Load, Scene, Support, Weight
+from validate.scene.scene import Drive, Load, Prescribed, Scene, Support, Weight
 
 # private: _FEWEST: a limit or list of the code, which the test must meet exactly.
 # private: _followed, _instants, _loading, _noted, _squeezable, _touched, _window:

@@ -14,11 +14,11 @@ from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.choices import BodyRanges, Machine, MeasuredBody, SeenOf
+from validate.pipeline.bodies.body_dynamics import BodyRanges, Machine, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import touching
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.plates.machine_compliance import doubt, yielding
+from validate.pipeline.plates.scene import doubt, yielding
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
 from validate.scene.contact import (

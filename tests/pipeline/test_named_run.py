@@ -7,12 +7,12 @@ import pytest
 
 from validate.errors import UsageError
 from validate.parameters import with_values
-from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
+from validate.pipeline.bodies.body_dynamics import MeasuredBody, SeenOf
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, folder_of, mesh_files
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.run.named_run import run_folder, run_name, tag
+from validate.pipeline.run.job import run_folder, run_name, tag
 from validate.scene.geometries.specification import MeshFile
 from validate.scene.material import Material
 from validate.scene.scene import Scene

@@ -12,10 +12,9 @@ from validate.commands.questions.scene import geometry_of
 from validate.fem.system import build
 from validate.parameters import describe, with_values
 from validate.pipeline import load
-from validate.pipeline.bodies.body_dynamics import model_of
-from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.body_dynamics import MeasuredBody, model_of
 from validate.pipeline.bodies.measured import measured_body, solid, static_scene
-from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
+from validate.pipeline.bodies.own_body import mesh_of, unknowns_of
 from validate.pipeline.experiment.tree import Meshes, Tree
 from validate.pipeline.run import estimate as cost
 from validate.pipeline.run.estimate import fits

@@ -20,7 +20,7 @@ from test_measured_body import (
 
 from validate.compare.verdict import Accept
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.choices import BodyRanges, SeenOf
+from validate.pipeline.bodies.body_dynamics import BodyRanges, SeenOf
 from validate.pipeline.checks.checks import drive_inputs
 from validate.recording.types import Markers, Signal
 from validate.register.observation import Selection
@@ -28,8 +28,7 @@ from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Load, Scene, Support
+from validate.scene.scene import Load, Prescribed, Scene, Support
 
 SD = 2e-5
 STIFFNESS = E * SIZE[0] * SIZE[1] / SIZE[2]

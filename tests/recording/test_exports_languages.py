@@ -7,7 +7,7 @@ import pytest
 from exports import D, F, T, assert_test, comma, read, rows
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.tables.encoding import decode
+from validate.recording.tables.table import decode
 
 PAIRS = list(zip(T, D, F, strict=True))
 QUOTED = '"Zeit","Weg","Kraft"\n"(s)","(mm)","(N)"\n' + rows(form=lambda x: f'"{comma(x)}"')

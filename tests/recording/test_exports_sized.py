@@ -10,8 +10,9 @@ from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.readers import READERS
 from validate.recording.tables import blocks as repeats
-from validate.recording.tables import encoding, workbook
 from validate.recording.tables import specimens as sized
+from validate.recording.tables import table as encoding
+from validate.recording.tables import workbook
 from validate.recording.tables.columns import Pick, Said
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording

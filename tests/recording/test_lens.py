@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from validate.commands.main import cli
 from validate.errors import RecordingError, UsageError
-from validate.recording.images import lens
+from validate.recording.images import image as lens
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.images.png_stack import read_png_stack
 

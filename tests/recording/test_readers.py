@@ -29,13 +29,13 @@ from validate.recording.preflight import inspect_recording
 from validate.recording.reader import Reader
 from validate.recording.readers import READERS, in_order, named, recognised
 from validate.recording.types import Signal
+from validate.testing.pulled_cube import refusal
 from validate.testing.readers import (
     ReaderSample,
     reader_contract,
     refuses_a_truncated_file,
     refuses_random_bytes,
 )
-from validate.testing.requirements import refusal
 
 pytestmark = pytest.mark.usefixtures("decoded_here")
 

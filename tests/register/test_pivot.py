@@ -16,7 +16,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.readers import recognised
 from validate.recording.types import Recording, Source
-from validate.register.tools.pivot import pivot
+from validate.register.tools.image_plane import pivot
 
 # private: _standing: replaced, to bring a case about.
 

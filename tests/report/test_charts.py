@@ -18,8 +18,7 @@ from validate.pipeline import load
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
 from validate.report.charts import chart as charts
-from validate.report.charts.axes import beneath, floor_of
-from validate.report.charts.line_styles import TOGETHER, alone, panel_labels, styled
+from validate.report.charts.axes import TOGETHER, alone, beneath, floor_of, panel_labels, styled
 from validate.report.charts.style import ACCEPTED, COLUMNS, MEASURED, PALETTE, WIDTH, painted
 from validate.report.views.drawers import figure_of
 

@@ -10,7 +10,7 @@ from validate.compare.result import Result
 from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.report.scenes.loads import at_times, held
+from validate.report.scenes.body_scene import at_times, held
 from validate.report.sections.observations import driven, holds
 
 pytestmark = [pytest.mark.xdist_group("two methods of the phantom"), pytest.mark.slow]

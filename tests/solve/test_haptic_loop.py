@@ -15,8 +15,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.scene.tool import Needle
 from validate.solve.explicit.central import CentralDifference
-from validate.solve.haptic.loop import HapticLoop, HapticStepper
-from validate.solve.haptic.spring_probe import Hold
+from validate.solve.haptic.loop import HapticLoop, HapticStepper, Hold
 from validate.solve.types import State
 
 # private: _aim, _holding: called alone, case by case.

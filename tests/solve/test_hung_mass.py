@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from validate.fem.modes import modes_of
+from validate.fem.critical import modes_of
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material

@@ -11,7 +11,7 @@ from inertial_scenes import TOTAL, cube, driven, exact, small
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.modes import modes_of
+from validate.fem.critical import modes_of
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Material, Region

@@ -11,8 +11,7 @@ from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.places import InBox, OnPlane
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Load, Probe, Scene
+from validate.scene.scene import Load, Prescribed, Probe, Scene
 from validate.solve.march import run_scheme
 from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic

@@ -21,9 +21,8 @@ from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.method_run import Truth
 from validate.pipeline.run.pipeline import compare
-from validate.study.filters.bench import Bench, Ready, open_bench
 from validate.study.filters.cell import run_cell
-from validate.study.filters.plan import FilterPlan, plan
+from validate.study.filters.plan import Bench, FilterPlan, Ready, open_bench, plan
 from validate.study.filters.score import FilterScores
 from validate.study.sweep import axes
 

@@ -18,12 +18,11 @@ from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Case, Experiment, ReportAdditions, vary
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options, chosen_cases
-from validate.pipeline.run.named_run import run_name
+from validate.pipeline.run.job import run_name
 from validate.pipeline.run.pipeline import compare
 from validate.study.filters import plan as filter_plan
-from validate.study.filters.bench import Bench
 from validate.study.filters.cell import run_cell
-from validate.study.filters.plan import FilterPlan, plan
+from validate.study.filters.plan import Bench, FilterPlan, plan
 from validate.study.filters.study import run_line, study
 from validate.study.sweep import axes
 

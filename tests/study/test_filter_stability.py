@@ -11,7 +11,7 @@ from validate.estimate.filters import FILTERS
 from validate.pipeline import load
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
-from validate.study.filters.stability import (
+from validate.study.filters.ranking import (
     FilterEnding,
     FilterEndings,
     endings_exhibit,

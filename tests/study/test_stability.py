@@ -29,12 +29,13 @@ from validate.solve.amplification import amplification
 from validate.solve.dynamic.newmark import Newmark, misprint_limit
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.explicit.linear import ExplicitLinear
+from validate.study.stability import cell as precision
 from validate.study.stability import page as stability_page
-from validate.study.stability import precision
 from validate.study.stability import study as stability_module
 from validate.study.stability.cell import (
     StabilityBench,
     Stepped,
+    drift,
     frequencies,
     measured_limit,
     run_cell,
@@ -47,7 +48,6 @@ from validate.study.stability.plan import (
     stability_cells,
     step_grid,
 )
-from validate.study.stability.precision import drift
 from validate.study.stability.study import Stability, declared, points, stability
 from validate.study.study_page import write_study
 
@@ -231,7 +231,7 @@ def test_explicit_steps_of_one_mass_are_the_cosine(positions: bool) -> None:
 
 
 def test_energy_over_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validate.study.stability.precision.DRIFT_STEPS", 2000)
+    monkeypatch.setattr("validate.study.stability.cell.DRIFT_STEPS", 2000)
     omegas = np.array([1.0, 7.0, 30.0])
     for scheme in declared().values():
         if scheme.conserves:
@@ -270,7 +270,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> tuple[StabilityCell, ...]:
     """The base, nu = 0, and what must be refused."""
     cells = stability_cells(body("needle_block"), JOB, quick=True)
     without_nu = replace(body("needle_block").base, nu=0.0)
-    monkeypatch.setattr("validate.study.stability.precision.DRIFT_STEPS", 200)
+    monkeypatch.setattr("validate.study.stability.cell.DRIFT_STEPS", 200)
     picked = [
         replace(cells[0], drift=True),
         *(c for c in cells if c.expected or c.variant == without_nu),

@@ -39,8 +39,9 @@ from validate.study.choose.exhibits import choose_exhibits
 from validate.study.choose.facts import principal_strains
 from validate.study.choose.study import Wanted, choose, wanted
 from validate.study.coverage import plan as coverage_plan
+from validate.study.stability import cell as precision
 from validate.study.stability import cell as stability_cell
-from validate.study.stability import gain, precision
+from validate.study.stability import gain
 from validate.study.tradeoff import cell as trade_cell
 from validate.study.tradeoff import study as trade
 from validate.study.tradeoff.cell import Measured, TradeCell, held_bytes, run_cell

@@ -21,10 +21,9 @@ from validate.recording.types import Contours
 from validate.register.outlines.outlines import observe_outlines
 from validate.register.outlines.plane import cavity_sampler
 from validate.scene.geometries.box import box
-from validate.study.filters.bench import Bench
 from validate.study.filters.cell import folds_of, run_cell
 from validate.study.filters.page import against_first, study_exhibits
-from validate.study.filters.plan import FilterCell, plan
+from validate.study.filters.plan import Bench, FilterCell, plan
 from validate.study.filters.score import (
     AHEAD,
     HELD_OUT,

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import click
 
 from validate.errors import UsageError
-from validate.report.views.layout import width, wrapped
+from validate.report.views.drawers import width, wrapped
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(dir_okay=False, path_type=Path)

@@ -20,12 +20,13 @@ from validate.recording.types import Frames, Markers, Recording
 from validate.register.tools.image_plane import (
     ImagePlane,
     KnownTarget,
+    Pivot,
     SeenPoints,
     by_target,
     image_plane,
+    pivot,
 )
 from validate.register.tools.landmarks import dwells
-from validate.register.tools.pivot import Pivot, pivot
 
 _GROSS = 0.05  # of the image's diagonal: what marking by hand never misses by
 _LARGEST = 5e-3  # m: no scanner's or camera's pixel on tissue is wider

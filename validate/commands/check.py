@@ -24,7 +24,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.origins import Opened, opened
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cells import InStore
-from validate.pipeline.run.named_run import reports_of, run_folder
+from validate.pipeline.run.job import reports_of, run_folder
 from validate.pipeline.run.pipeline import compare
 from validate.pipeline.run.runs import stored_run
 from validate.report.long_table import long_table

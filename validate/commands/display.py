@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from validate.numbers import duration, significant, with_unit
-from validate.report.views.layout import laid, width, wrapped
+from validate.report.views.drawers import laid, width, wrapped
 
 if TYPE_CHECKING:
     from validate.report.long_table import LongTable

@@ -11,7 +11,7 @@ from validate.files import json_value, safe_name
 from validate.places import try_file, try_folder, write_whole
 from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
-from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.store import NOT_SHOWN
 from validate.report.stored.tables import pictures, plain_name, stored_folder, stored_views
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of

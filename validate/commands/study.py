@@ -25,7 +25,7 @@ from validate.study.coverage.page import HEAD, interval, percent
 from validate.study.filters import page as filter_page
 from validate.study.filters.page import chosen_line, ranking_table
 from validate.study.filters.ranking import Ranking
-from validate.study.filters.stability import sentence as ending_words
+from validate.study.filters.ranking import sentence as ending_words
 from validate.study.filters.study import FilterStudy
 from validate.study.stability import page as stability_page
 from validate.study.stability.study import Stability

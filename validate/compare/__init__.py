@@ -38,7 +38,7 @@ _HOMES = {
         "force_pair",
         "force_scores",
     ),
-    "shapes.boundary": ("outline_boundary",),
+    "shapes.pair": ("outline_boundary",),
     "shapes.shape_error": (
         "Boundaries",
         "boundary_scores",

@@ -62,7 +62,7 @@ def connected(where: Where, count: int) -> Iterator[Any]:
 @contextmanager
 def _local_cluster(count: int) -> Iterator[Any]:
     settings = {
-        "distributed.worker.multiprocessing-method": "forkserver",  # of `engine.server`
+        "distributed.worker.multiprocessing-method": "forkserver",  # of `engine.pool`
         "distributed.nanny.pre-spawn-environ": {},  # would be this process's own, and stay so
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.admin.tick.interval": "1s",  # each of five event loops looks at the clock

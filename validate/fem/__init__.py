@@ -6,8 +6,7 @@ _HOMES = {
     "system": ("Responses", "System", "build", "responses"),
     "assembly.assemble": ("mass", "stiffness"),
     "laws.law": ("Law", "law_of"),
-    "critical": ("CriticalStep", "critical_step"),
-    "modes": ("Modes", "modes_of"),
+    "critical": ("CriticalStep", "critical_step", "Modes", "modes_of"),
     "assembly.locate": ("Rows",),
 }
 

@@ -4,8 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "identification": ("Identification", "InTurn", "Profiled", "identify"),
-    "least_squares": ("Fit", "fit", "Range", "Space", "whitened"),
-    "profile": ("Side", "side"),
+    "least_squares": ("Fit", "fit", "Range", "Side", "side", "Space", "whitened"),
     "scaled_curve": ("ScaledFit", "UnitCurve", "fit_scaled"),
     "budget": ("IdentifiedValue", "Pattern", "pattern"),
     "modulus": ("ModulusFit", "fit_modulus"),

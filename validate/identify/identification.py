@@ -17,8 +17,7 @@ from scipy.special import chdtri
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.least_squares import Fit, Residual, Space, fit
-from validate.identify.profile import RISE, Side, side
+from validate.identify.least_squares import RISE, Fit, Residual, Side, Space, fit, side
 from validate.identify.scaled_curve import linear_fit, linear_side
 
 FACTOR = 2.0  # between the ends of an interval: wider is not identified

@@ -16,8 +16,7 @@ from scipy.interpolate import CubicSpline
 from validate.arrays import Floats
 from validate.errors import ComparisonError, ValidateError
 from validate.identify.budget import dependence
-from validate.identify.least_squares import Fit, Residual, Space
-from validate.identify.profile import RISE, Side
+from validate.identify.least_squares import RISE, Fit, Residual, Side, Space
 
 # --- Closed form of an identification: one parameter that the residual is linear in.
 #

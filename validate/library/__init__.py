@@ -8,8 +8,7 @@ promised.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "files": ("load", "open_recording"),
-    "single_run": ("run",),
+    "single_run": ("load", "open_recording", "run"),
     "run_result": ("RunCheck", "RunResult", "open_run"),
     "named_study": ("study",),
     "study_result": ("StudyResult",),

@@ -6,8 +6,7 @@ from typing import Any, Literal, TypedDict, Unpack
 
 from validate.engine.cell import Where
 from validate.errors import UsageError
-from validate.library.files import load
-from validate.library.single_run import Value, as_texts, set_words
+from validate.library.single_run import Value, as_texts, load, set_words
 from validate.library.studies import (
     Studied,
     StudySettings,

@@ -17,8 +17,8 @@ from validate.parameters import nearest_names
 from validate.recording.types import Markers, Recording, Signal
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable
-from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.folder import MARK
+from validate.report.stored.store import NOT_SHOWN
 from validate.report.stored.tables import PICTURE, Shown, pictures, plain_name, shown_by_name
 from validate.report.views.drawers import figures, part, save, terminal
 from validate.report.views.standard import VIEWS

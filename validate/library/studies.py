@@ -16,7 +16,7 @@ from validate.library.single_run import Progress, no_progress, warn_of_units
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import sources_of
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.named_run import differences, study_folder, tag
+from validate.pipeline.run.job import differences, study_folder, tag
 from validate.report.stored.environment import made
 from validate.report.stored.folder import locked, try_results
 from validate.study.choose.facts import stored_effects
@@ -25,7 +25,7 @@ from validate.study.coverage import page as coverage_page
 from validate.study.coverage.plan import DRAWS
 from validate.study.coverage.study import Coverage, coverage
 from validate.study.filters import page as filter_page
-from validate.study.filters.stability import FilterEndings, filter_endings, with_endings
+from validate.study.filters.ranking import FilterEndings, filter_endings, with_endings
 from validate.study.filters.study import FilterStudy, study
 from validate.study.identify import study as identify_page
 from validate.study.identify.study import STARTS, IdentifyStudy, identification

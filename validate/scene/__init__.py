@@ -7,6 +7,7 @@ _HOMES = {
     "mesh_files.mesh_file": ("filled", "read_mesh", "write_mesh"),
     "mesh_files.third_party_meshes": ("ForeignBody", "read_foreign"),
     "scene": (
+        "Prescribed",
         "Cavity",
         "Drive",
         "Foundation",
@@ -29,7 +30,6 @@ _HOMES = {
     "geometries.specification": ("quarter_cylinder",),
     "geometries.inclusion": ("Block", "Capsule", "block_with_inclusion"),
     "geometries.refinement": ("refined",),
-    "prescribed_motion": ("Prescribed",),
     "places": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
 }
 

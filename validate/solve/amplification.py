@@ -19,7 +19,7 @@ from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
-_COUPLED = 1e-8  # of the damping, as in `fem.modes`
+_COUPLED = 1e-8  # of the damping, as in `fem.critical`
 
 
 @dataclass(frozen=True)

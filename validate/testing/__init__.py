@@ -11,7 +11,7 @@ _HOMES = {
     "laws": ("law_contract",),
     "schemes": ("scheme_contract",),
     "filters": ("filter_contract",),
-    "requirements": ("refusal",),
+    "pulled_cube": ("refusal",),
 }
 
 __all__ = names(_HOMES)

@@ -9,8 +9,14 @@ from validate.arrays import Floats
 from validate.estimate.filters import Filter
 from validate.estimate.measurements import Measurements
 from validate.solve.types import Uncertain
-from validate.testing.pulled_cube import DT, PulledCase, case
-from validate.testing.requirements import refusal, require, require_documented_settings
+from validate.testing.pulled_cube import (
+    DT,
+    PulledCase,
+    case,
+    refusal,
+    require,
+    require_documented_settings,
+)
 
 
 def steps_from_rest(settings: Filter) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.fem.laws.law import law_of
 from validate.scene.material import Material
-from validate.testing.requirements import require
+from validate.testing.pulled_cube import require
 
 _EYE = np.eye(3)
 _DRAWS = 25

@@ -1,12 +1,15 @@
-"""Cube under tension (paper 001, and a smaller one), with measurements of single nodes."""
+"""Cube under tension (paper 001, and a smaller one), and checks that contracts are made of."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from validate.arrays import Floats
+from validate.errors import ValidateError
 from validate.estimate.measurements import Measurements
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box
@@ -98,3 +101,34 @@ def case(steps: int = 60, shape: Shape = SMALL) -> PulledCase:
     t = np.asarray(DT * np.arange(1, steps + 1), np.float64)
     truth = march("fem", Newmark(DT).prepare(system), t, inputs, np.array([steps - 1]), 0.0)
     return PulledCase(system, inputs, truth)
+
+
+# --- checks that contracts are made of -----------------------------------------------------------
+
+
+def require(condition: object, what: str) -> None:
+    """Raise `AssertionError` with `what` is expected where the condition is false."""
+    if not condition:
+        raise AssertionError(what)
+
+
+def refusal(action: Callable[[], Any]) -> str:
+    """Return the one line of the `ValidateError` that an action raises.
+
+    Raises `AssertionError` where it raises none, or one of several lines.
+    """
+    try:
+        action()
+    except ValidateError as error:
+        text = str(error.args[0])
+        require(len(text.splitlines()) == 1, f"an error of several lines: {text!r}")
+        return str(error)
+    raise AssertionError("expected a ValidateError, but nothing was raised")
+
+
+def require_documented_settings(kind: type) -> None:
+    """Every field of settings has a sentence and a unit, except a scheme inside."""
+    for f in fields(kind):
+        if f.name != "inner":
+            doc = f.metadata.get("doc")
+            require(doc, f"{kind.__name__}.{f.name}: declare it by quantity(default, unit, doc)")

@@ -11,7 +11,7 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.text_rows import LEFT_OUT
 from validate.recording.reader import Options, Reader, digest
 from validate.recording.types import Recording
-from validate.testing.requirements import refusal, require
+from validate.testing.pulled_cube import refusal, require
 
 _CUT = 3  # bytes cut off an end: a record, a number and a chunk are incomplete without them
 

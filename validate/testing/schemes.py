@@ -15,7 +15,7 @@ from validate.scene.material import LawName, Material
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.scene.tool import Needle
 from validate.solve.types import Scheme
-from validate.testing.requirements import refusal, require, require_documented_settings
+from validate.testing.pulled_cube import refusal, require, require_documented_settings
 
 _DEPTH, _FORCE = 1e-5, 0.001  # m, N of a step
 _INWARD = (-1.0, 0.0, 0.0)

@@ -43,10 +43,10 @@ from validate.commands.questions.motion import (
     require_dynamic,
 )
 from validate.commands.questions.scene import CELLS, answered_mesh, imports, rendered, tree_of
-from validate.commands.recording_summary import beside
+from validate.commands.recordings import beside
 from validate.errors import UsageError
 from validate.pipeline.bodies.markers import AS_SEEN
-from validate.pipeline.bodies.mesh import PLATES, sizes_of_mesh, unknowns_of
+from validate.pipeline.bodies.own_body import PLATES, sizes_of_mesh, unknowns_of
 from validate.pipeline.run.estimate import FEWEST_STATES, RUNS, newton_seconds, states_within
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording

@@ -27,8 +27,7 @@ from validate.commands.questions.body import BODY
 from validate.commands.questions.inclusion import INCLUSION
 from validate.commands.questions.kinds import NewKind
 from validate.commands.questions.plates import PLATES
-from validate.commands.recording_summary import beside, channels, plain, topics
-from validate.commands.recordings import ask_back
+from validate.commands.recordings import ask_back, beside, channels, plain, topics
 from validate.errors import SceneError, UsageError
 from validate.pipeline.run.estimate import RunEstimate, estimated
 from validate.pipeline.run.twin_record import kind_of_recordings

@@ -14,9 +14,8 @@ from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, sides, unit_
 from validate.commands.questions.law import coefficient_values, left_open
 from validate.errors import SceneError, UsageError
 from validate.parameters import describe, with_values
-from validate.pipeline.bodies.body_dynamics import WATER
-from validate.pipeline.bodies.choices import MeasuredBody
-from validate.pipeline.bodies.mesh import grid_unknowns
+from validate.pipeline.bodies.body_dynamics import WATER, MeasuredBody
+from validate.pipeline.bodies.own_body import grid_unknowns
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.scene.contact import Indenter, RigidContact
@@ -26,8 +25,7 @@ from validate.scene.material import Material
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.places import axis_of, nodes_of, place_of
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Drive, Load, Pressure, Scene, Support, Weight
+from validate.scene.scene import Drive, Load, Prescribed, Pressure, Scene, Support, Weight
 from validate.units import in_si, split
 
 # --- Parts of a declaration as the lines of an experiment's file: what differs from the

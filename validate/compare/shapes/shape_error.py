@@ -15,15 +15,16 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats
 from validate.compare.score import Counted, Metric, Score
-from validate.compare.shapes.boundary import (
+from validate.compare.shapes.pair import (
     Boundary,
+    FieldPair,
     crossings,
     deformed_boundary,
     enclosed,
     normals,
     require_comparable,
+    same_mesh,
 )
-from validate.compare.shapes.pair import FieldPair, same_mesh
 from validate.errors import ComparisonError
 from validate.scene.shape_functions import symmetric_points
 

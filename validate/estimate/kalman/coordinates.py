@@ -12,7 +12,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.estimate.kalman.covariance import Decoupled, Dense, GainSequence
 from validate.estimate.kalman.formulas import Gain, log_likelihood
-from validate.fem.modes import modes_of
+from validate.fem.critical import modes_of
 from validate.fem.system import System, once
 from validate.solve.dynamic.linear import Excitation
 from validate.solve.dynamic.newmark_rule import Propagation, Rule, per_mode

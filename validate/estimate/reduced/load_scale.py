@@ -25,7 +25,7 @@ from validate.estimate.kalman.formulas import (
     nothing,
 )
 from validate.estimate.measurements import Measurements, timetable
-from validate.estimate.reduced.small_state import CoreStepper
+from validate.estimate.reduced.reduced_kf import CoreStepper
 from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System
 from validate.parameters import quantity

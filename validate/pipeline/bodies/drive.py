@@ -13,14 +13,13 @@ from validate.identify.modulus import MIN_SAMPLES, load_noise
 from validate.parameters import known
 from validate.pipeline.bodies.markers import BodyAt, leading, markers_topic, registered
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.machine_compliance import taken_off
+from validate.pipeline.plates.scene import taken_off
 from validate.recording.merge import repeats_share
 from validate.recording.types import Recording, Signal
 from validate.register.clocks import clock_sd, interpolated
 from validate.register.signals import SignalObservation
 from validate.scene.contact import Indenter, RigidContact
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Drive, Load, Pressure, Scene, Weight
+from validate.scene.scene import Drive, Load, Prescribed, Pressure, Scene, Weight
 
 Kind = Literal["weighs", "pulls", "moves", "follows", "presses", "releases"]
 Mover = Drive | RigidContact | Prescribed | Load | Pressure | Weight

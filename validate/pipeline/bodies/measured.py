@@ -17,6 +17,7 @@ from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
 from validate.pipeline.bodies.body_dynamics import (
     Changes,
+    SeenOf,
     doubting,
     element_of,
     following,
@@ -26,9 +27,9 @@ from validate.pipeline.bodies.body_dynamics import (
     model_of,
 )
 from validate.pipeline.bodies.body_registration import place
-from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.drive import drive_kind, mover, placed_points, pressing
-from validate.pipeline.bodies.mesh import (
+from validate.pipeline.bodies.modulus import identify_body, model_name
+from validate.pipeline.bodies.own_body import (
     costs_of,
     even_axes,
     grid_unknowns,
@@ -36,7 +37,6 @@ from validate.pipeline.bodies.mesh import (
     mesh_of,
     unknowns_of,
 )
-from validate.pipeline.bodies.modulus import identify_body, model_name
 from validate.pipeline.calibration.fitted_moduli import modulus_in
 from validate.pipeline.experiment.experiment import (
     CORNER_ORDER,
@@ -50,7 +50,7 @@ from validate.pipeline.experiment.experiment import (
 )
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import CellSize, Tree, beside, changed_by
-from validate.pipeline.plates.machine_compliance import doubt, yielding
+from validate.pipeline.plates.scene import doubt, yielding
 from validate.pipeline.run.estimate import (
     INPUTS,
     MESHES,

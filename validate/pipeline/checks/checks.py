@@ -41,8 +41,7 @@ from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.meshless import AnyScene, RigidBody
-from validate.scene.prescribed_motion import Prescribed
-from validate.scene.scene import Scene
+from validate.scene.scene import Prescribed, Scene
 
 # --- numerical uncertainty u_num of the accepted methods, from their declared meshes and steps ---
 

@@ -1,17 +1,21 @@
-"""Job of a run or study: data that all its cells share, loaded by a worker."""
+"""Job of a run or study: data that all its cells share, loaded by a worker; a run's name."""
 
 import hashlib
-from collections.abc import Mapping
+import json
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from validate.catalogue import reports_of as reports_of
 from validate.engine.identity import Identity, identity_of
 from validate.engine.user_code import NO_CODE, SentCode, code_hash, received, sent
 from validate.errors import UsageError
 from validate.estimate.filters import FILTERS
+from validate.parameters import Parameter, changed, describe
 from validate.pipeline.experiment.declaration import encoded, from_json, holds_code, to_json
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import (
@@ -21,7 +25,13 @@ from validate.pipeline.experiment.find import (
     package_name,
     sources_of,
 )
-from validate.pipeline.experiment.options import folder_of
+from validate.pipeline.experiment.options import (
+    Options,
+    all_methods,
+    configure,
+    folder_of,
+    with_simulators,
+)
 from validate.plugins import Registry
 from validate.register.sensing import SENSORS
 from validate.scene.laws import LAWS
@@ -155,3 +165,70 @@ def job_on(
 def file_sha256(path: Path) -> str:
     """Of an experiment's file and of those beside it that it names."""
     return hashlib.sha256(b"".join(f.read_bytes() for f in sources_of(path))).hexdigest()
+
+
+# --- name of a run: the experiment's name, the user's changes and a short hash -------------------
+
+_LONGEST = 60  # characters of what differs in a folder's name
+_DIGITS = 6  # of the hash
+
+
+def run_folder(experiment: Experiment, options: Options, out: Path | None) -> Path:
+    """Where a run's report goes: below `out`, else below the reports/ of the project.
+
+    Raises `UsageError` for unknown methods, paths and values.
+    """
+    return reports_of(experiment.path, out) / run_name(experiment, options)
+
+
+def study_folder(experiment: Experiment, kind: str, out: Path | None) -> Path:
+    """`out`/<name>/study-<kind>, by default in the reports/ of the experiment's clone."""
+    return reports_of(experiment.path, out) / experiment.name / f"study-{kind}"
+
+
+def run_name(experiment: Experiment, options: Options) -> str:
+    """`NAME` of the run as declared, else as in `NAME+quick+material.E-3fa2c1`."""
+    return experiment.name + tag(*differences(experiment, options))
+
+
+def differences(experiment: Experiment, options: Options) -> tuple[list[str], list[Any]]:
+    """Return the user's changes: in words, and as content with every value. Those of a script, to
+    what the experiment's file declares, are among them.
+
+    Raises `UsageError` for unknown methods, paths and values.
+    """
+    loaded = loaded_from(experiment.path) if experiment.path else ()
+    file = with_simulators(loaded[0], options.simulators) if loaded else experiment
+    declared = _settable(file, Options({}, (), options.quick))
+    differing = sorted((c.path, c.value) for c in changed(declared, _settable(experiment, options)))
+    methods = sorted(set(options.methods))
+    if methods == sorted(experiment.methods):
+        methods = []
+    case = [f"case_{options.case}"] * bool(options.case)
+    words = ["quick"] * options.quick + case + ["methods"] * bool(methods)
+    simulators = sorted(options.simulators)
+    added = sorted({*experiment.methods} - {*file.methods})
+    if added and not methods:
+        words.append("methods")
+    other = {name: getattr(experiment, name) for name in ("accept", "accepted")
+             if getattr(experiment, name) != getattr(file, name)}  # fmt: skip
+    content = [options.quick, methods, differing, *simulators, *case, *added, *other.items()]
+    return [*words, *other, *(p for p, _ in differing), *["external"] * bool(simulators)], content
+
+
+def _settable(experiment: Experiment, options: Options) -> tuple[Parameter, ...]:
+    parameters, _ = configure(experiment, options)
+    return describe(parameters) + describe(all_methods(experiment, options), "methods.")
+
+
+def tag(words: Sequence[str], content: Any) -> str:
+    """What differs, in words that a folder may be called by, and a hash of `content`; "" without
+    words."""
+    if not words:
+        return ""
+    plain = [re.sub(r"[^\w.]+", "_", word) for word in words]
+    fit = max(1, sum(len("+".join(plain[: i + 1])) <= _LONGEST for i in range(len(plain))))
+    more = [f"{len(plain) - fit}_more"] if fit < len(plain) else []
+    text = json.dumps(content, default=str)
+    mark = hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+    return f"+{'+'.join([*plain[:fit], *more])}-{mark}"

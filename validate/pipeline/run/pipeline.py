@@ -39,9 +39,15 @@ from validate.pipeline.checks.checks import (
     with_uncertain_drives,
 )
 from validate.pipeline.checks.consistency import consistency_scores
-from validate.pipeline.checks.likely_causes import Difference, Failed, difference_of, explained_by
-from validate.pipeline.checks.plausibility import doubts
-from validate.pipeline.checks.sentence import figures_sentence, verdict_sentence
+from validate.pipeline.checks.likely_causes import (
+    Difference,
+    Failed,
+    difference_of,
+    doubts,
+    explained_by,
+    figures_sentence,
+    verdict_sentence,
+)
 from validate.pipeline.exhibits.standard import (
     error_at,
     external_exhibits,

@@ -35,7 +35,7 @@ from validate.recording.reader import (
     source_of,
     spread,
 )
-from validate.recording.tables.point_layout import FieldColumns, field_columns
+from validate.recording.tables.point_table import FieldColumns, field_columns
 from validate.recording.tables.vocabulary import role_of_name
 from validate.recording.types import Frames, Markers, Recording, Signal, Stream
 from validate.units import in_si, si_of

@@ -22,7 +22,7 @@ from validate.recording.reader import (
     source_of,
     spread,
 )
-from validate.recording.tables.encoding import whole_file
+from validate.recording.tables.table import whole_file
 from validate.recording.types import Markers, Recording
 
 TOPIC = "landmarks"

@@ -12,8 +12,7 @@ from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.streams import recorded
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.images.image import shallow
-from validate.recording.images.lens import straightened
+from validate.recording.images.image import shallow, straightened
 from validate.recording.images.png_stack import (
     OTHERS,
     SUFFIXES,

@@ -10,8 +10,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, UsageError
 from validate.files import ANY_SIZE, member, members, open_file, read_bytes
-from validate.recording.images.image import Pixels, decode_png
-from validate.recording.images.lens import straightened
+from validate.recording.images.image import Pixels, decode_png, straightened
 from validate.recording.reader import (
     LENS_FILE,
     M_PER_PX,

@@ -18,7 +18,7 @@ from validate.errors import RecordingError, UsageError
 from validate.files import ANY_SIZE, open_file
 from validate.recording.formats.streams import recorded
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.recording.images.lens import straightened
+from validate.recording.images.image import straightened
 from validate.recording.reader import (
     LENS_FILE,
     M_PER_PX,

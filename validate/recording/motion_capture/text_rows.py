@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import RecordingError
-from validate.recording.tables.encoding import decode, whole_file
+from validate.recording.tables.table import decode, whole_file
 
 NONE = 1e20  # NDI writes -3.7e28 for a number that is none
 ASSUMED = "assumed"  # a record: what was taken of a file and what decided, a line each

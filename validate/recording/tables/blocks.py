@@ -11,15 +11,16 @@ from typing import NoReturn
 
 from validate.errors import RecordingError, UsageError
 from validate.recording.tables.columns import Said, time_column
-from validate.recording.tables.encoding import Text, decode
 from validate.recording.tables.table import (
     NOTHING,
     Line,
     Split,
     Table,
+    Text,
     columns_of,
     decimal_sign,
     decimals,
+    decode,
     header_of,
     is_data,
     is_names,

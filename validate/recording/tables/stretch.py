@@ -8,8 +8,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.tables.blocks import parse_tables
-from validate.recording.tables.encoding import whole_file
-from validate.recording.tables.table import Table
+from validate.recording.tables.table import Table, whole_file
 from validate.recording.tables.vocabulary import words
 from validate.recording.types import Recording, Signal, Source
 from validate.units import si_factor

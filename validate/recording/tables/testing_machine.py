@@ -37,8 +37,7 @@ from validate.recording.tables.columns import (
     signs,
     timed_pick,
 )
-from validate.recording.tables.encoding import whole_file
-from validate.recording.tables.point_layout import field_columns
+from validate.recording.tables.point_table import field_columns
 from validate.recording.tables.specimens import (
     Sized,
     Sizes,
@@ -52,7 +51,7 @@ from validate.recording.tables.specimens import (
     specimen_tables,
     with_sizes,
 )
-from validate.recording.tables.table import Table, decimals
+from validate.recording.tables.table import Table, decimals, whole_file
 from validate.recording.tables.vocabulary import tells_a_stop
 from validate.recording.types import Record, Recording, Signal, Source, clock_of
 

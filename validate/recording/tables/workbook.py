@@ -21,9 +21,8 @@ from validate.recording.formats.subprocess_decoder import decoded
 from validate.recording.reader import MapOption, Options, Reader, head
 from validate.recording.tables.blocks import parse_tables
 from validate.recording.tables.columns import OPTIONS, role_of
-from validate.recording.tables.encoding import whole_file
 from validate.recording.tables.specimens import chosen, specimen_tables
-from validate.recording.tables.table import Table
+from validate.recording.tables.table import Table, whole_file
 from validate.recording.tables.testing_machine import INSTRON, recording_of
 from validate.recording.types import Recording
 

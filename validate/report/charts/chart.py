@@ -16,15 +16,19 @@ from matplotlib.lines import Line2D
 from validate.compare.exhibit import Chart, Picture, Series
 from validate.numbers import significant
 from validate.report.charts.axes import (
+    Drawn,
+    alone,
     beneath,
     cut_dips,
     fill_axes,
     floor_of,
     levels,
     name_levels,
+    panel_labels,
+    panel_series,
     readable,
+    styled,
 )
-from validate.report.charts.line_styles import Drawn, alone, panel_labels, panel_series, styled
 from validate.report.charts.style import (
     WIDTH,
     Drawing,

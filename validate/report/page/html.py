@@ -28,9 +28,17 @@ from validate.compare.exhibit import (
 from validate.compare.result import MethodResult, Result
 from validate.files import safe_name
 from validate.numbers import duration, with_unit
-from validate.report.charts.axes import beneath, floor_of, levels
+from validate.report.charts.axes import (
+    TOGETHER,
+    band_of,
+    beneath,
+    floor_of,
+    is_given,
+    is_jagged,
+    levels,
+    styled,
+)
 from validate.report.charts.intervals import order, reach, shares
-from validate.report.charts.line_styles import TOGETHER, band_of, is_given, is_jagged, styled
 from validate.report.charts.style import DPI, HasMethods, uri
 from validate.report.exhibits import DrawnExhibit
 from validate.report.export.tables import caption, sheet, shown, word_columns

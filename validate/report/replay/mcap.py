@@ -48,7 +48,7 @@ from validate.report.replay.space import (
     transforms,
 )
 from validate.report.replay.view import ReplayView, Track, over_time
-from validate.report.scenes.loads import HOW
+from validate.report.scenes.body_scene import HOW
 from validate.report.sections.observations import shown_method
 from validate.report.stored.environment import file_name
 

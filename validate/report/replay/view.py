@@ -12,7 +12,7 @@ from validate.recording.mcap.schemas import POSE, POSE_KEY
 from validate.recording.mcap.write import stamps_ns
 from validate.recording.types import Recording
 from validate.register.registration import Registered
-from validate.report.scenes.loads import HOW, Instant, at_times, held
+from validate.report.scenes.body_scene import HOW, Instant, at_times, held
 from validate.report.sections.observations import drive, holds, outline
 from validate.solve.types import Run
 

@@ -1,10 +1,11 @@
 """The scene of a drawn body: methods at common instants with what was measured on them, and tools.
 
-The page's view that turns (`page.body_view`) and the still pictures (`scenes.stills`) show it.
+The page's view that turns (`page.html`) and the still pictures (`scenes.stills`) show it.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from validate.numbers import significant, spaced, with_unit
 from validate.register.clocks import interpolated
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.outlines.plane import from_image
+from validate.register.registration import Registered
 from validate.report.scenes.body import (
     Camera,
     Tool,
@@ -23,15 +25,17 @@ from validate.report.scenes.body import (
     opening_plane,
     tools_of,
 )
-from validate.report.scenes.loads import held
 from validate.report.sections.observations import (
+    Held,
     drive,
     driven,
     finished,
+    holds,
     markers_seen,
     outline_seen,
 )
 from validate.scene.scene import Scene
+from validate.solve.types import Run
 
 _MM = 1e3
 MOST_METHODS = 4
@@ -279,3 +283,61 @@ def _at_nodes(scene: Scene, values: Floats) -> Floats:
 def three(x: Floats) -> Floats:
     """Return vectors (..., 3) of (..., d): a plane lies in space at z = 0."""
     return np.pad(x, [*([(0, 0)] * (x.ndim - 1)), (0, 3 - x.shape[-1])])
+
+
+# --- displacements between output frames: interpolation of a run at its load steps ---------------
+
+HOW = "between the loads interpolated linearly in the drive"
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Displacements u (n, d) m at time t s and drive in SI `unit`; `hold` None: none of the loads.
+
+    `computed` is False where it was interpolated.
+    """
+
+    t: float
+    drive: float
+    unit: str
+    u: Floats
+    hold: Held | None
+    computed: bool = True
+
+
+def held(registered: Registered, run: Run) -> tuple[Instant, ...]:
+    """Return the instants that the run computed, in order of time."""
+    if not holds(registered):
+        times = run.t[run.at]
+        rows = zip(times.tolist(), driven(registered, times).tolist(), run.u, strict=True)
+        return tuple(Instant(t, q, drive(registered).unit, u, None) for t, q, u in rows)
+    pairs = zip(holds(registered), run.u, strict=False)  # a run that ended early has fewer
+    return tuple(Instant(h.t, h.drive, h.unit, u, h) for h, u in pairs)
+
+
+def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, ...]:
+    """Instants at the loads and at those of `times` (k,) s that lie between them, in order.
+
+    Of a run over time the frames nearest to `times`, none interpolated.
+    """
+    known = held(registered, run)
+    if known and not holds(registered):
+        at = np.array([i.t for i in known])
+        return tuple(known[i] for i in np.unique([np.abs(at - t).argmin() for t in times]))
+    found = list(known)
+    for a, b in pairwise(known):
+        inside = times[(times > a.t) & (times < b.t)]
+        pairs = zip(inside.tolist(), driven(registered, inside).tolist(), strict=True)
+        found += [_between(a, b, *pair) for pair in pairs]
+    return tuple(sorted(found, key=lambda i: i.t))
+
+
+def _between(a: Instant, b: Instant, t: float, q: float) -> Instant:
+    way = b.drive - a.drive
+    share = (q - a.drive) / way if way else 0.0
+    return _mixed(a, b, float(np.clip(share, 0.0, 1.0)), t)
+
+
+def _mixed(a: Instant, b: Instant, share: float, t: float) -> Instant:
+    q = a.drive + share * (b.drive - a.drive)
+    return Instant(t, q, a.unit, a.u + share * (b.u - a.u), None, computed=False)

@@ -16,8 +16,7 @@ from validate.report.long_table import LongTable
 from validate.report.scenes.bodies import body
 from validate.report.scenes.markers import markers
 from validate.report.scenes.outlines import outlines
-from validate.report.sections.discrimination import discrimination
-from validate.report.sections.observations import drive
+from validate.report.sections.observations import discrimination, drive
 from validate.report.sections.provenance import parameters, recording
 from validate.report.sections.registration import registration
 from validate.report.views.standard import VIEWS

@@ -17,7 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.modes import Modes, modes_of
+from validate.fem.critical import Modes, modes_of
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic.linear import (

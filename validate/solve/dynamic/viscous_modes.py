@@ -21,9 +21,9 @@ from scipy.linalg import expm
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.locate import probe_rows
+from validate.fem.critical import lowest
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.viscoelasticity import Branches, Remembered, relaxed
-from validate.fem.modes import lowest
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.scene.material import Prony

@@ -24,7 +24,7 @@ from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
-from validate.solve.haptic.spring_probe import SpringProbe
+from validate.solve.haptic.loop import SpringProbe
 from validate.solve.regions.body import RegionBody, require_one_probe
 from validate.solve.regions.scheme import AsyncRegions
 from validate.solve.types import State, Stepper

@@ -25,7 +25,7 @@ from validate.scene.material import LawName, Prony
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
-from validate.solve.haptic.spring_probe import Hold, SpringProbe
+from validate.solve.haptic.loop import Hold, SpringProbe
 from validate.solve.regions.body import (
     PrimarySize,
     RegionBody,

@@ -1,6 +1,6 @@
 """Static contact with rigid bodies: detection, and Newton's method, linear or at large strain.
 
-R(u) - f = r at the end of a step, with the contact forces r of `solve.static.touching`: no penalty,
+R(u) - f = r at the end of a step, with the contact forces r that are detected below: no penalty,
 and nothing penetrates in the end.
 
 Departure: a node that comes to touch within a step is anchored where it stood at the step's

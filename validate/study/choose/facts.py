@@ -11,8 +11,8 @@ from validate.arrays import Floats
 from validate.catalogue import reports_of
 from validate.compare.effects import TELLS_APART
 from validate.fem.assembly.assemble import shape_gradients
+from validate.fem.critical import modes_of
 from validate.fem.locking import LOCKING_FROM
-from validate.fem.modes import modes_of
 from validate.fem.system import build
 from validate.pipeline.experiment.experiment import EffectSpec, Experiment
 from validate.pipeline.ladder.ladder import Rival, Trial

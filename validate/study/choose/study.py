@@ -20,8 +20,7 @@ from validate.errors import UsageError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.ladder.default import trial_of
 from validate.pipeline.ladder.ladder import RUNGS, Rung, Trial
-from validate.pipeline.run.job import job_of
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import job_of, study_folder
 from validate.study.choose.facts import Fact, ShownEffects, facts, with_effects
 from validate.study.filters.ranking import SAME_TIME
 from validate.study.tradeoff.cell import Measured, TradeCell, cavity_pressures, driving, keyed

@@ -34,8 +34,7 @@ from validate.pipeline.calibration.calibrated import here
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.job import job_of
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import job_of, study_folder
 from validate.study.coverage.bench import (
     PERFECT,
     AllStated,

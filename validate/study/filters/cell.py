@@ -19,8 +19,7 @@ from validate.estimate.measurements import Measurements, timetable
 from validate.fem.assembly.locate import Rows, probe_rows
 from validate.pipeline.run.case_solution import KeptFields
 from validate.solve.types import Run, Stepper, StepTimes
-from validate.study.filters.bench import Bench, Ready
-from validate.study.filters.plan import EACH, FilterCell
+from validate.study.filters.plan import EACH, Bench, FilterCell, Ready
 from validate.study.filters.score import NIS, FilterScores, error_scores, withheld_scores
 from validate.study.filters.withheld_errors import (
     Innovations,

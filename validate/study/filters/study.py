@@ -19,10 +19,17 @@ from validate.parameters import nearest_names
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.named_run import study_folder
-from validate.study.filters.bench import open_bench
+from validate.pipeline.run.job import study_folder
 from validate.study.filters.cell import run_cell
-from validate.study.filters.plan import CASE, EACH, METHODS, FilterCell, FilterPlan, plan
+from validate.study.filters.plan import (
+    CASE,
+    EACH,
+    METHODS,
+    FilterCell,
+    FilterPlan,
+    open_bench,
+    plan,
+)
 from validate.study.filters.ranking import Ranked, Ranking, TruthPick, picks, rankings, tied
 from validate.study.filters.score import (
     AHEAD,

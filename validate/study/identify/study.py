@@ -21,8 +21,7 @@ from validate.engine.pool import Pool
 from validate.engine.store import key_of
 from validate.errors import ComparisonError, UsageError
 from validate.identify.identification import Identification, Profiled, identify
-from validate.identify.least_squares import Fit, Space, fit
-from validate.identify.profile import RISE, Side, side
+from validate.identify.least_squares import RISE, Fit, Side, Space, fit, side
 from validate.identify.scaled_curve import linear_fit
 from validate.numbers import scale, shown_unit
 from validate.parameters import describe, with_values
@@ -42,8 +41,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, all_methods, configure
 from validate.pipeline.experiment.origins import opened
-from validate.pipeline.run.job import Job, file_sha256
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import Job, file_sha256, study_folder
 from validate.report.stored.folder import members
 from validate.report.views.view_filling import Shown, sized, table
 from validate.study.study_page import Findings

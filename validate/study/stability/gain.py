@@ -22,8 +22,7 @@ from validate.errors import ComparisonError
 from validate.fem.system import Responses, build, responses
 from validate.pipeline.bodies.own_body import own_body, with_law
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.run.job import Job, job_of
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import Job, job_of, study_folder
 from validate.report.views.view_filling import Shown, table
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.fluid.pressure_curve import tuned_gain

@@ -12,9 +12,8 @@ from validate.engine.cell import Record
 from validate.pipeline.ladder.ladder import PaperSetting, Turned
 from validate.report.stored.folder import members
 from validate.report.views.view_filling import Shown, table
-from validate.study.stability.cell import Stepped
+from validate.study.stability.cell import DRIFT_STEPS, STEPS, Stepped
 from validate.study.stability.plan import StabilityCell, axis, drift_variant
-from validate.study.stability.precision import DRIFT_STEPS, STEPS
 from validate.study.stability.study import Point, Stability, declared, limit_error, points
 from validate.study.study_page import Findings
 

@@ -16,8 +16,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.ladder.default import body_of
 from validate.pipeline.ladder.ladder import StabilityBody
-from validate.pipeline.run.job import job_of
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import job_of, study_folder
 from validate.solve.schemes import steppings
 from validate.solve.study_entries import Stepping
 from validate.study.stability.cell import SchemeResult, Stepped, open_bench, run_cell

@@ -20,8 +20,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.ladder.default import trial_of
 from validate.pipeline.ladder.ladder import Rival, Trial
-from validate.pipeline.run.job import Job, job_of
-from validate.pipeline.run.named_run import study_folder
+from validate.pipeline.run.job import Job, job_of, study_folder
 from validate.solve.types import StepTimes
 from validate.study.filters.ranking import dominator
 from validate.study.tradeoff.cell import (
