@@ -102,7 +102,7 @@ def test_arrays_are_read_whole_or_not(tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
     np.savez_compressed(file, zeros=np.zeros(10_000))
     assert npz_arrays(file, 100_000)["zeros"].shape == (10_000,)
-    with pytest.raises(RecordingError, match=r"a\.npz: 80\d+ bytes unpacked, the limit is 80000"):
+    with pytest.raises(RecordingError, match=r"a\.npz: 80\d+ bytes .* 80000"):
         npz_arrays(file, 80_000)
     whole = file.read_bytes()
     file.write_bytes(whole[:-30])

@@ -61,7 +61,5 @@ def test_a_former_class_is_the_class_of_today(module: str, former: str) -> None:
 def test_a_module_with_former_names_has_no_other_attribute() -> None:
     for module in FORMER_MEMBERS:
         found = import_module(f"validate.{module}")
-        with pytest.raises(
-            AttributeError, match=rf"validate\.{module}' has no attribute 'no_such_name'"
-        ):
+        with pytest.raises(AttributeError, match=rf"{module}' has no attribute"):
             _ = found.no_such_name

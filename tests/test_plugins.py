@@ -189,7 +189,7 @@ def test_a_law_of_a_plug_in_has_coefficients_of_its_own(
     kind = replace(further_law, name="gripped", coefficients=("grip",), holds=Gripped)
     monkeypatch.setattr(laws, "LAWS", replace(LAWS, _added=[further_law, kind]))
     own = Material(1e5, 0.4, "neo_hooke")
-    with pytest.raises(SceneError, match=r"'neo_hooke' does not know grip = 3.0: leave .* gripped"):
+    with pytest.raises(SceneError, match=r"'neo_hooke' does not know grip = 3.0"):
         replace(own, coefficients=Gripped(grip=3.0))
     assert own.of_law("gripped").coefficients == Gripped()  # type: ignore[arg-type]
     held = replace(own, law="gripped", coefficients=Gripped(grip=3.0))  # type: ignore[arg-type]
@@ -433,7 +433,7 @@ def test_a_script_adds_a_part_once() -> None:
     registry = Registry("numbers", (1, 2), str, lambda part: "" if isinstance(part, int) else "no")
     assert registry.add(3) == 3
     assert (list(registry), len(registry), registry[-1], 3 in registry) == ([1, 2, 3], 3, 3, True)
-    with pytest.raises(UsageError, match="numbers: the name '2' is taken; choose another one"):
+    with pytest.raises(UsageError, match=r"numbers: the name '2' is taken"):
         registry.add(2)
     with pytest.raises(UsageError, match="numbers: no"):
         registry.add("4")  # type: ignore[arg-type]

@@ -378,7 +378,7 @@ def test_exit_codes_of_what_the_machine_refuses(
 
 def test_answers_of_a_file_too_large_are_not_read(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("#" * 100_001)
-    with pytest.raises(UsageError, match=r"a.toml: 100001 bytes, the limit is 100000"):
+    with pytest.raises(UsageError, match=r"a.toml: 100001 bytes.*100000"):
         read_answers(tmp_path / "a.toml")
 
 
@@ -400,7 +400,7 @@ def test_places_that_cannot_be_known_are_refused(
     with pytest.raises(RecordingError, match=r"wires.csv: 36 bytes, the limit is 20"):
         known_places.rows_of(file, ("target",))
     monkeypatch.setattr(known_places, "read_device_set", lambda _: SimpleNamespace(landmarks={}))
-    with pytest.raises(UsageError, match=r"d.xml: its PhantomDefinition has no landmarks"):
+    with pytest.raises(UsageError, match=r"d.xml: .* no landmarks"):
         known_places._declared(tmp_path / "d.xml")
 
 
@@ -469,9 +469,7 @@ def test_commands_without_what_they_need_report_it(
     monkeypatch.setattr(external_check, "own_body", lambda found: SimpleNamespace(experiment=found))
     with pytest.raises(UsageError, match=r"no method 'lin'; .*linear"):
         external_check.job("x", tmp_path / "new", "lin", 2, (), inertia=False, force=False)
-    with pytest.raises(
-        UsageError, match="experiment 'x' has no synthetic recording, as its data are"
-    ):
+    with pytest.raises(UsageError, match=r"'x' has no synthetic recording"):
         making.record("x", tmp_path / "x.mcap", ())
     with pytest.raises(UsageError, match="no such file; paths start from"):
         new_body_questions.there(str(tmp_path / "nowhere"))
@@ -483,9 +481,9 @@ def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
 ) -> None:
     monkeypatch.setattr(new_body, "answered_mesh", lambda found: None)
     monkeypatch.setattr(new_body, "_judged", lambda found: ())
-    with pytest.raises(UsageError, match=r"held.all, .x, .y, .z and .slides are all empty: name"):
+    with pytest.raises(UsageError, match=r"held\.all, .*\.slides are all empty"):
         new_body._fields(None, "", Path(), {})  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match=r"seen.force, seen.markers and seen.outline are all none"):
+    with pytest.raises(UsageError, match=r"seen\.force, .*outline are all none"):
         new_body._fields(None, "", Path(), {"held.all": "x0"})  # type: ignore[arg-type]
 
 
@@ -498,10 +496,10 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
         return poses[tool], np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3))
 
     monkeypatch.setattr(tool_poses, "tool_poses", seen)
-    with pytest.raises(UsageError, match="'a' and 'b' are never visible at the same time"):
+    with pytest.raises(UsageError, match=r"'a' and 'b' are never visible"):
         tool_poses.in_reference(None, "a", "b")  # type: ignore[arg-type]
     partly = SimpleNamespace(unread={"/x": "", "/y": ""})
-    with pytest.raises(UsageError, match=r"a.mcap has 2 topics that are not read and would be"):
+    with pytest.raises(UsageError, match=r"a\.mcap has 2 topics that are not read"):
         outlining._same(Path("a.mcap"), partly)  # type: ignore[arg-type]
     whole = SimpleNamespace(unread={})
     assert outlining._same(Path("a.mcap"), whole) == Path("a.mcap")  # type: ignore[arg-type]
@@ -509,9 +507,7 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
     monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: (None, None))
     monkeypatch.setattr(outlining, "png", lambda picture: b"")
     contours = SimpleNamespace(t=np.zeros(1))
-    with pytest.raises(
-        RecordingError, match=r"a.png: cannot be written \(No such file or directory"
-    ):
+    with pytest.raises(RecordingError, match=r"a\.png: cannot be written"):
         outlining._pictured(frames, contours, tmp_path / "no" / "a.png", ())  # type: ignore[arg-type]
 
 

@@ -261,7 +261,7 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
 
 
 def test_a_test_in_tension_is_not_pressed() -> None:
-    with pytest.raises(RecordingError, match=r"a test in tension, .* --map test=compression"):
+    with pytest.raises(RecordingError, match=r"tension, .* --map test=compression"):
         fit_modulus(log(test="tension", **SIZES))
 
 

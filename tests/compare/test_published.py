@@ -58,7 +58,7 @@ def test_an_order_counted_in_a_window_says_so_in_its_verdict() -> None:
 
 
 def test_a_tolerance_as_wide_as_its_reference_is_refused_with_numbers() -> None:
-    with pytest.raises(ComparisonError, match=r"3000 N is wider than a tenth .* 3000 N; .* 300,"):
+    with pytest.raises(ComparisonError, match=r"3000 N .* a tenth .* 300,"):
         replace(FIGURE, theirs=3000.0, tolerance=3000.0)
     for theirs, tolerance, scale in ((0.0, 1e-5, 0.0), (1.0, 0.2, 1.0)):
         with pytest.raises(ComparisonError, match="wider than a tenth"):

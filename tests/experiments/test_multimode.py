@@ -111,13 +111,11 @@ def test_what_cannot_be_found_is_said_with_the_choice_there_is(tmp_path: Path) -
         load(Multimode(data=str(tmp_path)), tmp_path)
     curves(tmp_path, name="one")
     curves(tmp_path, name="two")
-    with pytest.raises(UsageError, match=r"2 materials in .* --set material=one\|two"):
+    with pytest.raises(UsageError, match=r"2 materials .*material=one\|two"):
         load(Multimode(data=str(tmp_path)), tmp_path)
     with pytest.raises(UsageError, match=r"no curves of three in"):
         load(Multimode(data=str(tmp_path), material="three"), tmp_path)
-    with pytest.raises(
-        UsageError, match=r"no biaxial curve of 'one'.*fit=equibiaxial\|pure_shear\|uni"
-    ):
+    with pytest.raises(UsageError, match=r"curve of 'one'.*equibiaxial\|pure_shear"):
         load(Multimode(data=str(tmp_path), material="one", fit="biaxial"), tmp_path)
 
 

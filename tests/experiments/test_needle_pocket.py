@@ -237,5 +237,5 @@ def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("bad", [{"depth": 0.0}, {"rate": 0.0}, {"tremor": -1e-3}])
 def test_a_hand_that_does_not_move_is_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(UsageError, match=r"deep at .* Hz with a tremor of .* must be above 0"):
+    with pytest.raises(UsageError, match=r"deep at .* Hz .* must be above 0"):
         replace(Hand(1e-3, 1e-3, 500.0, 0.0, 1), **bad)  # type: ignore[arg-type]

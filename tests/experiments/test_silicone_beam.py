@@ -73,7 +73,7 @@ def test_what_is_no_release_is_refused() -> None:
         released(swung(falling(at=2.5)))
     x = falling()
     x[-100:, 1] = np.nan
-    with pytest.raises(RecordingError, match=r"'Tip - 2' is seen at 0 of \d+ samples at the end"):
+    with pytest.raises(RecordingError, match=r"'Tip - 2' is seen at 0 of \d+ samples"):
         released(swung(x))
     other = swung(falling())
     markers = replace(other.markers["markers"], names=("a", *tuple(LAYOUT)[1:]))

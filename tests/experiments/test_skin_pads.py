@@ -112,9 +112,9 @@ def test_points_given_in_mm_say_the_scale_and_the_authors_curve_the_zero(tmp_pat
 def test_signs_are_declared_and_tested(tmp_path: Path) -> None:
     u = np.linspace(0.0, 6.5, 400)
     folder(tmp_path, u=-u, f=-0.02 * u)
-    with pytest.raises(RecordingError, match=r"displacement goes from .* signs.displacement=-1"):
+    with pytest.raises(RecordingError, match=r"displacement .* signs\.displacement=-1"):
         read_folder(tmp_path, (1.0, 1.0))
-    with pytest.raises(RecordingError, match=r"the force goes from .* --set signs.force=-1"):
+    with pytest.raises(RecordingError, match=r"the force .* --set signs\.force=-1"):
         read_folder(tmp_path, (-1.0, 1.0))
     assert read_folder(tmp_path, (-1.0, -1.0)).signal("force", FORCE).y[-1, 0] > 0
     with pytest.raises(UsageError, match="each 1 or -1"):
@@ -336,7 +336,7 @@ def test_a_history_of_two_marks_may_have_one_mark_a_column(tmp_path: Path) -> No
 
 def test_the_scale_of_edge_points_is_requested_and_never_24_mm(tmp_path: Path) -> None:
     edge_marks(grid_folder(tmp_path), 50, "column")
-    with pytest.raises(RecordingError, match=r"480\.0 px apart, .* --set pads\.window=8mm"):
+    with pytest.raises(RecordingError, match=r"480\.0 px apart, .* pads\.window=8mm"):
         read_folder(tmp_path, (1.0, 1.0))
     x, y = (np.loadtxt(tmp_path / f"{a}0.dat") for a in "xy")
     np.savetxt(tmp_path / "processed_xt_dic_0000.out", SCALE * np.stack([x, y], axis=1))
@@ -370,7 +370,7 @@ def test_marks_of_other_images_are_refused_with_both_readings(tmp_path: Path) ->
     for pad in (1, 2):
         marks = np.stack(inside, axis=1) + [190.0 * (pad - 1), 0.0]  # five columns
         write(tmp_path, f"_ref_{pad}", np.repeat(marks[None], 50, axis=0))
-    with pytest.raises(RecordingError, match=r"\[2, 2\] points .*, \[0, 0\] of these at the field"):
+    with pytest.raises(RecordingError, match=r"\[2, 2\] points .*, \[0, 0\] of these"):
         read_folder(tmp_path, (1.0, 1.0))
 
 
@@ -412,7 +412,7 @@ def test_an_edge_of_one_point_is_refused(tmp_path: Path) -> None:
         x = np.loadtxt(tmp_path / f"{name}.dat", ndmin=2)
         x[0] -= 100.0
         np.savetxt(tmp_path / f"{name}.dat", x)
-    with pytest.raises(RecordingError, match=r"1 and 12 points within .* px of the edges"):
+    with pytest.raises(RecordingError, match=r"1 and 12 points within .* px"):
         read_folder(tmp_path, (1.0, 1.0), "edges", 1e-3 * EDGE)
 
 

@@ -120,7 +120,7 @@ def test_images_in_which_few_disks_are_found_report_what_was_searched(
         monkeypatch.setattr(disk_module, name, found)
     with pytest.raises(
         RecordingError,
-        match=r"1 of 5 images.*0.*--set image.bright=False",
+        match=r"1 of 5 images.*image\.bright=False",
     ):
         disk_module.load(Tree(settings=disk_module.ImagedDisk()), tmp_path)
 
@@ -139,7 +139,5 @@ def test_images_without_a_scale_name_the_setting_of_a_run(
 
 @pytest.mark.parametrize("diameter", [0.0, -1.0, 1.0, float("nan")])
 def test_a_disk_has_a_diameter_of_a_disk(diameter: float) -> None:
-    with pytest.raises(
-        UsageError, match=f"disk.diameter = {diameter:g} m: expected a size above 0 and below 1 m"
-    ):
+    with pytest.raises(UsageError, match=rf"disk.diameter = {diameter:g} m: .* 1 m"):
         disk_module.Disk(diameter)

@@ -64,7 +64,7 @@ def test_indefinite_matrix_is_refused(shift: float) -> None:
     A, places = grid_laplacian(6)
     A = sparse.csr_array(A - shift * sparse.eye_array(len(places)))
     assert np.isfinite(splu(A.tocsc()).solve(np.ones(len(places)))).all()
-    with pytest.raises(SceneError, match=r"not positive definite .* add a support or pin"):
+    with pytest.raises(SceneError, match=r"not positive definite .* support or pin"):
         factorise(A, np.arange(len(places)), places)
 
 
@@ -88,7 +88,7 @@ def test_an_empty_column_is_refused_before_blas_complains(
     kept = np.ones(len(places))
     kept[len(places) // 2 :] = 0.0
     empty = sparse.csr_array(sparse.diags_array(kept) @ A @ sparse.diags_array(kept))
-    with pytest.raises(SceneError, match=r"not positive definite .*, 256 not positive"):
+    with pytest.raises(SceneError, match=r"not positive definite .*, 256"):
         factorise(empty, np.arange(len(places)), places)
     assert capfd.readouterr() == ("", "")
 

@@ -212,9 +212,7 @@ def test_foundation_acts_as_a_linear_spring() -> None:
 
 def test_what_has_no_large_strain_form_is_refused() -> None:
     scene = phantom(1, "pointwise", "neo_hooke")
-    with pytest.raises(
-        SceneError, match=r"law 'linear' has no large-strain form.*'neo_hooke', .*'svk'"
-    ):
+    with pytest.raises(SceneError, match=r"'linear' .*'neo_hooke', .*'svk'"):
         Body(replace(scene, material=MATERIAL))
     membrane = Membrane("cavity", 1e-4, Material(1e6, 0.45))
     with pytest.raises(SceneError, match="membranes are linear only"):

@@ -258,7 +258,7 @@ def test_taylor_hood_elements_agree_within_the_mesh() -> None:
 
 def test_other_cells_refuse_it_in_one_line() -> None:
     mesh = grid((1.0, 1.0, 1.0), (2, 2, 2))
-    with pytest.raises(SceneError, match=r"nu = 0.5 in hex8 .* use mixed cells .* nu <= 0.4999"):
+    with pytest.raises(SceneError, match=r"nu = 0\.5 in hex8 .* nu <= 0\.4999"):
         Scene(mesh, Material(E, 0.5))
     core = Region("core", np.array([0]), Material(E, 0.5))
     with pytest.raises(SceneError, match=r"nu = 0.5 in hex8"):

@@ -46,7 +46,7 @@ def test_its_error_is_what_it_says_of_noise_and_creep() -> None:
 
 
 def test_what_does_not_ring_is_refused() -> None:
-    with pytest.raises(ComparisonError, match=r"1\.\d periods of ringing in 1\.39 s: 3 are needed"):
+    with pytest.raises(ComparisonError, match=r"1\.\d periods .* 1\.39 s: 3 are needed"):
         ringing(T, rung(1.2, 0.05))
     with pytest.raises(ComparisonError, match=r"5 samples.*least 20"):
         ringing(T[:5], T[:5])

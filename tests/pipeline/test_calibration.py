@@ -126,7 +126,7 @@ def test_what_is_not_identifiable_blocks_the_prediction_unless_anyway() -> None:
 
 def test_a_residual_that_is_not_there_is_named_with_those_that_are() -> None:
     wrong = replace(OPEN, calibrations=(Calibration("fem", (E,), (Calibrates(("forse",)),)),))
-    with pytest.raises(ComparisonError, match=r"no residual 'forse'.*0 matched.*force@0\.1mm"):
+    with pytest.raises(ComparisonError, match=r"no residual 'forse'.*force@0\.1mm"):
         compare(wrong, Options({}))
 
 
@@ -152,7 +152,7 @@ def test_a_marker_that_is_never_seen_calibrates_nothing() -> None:
 
     on = (Calibrates(("node_B", "force@0.1mm")),)
     blind = replace(OPEN, load=unseen, calibrations=(Calibration("fem", (E,), on),))
-    with pytest.raises(ComparisonError, match=r"no residual 'node_B'.*0 matched.*force@0\.1mm"):
+    with pytest.raises(ComparisonError, match=r"no residual 'node_B'.*force@0\.1mm"):
         compare(replace(blind, accept=OPEN.accept[1:]), Options({}))
 
 

@@ -342,7 +342,7 @@ def test_a_body_that_slides_widens_about_the_middle_of_its_plate(tmp_path: Path)
     rests = (Support("zmin", (2,), rests=True),)
     file = MeshFile("b.npz", element="linear")
     p = BASE.with_scene(body=file, supports=rests)
-    with pytest.raises(SceneError, match=r"middle .the nearest is 25 mm away.*halvings=1"):
+    with pytest.raises(SceneError, match=r"middle .* 25 mm away.*halvings=1"):
         run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
     p = p.with_scene(body=replace(file, halvings=1))
     result = run_in_memory(experiment(tmp_path, p, recording(signals=log()), "force"))
@@ -437,7 +437,7 @@ def test_layouts_and_markers_that_are_not_given_are_requested(
         measured_markers.layout_of(None, "a.fcsv", tmp_path)  # type: ignore[arg-type]
     monkeypatch.undo()
     (tmp_path / "a.csv").write_text("name,x,y,z\na,1,2,3\nb,4,5,6\n")
-    with pytest.raises(UsageError, match=r"seen.layout: .*; a layout must be complete"):
+    with pytest.raises(UsageError, match=r"seen\.layout: .* must be complete"):
         measured_markers._points_in(tmp_path / "a.csv")
     none = BASE.with_settings(seen=SeenOf())
     for names in ((), ("left", "right")):

@@ -120,7 +120,7 @@ def test_outlines_of_what_the_model_does_not_have_are_refused(body: Mesh) -> Non
     def small(closed: float) -> Floats:
         return 0.3 * (edge(closed) - [0.02, 0.02]) + [0.02, 0.02]
 
-    with pytest.raises(RegistrationError, match=r"enclose 0\.\d+ cm2, .* 6\.\d+ cm2: .* else"):
+    with pytest.raises(RegistrationError, match=r"enclose 0\.\d+ cm2, .* 6\.\d+ cm2"):
         registered(body, outline=small)
     with pytest.raises(SceneError, match="no facets 'cyst'; it has"):
         registered(body, replace(PLACE, surface="cyst"))

@@ -94,7 +94,7 @@ def test_matched_samples_are_counted_without_gaps_and_ends() -> None:
 @pytest.mark.parametrize("offset", [20.0, 6.0])
 def test_too_small_an_overlap_is_refused_with_its_share(offset: float) -> None:
     reference, stream = pair((100.0, 100.0), 0.0, 0.0, 0)
-    with pytest.raises(RecordingError, match=r"of 860 samples \(\d+ %\) .* at least 50 %"):
+    with pytest.raises(RecordingError, match=r"of 860 samples \(\d+ %\) .* 50 %"):
         matched(reference, stream, Offset(offset, 0.0, "test", 0, 0.0))
     late = replace(stream, t=stream.t + offset)
     with pytest.raises(RecordingError, match=r"overlap by .* % at most; at least 50 %"):
@@ -258,9 +258,7 @@ def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
     wide = Signal(T, np.column_stack([T, T]), "N", 0.0, "machine")
     one = signal(T, motion(T))
     for stream in (wide, signal(T[:7], motion(T[:7]))):
-        with pytest.raises(
-            RecordingError, match=r"stream: (2 columns, exp|7 samples; at least 10)"
-        ):
+        with pytest.raises(RecordingError, match=r"stream: (2 columns|7 samples)"):
             offset_by_correlation(one, stream, 1.0)
     with pytest.raises(RecordingError, match=r"needs 1 column.*2"):
         event_time(wide, "onset")

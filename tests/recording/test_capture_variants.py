@@ -262,7 +262,7 @@ def test_a_text_of_nexus_1_is_called_so(tmp_path: Path, end: str) -> None:
     """It was taken for two tests of a testing machine."""
     path = tmp_path / "x.csv"
     path.write_bytes(f"TRAJECTORIES{end}100,Hz{end},s:A,,{end}Field #,X,Y,Z{end}".encode())
-    with pytest.raises(UsageError, match=r"export of Vicon Nexus 1, .* export the trial as C3D"):
+    with pytest.raises(UsageError, match=r"Vicon Nexus 1, .* as C3D"):
         recognised(path)
 
 

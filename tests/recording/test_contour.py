@@ -214,7 +214,7 @@ def test_a_black_image_has_the_smallest_speckle_that_can_be() -> None:
 
 def test_a_region_cut_by_the_border_is_refused() -> None:
     frame = image(ellipse(2e-3, 10e-3, 4.5e-3, 4.5e-3), level=-30.0)
-    with pytest.raises(RecordingError, match=r"cut by the border, \d+ % of its wall lies outside"):
+    with pytest.raises(RecordingError, match=r"border, \d+ % of its wall"):
         extract_outline(frame, PX, centre=(3e-3, 10e-3), radius=4e-3)
     with pytest.raises(RecordingError, match="no closed dark region"):
         extract_outline(frame, PX)
@@ -314,7 +314,7 @@ def test_an_outline_that_jumps_or_is_uncertain_is_refused(monkeypatch: pytest.Mo
         outline._next(flat(1).images[0], PX, At(), last)  # type: ignore[arg-type]
     monkeypatch.setattr(outline.RivalRegion, "words", "a region of 3 mm")
     rival = outline.RivalRegion.__new__(outline.RivalRegion)
-    with pytest.raises(RecordingError, match=r"confidence 0.52.*0.6.*3 mm; .*--confidence 0.51\)"):
+    with pytest.raises(RecordingError, match=r"0\.52.*0\.6.*3 mm; .*--confidence 0\.51"):
         outline._require_sure((rival,), 0.519, 0.6)
     outline._require_sure((rival,), 0.6, 0.6)
     outline._require_sure((), 0.1, 0.6)

@@ -79,7 +79,7 @@ def test_a_scale_of_an_image_of_another_size_is_not_believed() -> None:
 def test_what_is_not_stated_is_asked_for() -> None:
     with pytest.raises(UsageError, match=r"2 images.*--map rate=HZ"):
         read_dicom(DATA / "OBXXXX1A_2frame.dcm", {})
-    with pytest.raises(UsageError, match=r"has no scale, .* give --map m_per_px=0.1mm"):
+    with pytest.raises(UsageError, match=r"no scale, .* --map m_per_px=0\.1mm"):
         read_dicom(DATA / "US1_UNCR.dcm", {})
 
 
@@ -321,7 +321,7 @@ def test_what_a_codec_says_is_damage_unless_it_lacks_a_library(
 
     monkeypatch.setattr(dicom_arrays, "iter_pixels", refuse)
     ds = of_pixels(pydicom.uid.ExplicitVRLittleEndian, bytes(72))
-    with pytest.raises(raised, match=r"bytes missing|in 'Explicit VR Little Endian', which no"):
+    with pytest.raises(raised, match=r"bytes missing|Explicit VR Little Endian"):
         list(dicom_arrays._frames(ds))
 
 

@@ -94,7 +94,7 @@ def test_a_stretch_says_itself_which_way_it_goes(tmp_path: Path) -> None:
     recording = read(tmp_path, pressed, area="314mm2", length="20mm")
     assert recording.record("specimen")["test"] == "compression"
     assert np.allclose(recording.signals["displacement"].y[:, 0], E * LENGTH)
-    with pytest.raises(RecordingError, match=r"tension test .*below 1; give --map test=comp"):
+    with pytest.raises(RecordingError, match=r"tension test .* give --map test=comp"):
         read(tmp_path, pressed, area="314mm2", length="20mm", test="tension")
 
 
@@ -143,7 +143,7 @@ def test_one_of_the_two_may_be_written(tmp_path: Path) -> None:
 def test_a_true_stress_beside_a_displacement(tmp_path: Path) -> None:
     names = "Time (s),Extension (mm),True stress (kPa)\n"
     text = "Tensile test\n" + table(names, 3 + 1e3 * LENGTH * E, SIGMA * (1 + E))
-    with pytest.raises(RecordingError, match=r"the current area: give .*--map length=20mm"):
+    with pytest.raises(RecordingError, match=r"current area: give .*--map length=20mm"):
         read(tmp_path, text, area="314mm2")
     force = read(tmp_path, text, area="314mm2", length="20mm").signals["force"].y[:, 0]
     assert np.allclose(force, -SIGMA * 1e3 * AREA, rtol=1e-9, atol=1e-12)
@@ -188,7 +188,7 @@ def test_a_size_has_a_unit(mapping: dict[str, str], why: str, tmp_path: Path) ->
 
 def test_more_than_all_of_a_specimen_is_refused(tmp_path: Path) -> None:
     text = table("Time (s),Strain (mm/mm),Stress (kPa)\n", 100 * E, SIGMA)
-    with pytest.raises(RecordingError, match=r"4000 % of its length; .*'strain=Strain .*:%'"):
+    with pytest.raises(RecordingError, match=r"4000 % of its length; .*'strain=Strain"):
         read(tmp_path, text, **SIZES, test="compression")
     given = {**SIZES, "test": "compression", "strain": "Strain (mm/mm):%"}
     assert np.allclose(read(tmp_path, text, **given).signals["displacement"].y[:, 0], E * LENGTH)
@@ -217,7 +217,7 @@ def test_real_stretches_and_stresses(shared_data: Path) -> None:
 
 
 def test_two_directions_are_asked_about(shared_data: Path) -> None:
-    with pytest.raises(RecordingError, match=r"2 columns may be stress: .*--map area=314mm2"):
+    with pytest.raises(RecordingError, match=r"2 columns .*stress: .*--map area=314mm2"):
         read_instron(shared_data / "force/multimode/kawabata1981_biaxial.csv")
 
 
@@ -228,7 +228,7 @@ def picked(role: str, *values: float) -> Pick:
 def test_a_stretch_is_above_zero_and_a_true_measure_needs_its_sense() -> None:
     assert sized._relative(picked("stretch", 1.0, 1.5), "", None).tolist() == [0.0, 0.5]
     for values in ((1.0, 0.0), (1.0, sized._LONGEST + 1)):
-        with pytest.raises(RecordingError, match=r"'stretch' from .*: a stretch is 1 at rest"):
+        with pytest.raises(RecordingError, match=r"'stretch' from .* is 1 at rest"):
             sized._relative(picked("stretch", *values), "", None)
     with pytest.raises(ValidateError, match="'strain' does not show whether"):
         sized._signed(np.array([0.0, 0.1]), None, picked("strain"))
@@ -243,9 +243,7 @@ def test_a_sign_a_limit_and_a_word_that_do_not_fit_are_refused(
     with pytest.raises(UsageError, match="--map repeated=both"):
         repeats.without_repeats(None, Said("every", "1s", None), "both")  # type: ignore[arg-type]
     mcap = next(reader for reader in READERS if reader.name == "mcap")
-    with pytest.raises(
-        UsageError, match=r"--map specimen=.*: x.mcap is .*, which has no specimens"
-    ):
+    with pytest.raises(UsageError, match=r"specimen=.*: x\.mcap .* no specimens"):
         workbook.every_specimen(mcap, tmp_path / "x.mcap", {})
     (tmp_path / "a.csv").write_bytes(b"12345")
     monkeypatch.setattr(encoding, "MAX_BYTES", 4)

@@ -230,9 +230,7 @@ def test_png_stack_is_sorted_by_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scale", ["0.1", "8", "1e-7", "1e999"])
 def test_a_pixel_beyond_reason_is_asked_back(tmp_path: Path, scale: str) -> None:
     (tmp_path / "1.png").write_bytes(encode_png(IMAGES[0]))
-    with pytest.raises(
-        UsageError, match=f"m_per_px={scale}: .* outside 1e-06 to 0.01 m.* With its"
-    ):
+    with pytest.raises(UsageError, match=rf"m_per_px={scale}: .* 1e-06 to 0\.01 m"):
         read_png_stack(tmp_path, {"m_per_px": scale, "rate": "1"})
 
 
@@ -368,9 +366,7 @@ def test_files_of_a_stack_are_bounded_alone_and_together(
         read_png_stack(tmp_path, options)
     monkeypatch.undo()
     (tmp_path / "2.png").symlink_to(tmp_path / "nowhere.png")
-    with pytest.raises(
-        RecordingError, match=r"2.png. is outside its folder|cannot be read \(No such file"
-    ):
+    with pytest.raises(RecordingError, match=r"2.png. is outside|cannot be read"):
         read_png_stack(tmp_path, options)
 
 

@@ -98,9 +98,7 @@ def test_a_batch_whose_pictures_only_begin_alike_is_none() -> None:
 
 def test_an_image_too_large_for_a_message_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(schemas, "MAX_MESSAGE", 2000)
-    with pytest.raises(
-        RecordingError, match=r"image \(30, 40\): \d+ bytes as a message, limit 2000"
-    ):
+    with pytest.raises(RecordingError, match=r"image \(30, 40\): \d+ bytes .* 2000"):
         image_message(0, "probe", GREY[0])
 
 

@@ -48,7 +48,7 @@ def test_a_stack_of_images_has_its_frames_last(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_what_the_file_does_not_state_is_asked_for(tmp_path: Path) -> None:
     points = written(tmp_path / "x.mat", P=np.ones((4, 2)))
-    with pytest.raises(UsageError, match=r"x\.mat: P has no unit of length; .* unit=mm"):
+    with pytest.raises(UsageError, match=r"x\.mat: P has no unit .* unit=mm"):
         read_matlab(points, {})
     with pytest.raises(UsageError, match="unit=3kg: expected a length"):
         read_matlab(points, {"unit": "3kg"})
@@ -68,10 +68,10 @@ def test_what_is_neither_points_nor_images_is_listed(tmp_path: Path) -> None:
         "note": "char", "s.a": "(1, 1) float64", "plane": "(4, 5) float64",
         "c": "(4, 2) complex128",
     }  # fmt: skip
-    with pytest.raises(UsageError, match=r"--map force=PATH:N .* it holds .*'note': 'char'"):
+    with pytest.raises(UsageError, match=r"force=PATH:N .*'note': 'char'"):
         read_matlab(written(tmp_path / "x.mat", **other), {})
     words = {"note": "a text", "c": np.ones((4, 2)) * 1j}
-    with pytest.raises(RecordingError, match=r"x\.mat: neither points .* {'note': 'char'"):
+    with pytest.raises(RecordingError, match=r"x\.mat: neither .* {'note': 'char'"):
         read_matlab(written(tmp_path / "x.mat", **words), {})
     with pytest.raises(RecordingError, match="neither points"):
         read_matlab(written(tmp_path / "x.mat"), {})
@@ -129,7 +129,7 @@ def test_another_version_is_told(tmp_path: Path) -> None:
 
 def test_images_of_other_numbers_name_their_array(tmp_path: Path) -> None:
     path = written(tmp_path / "x.mat", images=np.zeros((4, 5, 3)))
-    with pytest.raises(RecordingError, match=r"images: \(4, 5, 3\) float64; images.*uint8"):
+    with pytest.raises(RecordingError, match=r"\(4, 5, 3\) float64; images.*uint8"):
         read_matlab(path, {"view": "images:px", "m_per_px": "0.1mm", "rate": "10"})
 
 

@@ -393,5 +393,5 @@ def test_a_file_of_words_alone_and_one_of_curves_list_what_they_contain() -> Non
     with pytest.raises(RecordingError, match=r"\(n, 2 or 3\) nor uint8 images.*; it"):
         matlab._unnamed(Path("x.mat"), word, {})
     curve = {"F": np.zeros(50), "d": np.zeros(9)}
-    with pytest.raises(UsageError, match=r"no array's role is clear.*--map force=PATH:N --map"):
+    with pytest.raises(UsageError, match=r"role is clear.*--map force=PATH:N --map"):
         matlab._unnamed(Path("x.mat"), curve, {})

@@ -218,9 +218,7 @@ def test_markups_of_two_frames_are_not_mixed(tmp_path: Path) -> None:
     assert got.x[0, 0] == pytest.approx([1e-3, 2e-3, 3e-3])
     assert np.isnan(got.x[0, 1]).all()
     path.write_text(json.dumps({"@schema": "markups", "markups": [lps, ras]}))
-    with pytest.raises(
-        RecordingError, match=r"lists in .'LPS', 'RAS'.* save them in separate files"
-    ):
+    with pytest.raises(RecordingError, match=r"in .'LPS', 'RAS'.* separate files"):
         read_markups(path, {})
 
 

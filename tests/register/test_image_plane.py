@@ -114,7 +114,7 @@ def test_what_leaves_the_plane_open_is_refused() -> None:
     with pytest.raises(RegistrationError, match="2 points give 6 equations for 8 unknowns"):
         image_plane(landmarks(rng, 1, 2))
     still = wired(rng, 1)
-    with pytest.raises(RegistrationError, match=r"mark targets at larger distances|do not fix"):
+    with pytest.raises(RegistrationError, match=r"larger distances|do not fix"):
         image_plane(SeenPoints(np.tile(still.px[:3], (3, 1)), np.repeat([0, 1, 2], 3),
                                still.targets[:3] * 3, np.tile(still.R[:3], (3, 1, 1)),
                                np.tile(still.t[:3], (3, 1))))  # fmt: skip

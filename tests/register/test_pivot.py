@@ -69,7 +69,7 @@ def test_poses_before_the_tip_stands_are_left_out() -> None:
     assert 220 <= len(got.used) <= 230
     assert got.used.min() >= 70
     assert np.abs(got.tip - TIP).max() < 4 * got.sd.max()
-    with pytest.raises(RegistrationError, match=r"does not stay on one point|fewer than half"):
+    with pytest.raises(RegistrationError, match=r"stay on one point|fewer than half"):
         pivot(*turned(np.random.default_rng(2), WIDE, noise=3e-4, coming=200))
 
 
@@ -90,7 +90,7 @@ def test_too_few_poses_and_a_tip_that_wanders_are_refused() -> None:
     with pytest.raises(RegistrationError, match="10 poses; at least 20"):
         pivot(R[:10], T[:10], point[:10])
     moved = T + 0.05 * np.sin(np.linspace(0, 40, N))[:, None] * [1, 0.5, -0.7]
-    with pytest.raises(RegistrationError, match=r"does not stay on one point|fewer than half"):
+    with pytest.raises(RegistrationError, match=r"stay on one point|fewer than half"):
         pivot(R, moved, point)
 
 

@@ -414,7 +414,7 @@ def test_what_is_drawn_is_written_as_numbers(tmp_path: Path) -> None:
                                             "b,1,", "b,2,3.0"]  # fmt: skip
     save(explained(view_of("limits"), of), of, out)
     assert len(out.read_text().splitlines()) == 1 + len(of.where(part="check").rows)
-    with pytest.raises(UsageError, match=r"\.svg, \.pdf, \.png, \.csv, \.html \(a chart\)"):
+    with pytest.raises(UsageError, match=r"\.svg, \.pdf, .* \.html \(a chart\)"):
         save(filled(chart, sampled()), sampled(), tmp_path / "x.tex")
 
 

@@ -205,9 +205,7 @@ def test_elements_inside_out_and_curved_ones_are_refused(tmp_path: Path) -> None
     path, whole = tmp_path / "body.inp", body("tet4")
     turned = Mesh(whole.nodes, whole.cells[:, [1, 0, 2, 3]], "tet4")
     path.write_text(inp(turned))
-    with pytest.raises(
-        SceneError, match=r"body\.inp: 12 of 12 .*; reverse the order of their nodes"
-    ):
+    with pytest.raises(SceneError, match=r"body\.inp: 12 of 12 .*; reverse"):
         read_foreign(path, "m")
     round_ = body("tet10")
     nodes = round_.nodes.copy()
@@ -316,7 +314,7 @@ def test_of_two_bodies_and_of_one_that_stands_twice_one_is_chosen(tmp_path: Path
     text, path = cae(body("tet4"), ""), tmp_path / "cae.inp"
     path.write_text(text.replace("*End Instance", "*End Instance\n*Instance, name=Gel-2, part=Gel\n"
                                  "50., 0., 0.\n*End Instance"))  # fmt: skip
-    with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\): .* --part Gel-1 -o"):
+    with pytest.raises(SceneError, match=r"2 bodies .*'Gel-2'\): .* --part Gel-1"):
         read_foreign(path, "mm")
     with pytest.raises(SceneError, match=r"2 bodies \('Gel-1', 'Gel-2'\)"):
         read_foreign(path, "mm", "Gel")
@@ -346,9 +344,7 @@ def test_a_set_of_elements_is_a_part(tmp_path: Path) -> None:
     assert cell_volumes(got.mesh).sum() == pytest.approx(3e-6)
     assert got.mesh.nodes[:, 2].min() == 0.015
     assert got.mesh.nodes[got.mesh.facet_nodes("joint"), 2].max() == 0.015
-    with pytest.raises(
-        SceneError, match=r"no part 'x'; there are .*'Upper', .*by size 1, the whole"
-    ):
+    with pytest.raises(SceneError, match=r"no part 'x'; .*'Upper', .*by size 1"):
         read_foreign(path, "m", "x")
 
 

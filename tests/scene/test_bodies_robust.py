@@ -146,9 +146,7 @@ def test_a_bomb_of_npz_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("nodes.npy", bytes(4 * MAX_BYTES))
     assert path.stat().st_size < MAX_BYTES / 100
-    with pytest.raises(
-        SceneError, match=r"bomb\.npz: 256\d+ bytes unpacked, the limit is 64000000"
-    ):
+    with pytest.raises(SceneError, match=r"bomb\.npz: 256\d+ bytes .* 64000000"):
         read_mesh(path)
 
 

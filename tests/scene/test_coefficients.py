@@ -22,7 +22,7 @@ def test_coefficients_that_the_law_would_not_use_are_refused() -> None:
         Material(1e4, 0.4, "svk", coefficients=Coefficients(volumetric="coupled"))
     with pytest.raises(SceneError, match=r"'linear' does not know stretches"):
         Material(1e4, 0.4, coefficients=Coefficients(stretches=(0.5, 2.0)))
-    with pytest.raises(SceneError, match=r"'yeoh' does not know C01 = 5.0: leave it out$"):
+    with pytest.raises(SceneError, match=r"'yeoh' does not know C01 = 5.0"):
         Material(1e4, 0.4, "yeoh", coefficients=Coefficients(C01=5.0, C20=1.0))
 
 

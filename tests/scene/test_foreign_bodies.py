@@ -322,7 +322,7 @@ def test_a_surface_of_vtk_is_told_how_to_come_in(tmp_path: Path) -> None:
 def test_elements_of_nodes_that_are_not_there_are_refused(cells: list[list[int]]) -> None:
     found = {"points": np.zeros((4, 3)), "cells.tetra": np.array(cells)}
     low, high = np.min(cells), np.max(cells)
-    with pytest.raises(SceneError, match=f"x.vtu: its elements name nodes {low} to {high} of 4; d"):
+    with pytest.raises(SceneError, match=rf"x\.vtu: .* nodes {low} to {high} of 4"):
         third_party_meshes._body("x.vtu", found, 1.0, None, turn=False)
 
 

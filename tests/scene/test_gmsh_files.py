@@ -59,7 +59,7 @@ def test_straight_quadratic_bricks_come_in(name: str, tmp_path: Path) -> None:
     place, bent = ("5, 0, 0", "5, 0, 0.5") if name.endswith("inp") else ("\n5 0 0", "\n5 0 0.5")
     assert place in text
     (tmp_path / name).write_text(text.replace(place, bent), "utf-8")
-    with pytest.raises(SceneError, match=r"1 edges or faces .* curved, middles up to 0.5 mm off"):
+    with pytest.raises(SceneError, match=r"1 edges or faces .* 0\.5 mm off"):
         read_foreign(tmp_path / name, "mm")
 
 
@@ -81,9 +81,7 @@ def test_formats_that_are_not_read_are_named(tmp_path: Path, text: str) -> None:
     old = tmp_path / "old.msh"
     old.write_text(text, "utf-8")
     for file in (old, FILES / "groups_40.msh"):
-        with pytest.raises(
-            SceneError, match=r"Gmsh's format [134] is not supported; save it as 2\.2 or 4\.1"
-        ):
+        with pytest.raises(SceneError, match=r"format [134] .* as 2\.2 or 4\.1"):
             read_foreign(file, "mm")
 
 

@@ -22,7 +22,7 @@ from validate.solve.haptic.needle import Surface
 
 @pytest.mark.parametrize("E", [0.0, -1.0, math.nan, math.inf])
 def test_modulus_must_be_positive(E: float) -> None:
-    with pytest.raises(SceneError, match=r"modulus E = .* Pa: expected a positive number"):
+    with pytest.raises(SceneError, match=r"E = .* Pa: expected a positive number"):
         Material(E, 0.3)
 
 

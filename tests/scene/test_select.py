@@ -153,7 +153,7 @@ def test_what_covers_an_area_needs_faces() -> None:
 def test_a_load_or_mass_that_is_wholly_held_is_refused() -> None:
     scene = loaded(MESHES["tet4"])
     held = replace(scene, loads=(Load("pull", "x0", Z),))
-    with pytest.raises(SceneError, match=r"load 'pull': .*all 9 unknowns.*9 nodes.*10 mm away"):
+    with pytest.raises(SceneError, match=r"'pull': .* 9 unknowns.*9 nodes.*10 mm"):
         build(held)
     hung = replace(scene, masses=(Mass("weight", OnPlane((0.0, 0.0, 0.0), X).points, 0.1),))
     with pytest.raises(SceneError, match=r"mass 'weight': .* hold all 27 unknowns"):
@@ -166,5 +166,5 @@ def test_a_load_or_mass_that_is_wholly_held_is_refused() -> None:
 
 @pytest.mark.parametrize("mass", [-1.0, float("nan")])
 def test_a_mass_is_not_below_zero(mass: float) -> None:
-    with pytest.raises(SceneError, match=r"mass 'weight': .* kg; expected a mass of 0 or above"):
+    with pytest.raises(SceneError, match=r"mass 'weight': .* kg; .* 0 or above"):
         Mass("weight", "x1", mass)

@@ -115,9 +115,7 @@ def test_a_surface_with_a_void_is_filled_around_it(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_bodies_that_overlap_are_refused_with_both_volumes(tmp_path: Path) -> None:
     points, both = np.vstack([X, X + 5]), np.vstack([T, len(X) + T])
-    with pytest.raises(
-        SceneError, match=r"24 triangles around 12 cm3, filled are 10\.\d+ cm3 .*unite"
-    ):
+    with pytest.raises(SceneError, match=r"24 triangles .* 12 cm3, .* 10\.\d+ cm3"):
         filled(stl(tmp_path / "x.stl", points, both), "mm", 6e-3)
 
 

@@ -313,7 +313,7 @@ def test_a_body_that_nothing_holds_is_named_before_any_solve() -> None:
     with pytest.raises(SceneError, match=r"3 of 6 ways \(along.*z\)"):
         ContactNewton().prepare(build(loose))
     pinned = replace(loose, pins=(Pin((0.0, 0.0, 0.0), (0, 1)),))
-    with pytest.raises(SceneError, match=r"in 1 of 6 ways \(along x, along y, about z\)|about z"):
+    with pytest.raises(SceneError, match=r"in 1 of 6 ways|about z"):
         ContactNewton().prepare(build(pinned))
     ContactNewton().prepare(build(replace(pinned, pins=(*pinned.pins, Pin(BOX, (0,))))))
     ContactNewton().prepare(on_a_slope(SLOPE, 0.0, 0.3))  # what rubs on its floor is held
@@ -322,9 +322,7 @@ def test_a_body_that_nothing_holds_is_named_before_any_solve() -> None:
 
 
 def test_schemes_without_contact_refuse_it() -> None:
-    with pytest.raises(
-        SceneError, match=r"does not support contact with rigid.* 1; use ContactNewton"
-    ):
+    with pytest.raises(SceneError, match=r"contact with .* 1; use ContactNewton"):
         Newmark().prepare(build(pressed(MESHES["tet4"])))
 
 
@@ -336,14 +334,12 @@ def test_graded_lines_reach_as_far() -> None:
 @pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"max_iterations": 0}])
 def test_settings_of_a_scheme_are_positive(wrong: dict[str, float]) -> None:
     for scheme in (ContactNewton, NewtonDynamics):
-        with pytest.raises(SceneError, match=r"tolerance .*, .* iterations.*: all must be p"):
+        with pytest.raises(SceneError, match=r"tolerance .*, .* iterations"):
             scheme(**wrong)  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="dt 0 s"):
         NewtonDynamics(dt=0.0)
     for margin in (-0.1, 1.0):
-        with pytest.raises(
-            SceneError, match=f"margin {margin:g}: expected a share of the critical step, 0"
-        ):
+        with pytest.raises(SceneError, match=rf"margin {margin:g}: expected a share"):
             CentralDifference(margin=margin)
 
 

@@ -216,9 +216,7 @@ def test_volume_ratio_must_be_positive(ratio: float) -> None:
 @pytest.mark.parametrize("ratio", [0.0, -1.0, 0.01, 0.07])
 def test_volume_that_no_pressure_gives_is_refused(phantom: Responses, ratio: float) -> None:
     """The curve's minimum is 0.074; below it a cubic still has a root, past its turning points."""
-    with pytest.raises(
-        SceneError, match=rf"no pressure gives V/V0 = {ratio:g}; use a ratio nearer to"
-    ):
+    with pytest.raises(SceneError, match=rf"no pressure gives V/V0 = {ratio:g}"):
         pressure_at_volume(phantom, np.array([1.0, ratio]))
 
 

@@ -251,9 +251,7 @@ def test_solvers_take_several_right_hand_sides(solver: SolverName) -> None:
 @pytest.mark.parametrize("solver", ["gaussian_elimination", "dense_solve", "dense_inverse"])
 def test_dense_matrices_have_a_largest_size(solver: SolverName) -> None:
     J = propagation(small(), rule_of("average", 0.002)).J.__class__((4001, 4001))
-    with pytest.raises(
-        SceneError, match=f"{solver} with 4001 unknowns: a dense matrix may have at most 4000"
-    ):
+    with pytest.raises(SceneError, match=rf"{solver} with 4001 unknowns: .* 4000"):
         solver_of(solver, J, np.arange(4001), np.zeros((4001, 3)))
 
 

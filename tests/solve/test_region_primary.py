@@ -262,15 +262,11 @@ def test_a_region_without_balance_or_upright_cells_is_unsettled() -> None:
     law = SimpleNamespace(rounding=0.0, after=lambda *_: jump)
     base = SimpleNamespace(inertia=np.ones(1), damping=np.zeros(1), next=lambda u, b, f: u)
     solver = PrimarySolver(base, law, 1e-3, one, np.zeros(1, int), np.zeros((1, 3)))
-    with pytest.raises(
-        UnsettledError, match=r"no equilibrium of the primary region after \d+ Newton iterat"
-    ):
+    with pytest.raises(UnsettledError, match=r"primary region after \d+ Newton"):
         solver._settled(base, np.zeros(1), np.zeros(1), np.zeros(1), jump)
     over = SimpleNamespace(force=lambda u: 0 * u, inverted=lambda u: True)
     turned = replace(solver, law=SimpleNamespace(after=lambda *_: over))
     with pytest.raises(UnsettledError, match="the primary region has inverted cells"):
         turned.walk(np.zeros(1), np.zeros(1), np.zeros(1), None)
-    with pytest.raises(
-        UnsettledError, match=r"a Newton correction inverts cells even at 1/\d+ of its siz"
-    ):
+    with pytest.raises(UnsettledError, match=r"inverts cells even at 1/\d+"):
         solver._corrected(np.zeros(1), np.ones(1), over)

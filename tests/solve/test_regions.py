@@ -380,16 +380,14 @@ def test_regions_of_a_block_settle_where_the_whole_body_does(dimension: int) -> 
 
 @pytest.mark.parametrize(("least", "most"), [(0, 3), (4, 3), (-1, -1)])
 def test_layers_of_a_region_rise_from_one(least: int, most: int) -> None:
-    with pytest.raises(
-        SceneError, match=f"primary region of {least} to {most} layers: expected at least 1"
-    ):
+    with pytest.raises(SceneError, match=rf"of {least} to {most} layers: .* 1"):
         PrimarySize("linear", least, most, 1.0, 1e-3, 1e-3)
 
 
 def test_touched_bodies_have_the_damping_of_their_nodes_only() -> None:
     material = SimpleNamespace(stiffness_damping=0.1)
     system = SimpleNamespace(scene=SimpleNamespace(materials=(material,)), free=np.arange(3))
-    with pytest.raises(SceneError, match=r"nodal damping, C = alpha M .*; remove stiffness"):
+    with pytest.raises(SceneError, match=r"nodal damping, C = alpha M"):
         RegionBody.of(system)  # type: ignore[arg-type]
 
 

@@ -101,9 +101,7 @@ def test_large_strain_is_left_out_for_the_reason_that_holds() -> None:
 @pytest.mark.parametrize("text", ["1.2.3mm", "mm", "5", "5 ", "", "infHz", "-Hz"])
 def test_a_wish_is_a_number_with_its_unit(text: str) -> None:
     assert choose._split("2.5 mm", "--error", "1mm") == (2.5, "mm")
-    with pytest.raises(
-        UsageError, match=f"--error {text}: expected a number with its unit; write for example 1mm"
-    ):
+    with pytest.raises(UsageError, match=rf"--error {text}: .* for example 1mm"):
         choose._split(text, "--error", "1mm")
 
 

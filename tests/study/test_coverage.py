@@ -393,9 +393,7 @@ def test_blocks_of_draws_that_fail_are_counted(monkeypatch: pytest.MonkeyPatch) 
     study = SimpleNamespace(
         bench=SimpleNamespace(runs=runs), draws=9, seed=1, job=None, noise=None, opening=None
     )
-    with pytest.raises(
-        ComparisonError, match=r"kf: 1 of 2 blocks of \d+ draws could not be checked: o"
-    ):
+    with pytest.raises(ComparisonError, match=r"kf: 1 of 2 blocks of \d+ draws"):
         coverage_module._of_method(study, "kf")  # type: ignore[arg-type]
 
 

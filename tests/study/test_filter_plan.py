@@ -105,7 +105,7 @@ def test_what_cannot_run_is_refused_at_once(
 
 
 def test_an_experiment_without_time_has_no_filters(phantom: Experiment) -> None:
-    with pytest.raises(UsageError, match=r"has no filter: no method of .* is given markers"):
+    with pytest.raises(UsageError, match=r"has no filter: no method of"):
         plan(phantom, Options({}), (), 2)
 
 

@@ -94,5 +94,5 @@ def test_nothing_is_ranked_by_a_score_that_is_not_there_or_of_cells_that_failed(
         filters._require_score(SimpleNamespace(records=failed), "rmse")  # type: ignore[arg-type]
     good = {"a": Record("a", SimpleNamespace(scores={"top.rmse": 1.0}))}
     filters._require_score(SimpleNamespace(records=good), "top.rmse")  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match=r"no score 'top.rms' to rank by; .*top.rmse"):
+    with pytest.raises(UsageError, match=r"no score 'top\.rms' .*top\.rmse"):
         filters._require_score(SimpleNamespace(records=good), "top.rms")  # type: ignore[arg-type]
