@@ -23,7 +23,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.fem.cavity import CavitySurface, volume_form
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.condense import condense
 from validate.fem.system import build
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion

@@ -21,7 +21,8 @@ import click
 from validate.report.export import parquet
 from validate.report.export.table_file import write_long_table
 from validate.report.long_table import POINT, LongRow, LongTable, long_table
-from validate.report.stored.folder import MARK, write_json
+from validate.report.stored.folder import MARK
+from validate.report.stored.json_values import write_json
 
 _CHECKS, _SCORES = 4, 300
 _TEXT = "x" * 1000

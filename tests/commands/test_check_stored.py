@@ -16,11 +16,11 @@ from validate.checksums import sealed
 from validate.engine import identity
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options
+from validate.pipeline.run.cached_runs import rests_on
 from validate.pipeline.run.pipeline import compare
-from validate.pipeline.run.runs import rests_on
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.report.stored.folder import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 
 _LOADS = re.compile(r"load=lambda p, folder: .*,\n")

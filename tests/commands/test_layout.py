@@ -16,7 +16,7 @@ from validate.commands.arguments import complain
 from validate.commands.screen import check_passages
 from validate.compare.verdict import Check
 from validate.report.stored.store import check_members
-from validate.report.views.drawers import laid, width, wrapped
+from validate.report.views.layout import laid, width, wrapped
 
 HEAD = ("name", "value", "why it is so")
 ROWS = (

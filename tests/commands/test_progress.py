@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 from rich.spinner import Spinner
 
-from validate.commands import display as module
-from validate.commands.display import Watch, drawn, progress
+from validate.commands import progress as module
+from validate.commands.progress import Watch, drawn, progress
 from validate.pipeline.run.runs import Pace
 
 

@@ -31,7 +31,7 @@ from validate.compare.score import Score
 from validate.recording.preflight import Inspection, Topic
 from validate.recording.types import Recording, Source
 from validate.report.stored.store import check_members
-from validate.report.views.drawers import bar
+from validate.report.views.bars import bar
 
 # private: _besides, _passages: called alone, case by case.
 

@@ -8,7 +8,7 @@ from report_samples import small_result
 
 import validate
 from validate.errors import UsageError
-from validate.report.stored.folder import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 
 FOLDERS = ("cube+quick-aaaaaa", "cube+quick+material.E-bbbbbb", "cube+methods-cccccc")

@@ -15,7 +15,7 @@ from validate.engine import cluster
 from validate.engine.cell import Record, Where
 from validate.engine.cluster import Drain
 from validate.engine.identity import digest
-from validate.engine.pool import Queue
+from validate.engine.queue import Queue
 from validate.errors import UsageError
 
 # private: _dask, _size: replaced, to bring a case about.

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from validate.engine.cell import Where
 from validate.engine.execution import finish
-from validate.engine.pool import Pool, Queue
+from validate.engine.pool import Pool
+from validate.engine.queue import Queue
 
 
 @given(

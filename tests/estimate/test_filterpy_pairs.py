@@ -10,10 +10,10 @@ import pytest
 
 from validate.errors import ComparisonError
 from validate.estimate.filterpy import oracle as filterpy_oracle
+from validate.estimate.filterpy.classes import drawing
 from validate.estimate.filterpy.filters import (
     FILTERPY_FILTERS,
     FilterpyFilter,
-    drawing,
     ensemble,
     kalman,
     require_shapes,

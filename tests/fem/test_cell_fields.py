@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validate.fem.assembly.locate import cell_fields
+from validate.fem.assembly.cell_fields import cell_fields
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic

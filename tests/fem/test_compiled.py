@@ -5,7 +5,7 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
-from validate.fem.kernels.threads import compiled, name_apart
+from validate.fem.kernels.jit_cache import compiled, name_apart
 
 # private: _load_index, _save_data: numba's cache, between whose steps another process comes.
 
@@ -50,4 +50,4 @@ def _twice_of(file: Path) -> Any:
 def test_every_stored_loop_is_stored_apart(project_root: Path) -> None:
     files = (project_root / "validate").rglob("*.py")
     own = [file.name for file in files if "cache=True" in file.read_text()]
-    assert own == ["threads.py"]
+    assert own == ["jit_cache.py"]

@@ -10,7 +10,7 @@ from validate.errors import ComparisonError
 from validate.identify.recorded_motion import RecordedMotion, recorded_motion
 from validate.pipeline.run.case_solution import between
 from validate.recording.types import Contours, Recording, Signal, Source
-from validate.report.sections.sections import motion_lines, motion_words
+from validate.report.sections.motion_words import motion_lines, motion_words
 
 T = np.arange(401) / 200.0
 ALONG = np.array([0.6, 0.0, 0.8])

@@ -18,8 +18,8 @@ from validate.pipeline.experiment.experiment import Input, Uncertainty, vary
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.experiment.variation import change_of
+from validate.pipeline.run.cached_runs import rests_on
 from validate.pipeline.run.pipeline import compare, set_out
-from validate.pipeline.run.runs import rests_on
 from validate.recording.types import Recording
 from validate.register.sensing import ForceSensing
 

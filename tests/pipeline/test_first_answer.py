@@ -8,18 +8,13 @@ import pytest
 from command_line import called
 
 from validate.commands.run import _refined
-from validate.pipeline.bodies.own_body import unknowns_of
+from validate.pipeline.bodies.mesh import unknowns_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import Options, folder_of
-from validate.pipeline.run import estimate as cost
-from validate.pipeline.run.estimate import (
-    affordable,
-    estimated,
-    linear_seconds,
-    newton_seconds,
-    states_within,
-)
+from validate.pipeline.run import cost
+from validate.pipeline.run.cost import affordable, linear_seconds, newton_seconds, states_within
+from validate.pipeline.run.estimate import estimated
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 from validate.scene.geometries.box import box, grid

@@ -35,7 +35,7 @@ from validate.pipeline.bodies import (
 )
 from validate.pipeline.bodies.body_dynamics import BodyRanges, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import solid
-from validate.pipeline.bodies.own_body import mesh_of
+from validate.pipeline.bodies.mesh import mesh_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.ladder import default as ladder_default

@@ -14,10 +14,10 @@ from validate.parameters import describe, with_values
 from validate.pipeline import load
 from validate.pipeline.bodies.body_dynamics import MeasuredBody, model_of
 from validate.pipeline.bodies.measured import measured_body, solid, static_scene
-from validate.pipeline.bodies.own_body import mesh_of, unknowns_of
+from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
 from validate.pipeline.experiment.tree import Meshes, Tree
-from validate.pipeline.run import estimate as cost
-from validate.pipeline.run.estimate import fits
+from validate.pipeline.run import cost
+from validate.pipeline.run.cost import fits
 from validate.recording.types import Recording, Source
 from validate.scene.geometries.box import divided, fitting, member, similarity
 from validate.scene.geometries.specification import Box

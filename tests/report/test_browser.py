@@ -26,9 +26,10 @@ from validate.library.comparison import scores_of_runs
 from validate.pipeline.experiment.find import find
 from validate.report.write import write_report
 from validate.solve.types import Ending, Outcome
+from validate.study.loose_page import write_loose
 from validate.study.stored_runs.published_page import write_published
 from validate.study.stored_runs.score_comparison import write_comparison
-from validate.study.study_page import Findings, write_loose, write_study
+from validate.study.study_page import Findings, write_study
 
 OPTIONS = (
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--hide-scrollbars",

@@ -32,9 +32,10 @@ from validate.report.scenes import gl
 from validate.report.scenes.body_scene import at_times, held
 from validate.report.scenes.maps import ranges, values
 from validate.report.sections.observations import holds
-from validate.report.sections.sections import band
-from validate.report.stored.folder import write_json
-from validate.report.stored.store import document, rounded, schema, thinned
+from validate.report.sections.verdicts import band
+from validate.report.stored.exhibit_rows import rounded, thinned
+from validate.report.stored.json_values import write_json
+from validate.report.stored.store import document, schema
 from validate.report.write import write_report
 from validate.scene.geometries.box import box
 

@@ -10,7 +10,7 @@ from report_samples import small_result
 
 from validate.parameters import Changed
 from validate.report.stored.environment import Commit, Made
-from validate.report.stored.folder import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 
 

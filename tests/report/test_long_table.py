@@ -27,7 +27,7 @@ from validate.report.long_table import (
     long_table,
 )
 from validate.report.stored import tables as stored_tables
-from validate.report.stored.folder import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import document
 
 CREATED = "2026-11-21T04:00:00Z"

@@ -16,7 +16,7 @@ from validate.compare.verdict import Acceptance, Validation
 from validate.report.exhibits import DrawnExhibit, draw_all
 from validate.report.export.tables import shown
 from validate.report.page.html import page
-from validate.report.sections.sections import band
+from validate.report.sections.verdicts import band
 
 CREATED = "2026-11-21T04:00:00Z"
 

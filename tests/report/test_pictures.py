@@ -18,7 +18,8 @@ from validate.report.scenes import outline_images as module
 from validate.report.scenes.body import flattest
 from validate.report.scenes.outline_images import outline_images
 from validate.report.scenes.residual_arrows import arrow_axes, magnified, residual_arrows
-from validate.report.sections.observations import Held, noise_rows, over_noise
+from validate.report.sections.discrimination import noise_rows, over_noise
+from validate.report.sections.observations import Held
 
 # private: _circle: called alone, case by case.
 # private: _outline: replaced, to bring a case about.

@@ -14,7 +14,7 @@ from validate.compare.published import Published
 from validate.compare.result import Result
 from validate.report.exhibits import draw_all
 from validate.report.page.html import page
-from validate.report.sections.sections import band
+from validate.report.sections.verdicts import band
 from validate.report.stored.store import document, schema
 
 # private: _content, _document, _holds, _show: called alone, case by case.

@@ -16,10 +16,10 @@ from validate.compare.result import Result
 from validate.compare.score import Score
 from validate.errors import UsageError
 from validate.report.export.fields import open_fields, write_fields
-from validate.report.sections.observations import noise_rows
+from validate.report.sections.discrimination import noise_rows
 from validate.report.sections.registration import registration
 from validate.report.stored.environment import without_folder
-from validate.report.stored.folder import write_json
+from validate.report.stored.json_values import write_json
 from validate.report.stored.store import Json, document, schema
 
 CREATED = "2026-11-21T04:00:00Z"

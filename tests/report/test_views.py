@@ -20,8 +20,9 @@ from validate.report import open_store
 from validate.report.export.table_file import stored_table
 from validate.report.export.tables import shown
 from validate.report.long_table import LongTable
-from validate.report.stored.folder import write_json
-from validate.report.stored.store import document, stored_exhibits
+from validate.report.stored.exhibit_rows import stored_exhibits
+from validate.report.stored.json_values import write_json
+from validate.report.stored.store import document
 from validate.report.views.drawers import figures, page, save, terminal
 from validate.report.views.standard import STANDARD, VIEWS, view_of
 from validate.report.views.view_filling import explained, filled

@@ -21,7 +21,7 @@ from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
 from validate.scene.mesh_files.vtu import write_vtu
 from validate.scene.scene import Drive, Load, Pin, Probe, Scene, Support, Weight
-from validate.solve.external import exchange, suite
+from validate.solve.external import exchange, limits
 from validate.solve.external import program as ran
 from validate.solve.external.exchange import NoAnswerError, echoed, write_job
 from validate.solve.external.program import Ended
@@ -418,11 +418,11 @@ def test_a_program_that_cannot_be_started_is_one_line(
     def ended(code: int) -> None:
         raise SystemExit(code)
 
-    monkeypatch.setattr(suite.resource, "setrlimit", lambda *_: None)
-    monkeypatch.setattr(suite.os, "execvp", forbidden)
-    monkeypatch.setattr(suite.os, "_exit", ended)
+    monkeypatch.setattr(limits.resource, "setrlimit", lambda *_: None)
+    monkeypatch.setattr(limits.os, "execvp", forbidden)
+    monkeypatch.setattr(limits.os, "_exit", ended)
     with pytest.raises(SystemExit, match="127"):
-        suite.become(["solver", "job"], 2**30, 2**20)
+        limits.become(["solver", "job"], 2**30, 2**20)
     assert capsys.readouterr().out == "solver: Permission denied\n"
 
 

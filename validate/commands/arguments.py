@@ -9,7 +9,7 @@ from typing import Any, Literal
 import click
 
 from validate.errors import UsageError
-from validate.report.views.drawers import width, wrapped
+from validate.report.views.layout import width, wrapped
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(dir_okay=False, path_type=Path)
@@ -27,7 +27,7 @@ def detailed(command: Callable[..., Any]) -> Any:
 
     @wraps(command)
     def chosen(*, quiet: bool, verbose: bool, **given: Any) -> Any:
-        from validate.commands.display import quiet as without_progress
+        from validate.commands.progress import quiet as without_progress
 
         if quiet and verbose:
             raise UsageError("-q and --verbose exclude each other: give one")

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from validate.commands.arguments import Detail, complain
-from validate.commands.display import print_views, progress, relative, say, shown
+from validate.commands.display import print_views, relative, say, shown
+from validate.commands.progress import progress
 from validate.commands.run import each
 from validate.commands.run_screen import figures_line
 from validate.commands.screen import Passage, check_passages, rows, sentences, show
@@ -23,13 +24,14 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.origins import Opened, opened
 from validate.pipeline.experiment.tree import Tree
+from validate.pipeline.run.cached_runs import stored_run
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.job import reports_of, run_folder
 from validate.pipeline.run.pipeline import compare
-from validate.pipeline.run.runs import stored_run
 from validate.report.long_table import long_table
-from validate.report.sections.sections import motion_lines
-from validate.report.stored.folder import members, try_results
+from validate.report.sections.motion_words import motion_lines
+from validate.report.stored.folder import try_results
+from validate.report.stored.json_values import members
 from validate.report.stored.store import check_members, figure_members, overall_members
 from validate.scene.scene import Scene
 from validate.study.stored_runs.published_page import FOLDER, write_published

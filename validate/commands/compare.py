@@ -16,7 +16,7 @@ from validate.library.comparison import scores_of_runs
 from validate.numbers import shown_unit, significant, text
 from validate.report.stored.folder import try_results
 from validate.report.stored.tables import stored_folder
-from validate.report.views.drawers import laid, width, wrapped
+from validate.report.views.layout import laid, width, wrapped
 from validate.study.stored_runs.score_comparison import (
     Pair,
     Row,

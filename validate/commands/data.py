@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from validate.commands.display import progress, relative, say, table
+from validate.commands.display import relative, say, table
+from validate.commands.progress import progress
 from validate.datasets.home import DataSet, cache_folder, data_sets, named, searched, whole
 from validate.errors import RecordingError
 

@@ -5,13 +5,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from validate.commands.display import progress, relative, say
+from validate.commands.display import relative, say
+from validate.commands.progress import progress
 from validate.errors import UsageError
 from validate.files import json_value, safe_name
 from validate.places import try_file, try_folder, write_whole
 from validate.report.export.junit_latex import junit, tabular
 from validate.report.long_table import LongTable, content_of
-from validate.report.stored.store import NOT_SHOWN
+from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.tables import pictures, plain_name, stored_folder, stored_views
 from validate.report.views.drawers import drawable, figure_of, save
 from validate.report.views.standard import view_of
@@ -51,7 +52,7 @@ def _figures(run: Path, folder: Path) -> None:
     (85 mm) and two (175 mm), tables as CSV and LaTeX, pictures as they are and in SVG and PDF.
     """
     from validate.report.charts.style import COLUMNS  # matplotlib takes half a second
-    from validate.report.stored.folder import figure_of_file
+    from validate.report.stored.figures import figure_of_file
 
     table = read_table(run, *NOT_SHOWN)
     try_folder(folder)

@@ -11,7 +11,7 @@ from validate.errors import ValidateError
 from validate.recording.mcap.decoders import messages_in
 from validate.recording.preflight import Inspection, Topic, inspect_file
 from validate.recording.readers import named, recognised
-from validate.report.sections.sections import motion_lines
+from validate.report.sections.motion_words import motion_lines
 
 _UNREAD = "not read: "  # before the reason, in a topic's kind
 

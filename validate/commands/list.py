@@ -15,7 +15,7 @@ from validate.pipeline.experiment.declaration import to_json
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import laws_of
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 
 _DEFAULT = 16  # characters of a default
 _FIRST = 10  # of each list on the screen

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from validate.commands.arguments import complain
-from validate.commands.display import progress, say
+from validate.commands.display import say
+from validate.commands.progress import progress
 from validate.errors import RecordingError, UsageError
 from validate.files import safe_name
 from validate.places import try_file

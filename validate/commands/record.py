@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from validate.commands.arguments import pairs
-from validate.commands.display import progress
+from validate.commands.progress import progress
 from validate.commands.recordings import written as say
 from validate.commands.run import ask_about
 from validate.errors import UsageError

@@ -8,7 +8,8 @@ from time import perf_counter
 
 from validate.catalogue import experiment_files
 from validate.commands.arguments import BAD_INPUT, FAILED, OK, Detail, command_line, complain, pairs
-from validate.commands.display import progress, say
+from validate.commands.display import say
+from validate.commands.progress import progress
 from validate.commands.run_screen import called, show_run
 from validate.engine.pool import Pool
 from validate.errors import UsageError, ValidateError

@@ -10,7 +10,8 @@ from typing import Any
 from validate.commands.arguments import Detail
 from validate.commands.display import console, error_shown, say
 from validate.numbers import scale, shown_unit, significant, to_decimal_of
-from validate.report.views.drawers import bar, legend, wrapped
+from validate.report.views.bars import bar, legend
+from validate.report.views.layout import wrapped
 
 LINES = 25
 _NAME = 12  # characters of a name that is cut

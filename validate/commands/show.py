@@ -5,7 +5,7 @@ from pathlib import Path
 from validate.commands.display import console, relative, say
 from validate.commands.screen import rows
 from validate.errors import UsageError
-from validate.report.stored.store import NOT_SHOWN
+from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.tables import exhibit_of, pictures, shown_by_name, stored_folder
 from validate.report.views.drawers import save, terminal
 from validate.study.stored_runs.score_comparison import read_table
@@ -15,7 +15,7 @@ def picture(file: Path, out: Path) -> None:
     """Write a stored picture as .svg, .pdf or .png; raises `UsageError` for another suffix."""
     if out.suffix not in (".svg", ".pdf", ".png"):
         raise UsageError(f"{out}: a picture is written as .svg, .pdf or .png")
-    from validate.report.stored.folder import figure_of_file
+    from validate.report.stored.figures import figure_of_file
 
     figure_of_file(file).savefig(out)
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from validate.checksums import read_sealed
 from validate.commands.arguments import FAILED, OK, Detail, command_line, pairs
-from validate.commands.display import progress, relative, say, table
+from validate.commands.display import relative, say, table
+from validate.commands.progress import progress
 from validate.commands.screen import Passage, cut, rows, sentences, show
 from validate.compare.exhibit import Entry, TableCell, plain
 from validate.engine.cell import Where

@@ -20,7 +20,7 @@ from distributed.scheduler import KilledWorker
 from validate.child_process import users_variables
 from validate.engine.cell import Done, Plan, Record, Where, prove, run_batch
 from validate.engine.identity import Identity, OtherCodeError, digest, require_same
-from validate.engine.pool import Batch, Queue
+from validate.engine.queue import Batch, Queue
 from validate.errors import UsageError, ValidateError
 
 TASK_S = 0.5  # s of work in one task: a kill loses so much, and Dask's 2 ms a task vanish in it

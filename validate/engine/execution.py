@@ -18,7 +18,8 @@ import numpy as np
 
 from validate.engine.cell import C, Done, Plan, R, Record, Where, opened, recorded
 from validate.engine.identity import Identity, digest
-from validate.engine.pool import Pool, Queue
+from validate.engine.pool import Pool
+from validate.engine.queue import Queue
 from validate.engine.store import read_records, write_record
 from validate.places import try_folder
 

@@ -1,10 +1,9 @@
-"""Pool of workers of one command and their queue of cells: this process, local or a scheduler."""
+"""Pool of workers of one command: this process, local workers by a fork server, or a scheduler."""
 
 import os
 import signal
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from multiprocessing import forkserver, set_forkserver_preload
@@ -117,8 +116,6 @@ class Pool:
     def prepare(self) -> None:
         """Has what workers need imported, in a process that they are forked from later."""
         if self.workers and not self.address:
-            from validate.engine.pool import serve
-
             serve(self._preload)
 
     def begin(self, most: int | None = None) -> None:
@@ -164,62 +161,3 @@ class Pool:
             self._client = self._stack.enter_context(connected(self._where, self._count))
         except BaseException as error:
             self._error = error
-
-
-# --- queue of waiting cells, shared by workers and the calling process ---------------------------
-
-Batch = tuple[Any, ...]
-
-
-class Queue:
-    """Cells in order. While one that is timed runs, at most `beside` batches run in all."""
-
-    def __init__(self, cells: Sequence[Any], beside: int = 1) -> None:
-        self._waiting = deque(cells)
-        self._beside = beside
-        self._running: list[Batch] = []
-        self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    @property
-    def running(self) -> int:
-        return len(self._running)
-
-    @property
-    def first(self) -> Any:
-        """The next cell; None where none waits."""
-        with self._lock:
-            return self._waiting[0] if self._waiting else None
-
-    def take(self, most: int = 1) -> Batch:
-        """At most so many of the next cells, timed ones singly; () where none may start now."""
-        with self._lock:
-            if not self._waiting or not self._may_start(self._waiting[0]):
-                return ()
-            batch: Batch = (self._waiting.popleft(),)
-            while len(batch) < most and self._waiting:
-                if batch[0].timed or self._waiting[0].timed:
-                    break
-                batch += (self._waiting.popleft(),)
-            self._running.append(batch)
-            return batch
-
-    def ended(self, batch: Batch) -> None:
-        with self._lock:
-            self._running.remove(batch)
-
-    def again(self, cell: Any) -> None:
-        """A cell whose result was lost is the next one."""
-        with self._lock:
-            self._waiting.appendleft(cell)
-
-    def close(self) -> None:
-        """Nothing is taken any more."""
-        with self._lock:
-            self._waiting.clear()
-
-    def _may_start(self, cell: Any) -> bool:
-        timed = cell.timed or any(c.timed for batch in self._running for c in batch)
-        return not timed or len(self._running) < self._beside

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.scene.mesh import Mesh
 from validate.scene.shape_functions import Quadrature, facet_rule, simplex_rule
 

@@ -17,8 +17,8 @@ from validate.parameters import nearest_names
 from validate.recording.types import Markers, Recording, Signal
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable
+from validate.report.stored.exhibit_rows import NOT_SHOWN
 from validate.report.stored.folder import MARK
-from validate.report.stored.store import NOT_SHOWN
 from validate.report.stored.tables import PICTURE, Shown, pictures, plain_name, shown_by_name
 from validate.report.views.drawers import figures, part, save, terminal
 from validate.report.views.standard import VIEWS
@@ -92,7 +92,7 @@ class Plots:
 
 def drawn(exhibit: Exhibit, table: LongTable = _NO_RUN) -> "Figure | ShownView":
     """Return an exhibit's one chart or picture as a figure, else the exhibit as a view."""
-    from validate.report.stored.folder import figure_of_pixels, shown_in_notebooks
+    from validate.report.stored.figures import figure_of_pixels, shown_in_notebooks
     from validate.report.views.drawers import figures
 
     found = figures(exhibit, table)
@@ -126,7 +126,7 @@ def _read(folder: Path, changed: int, views: tuple[str, ...]) -> tuple[LongTable
 
 
 def _picture(file: Path) -> "Figure":
-    from validate.report.stored.folder import figure_of_file, shown_in_notebooks
+    from validate.report.stored.figures import figure_of_file, shown_in_notebooks
 
     return shown_in_notebooks(figure_of_file(file))
 

@@ -13,8 +13,8 @@ from validate.library.plots import Plots, ShownView, plots_of
 from validate.numbers import scale, shown_unit, text, to_decimal_of, with_unit
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, content_of
-from validate.report.stored.folder import Json
-from validate.report.stored.store import NOT_SHOWN
+from validate.report.stored.exhibit_rows import NOT_SHOWN
+from validate.report.stored.json_values import Json
 from validate.report.stored.tables import exhibit_of, stored_folder
 from validate.report.views.view_filling import explained
 from validate.study.stored_runs.score_comparison import read_table

@@ -19,10 +19,10 @@ from validate.pipeline.experiment.declaration import completed
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, doubtful, with_simulators
+from validate.pipeline.run.cached_runs import rests_on
 from validate.pipeline.run.cells import InStore
 from validate.pipeline.run.job import reports_of, run_folder
 from validate.pipeline.run.pipeline import compare
-from validate.pipeline.run.runs import rests_on
 from validate.recording.readers import named, recognised
 from validate.recording.types import Recording
 from validate.report.stored.folder import STUDIES, locked, try_results

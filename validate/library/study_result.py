@@ -14,7 +14,8 @@ from validate.library.plots import Plots, plots_of
 from validate.parameters import nearest_names
 from validate.report.export.fields import as_dataset
 from validate.report.long_table import frame
-from validate.report.stored.folder import MARK, Json
+from validate.report.stored.folder import MARK
+from validate.report.stored.json_values import Json
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -34,7 +34,7 @@ from validate.compare.row import (
 )
 from validate.errors import UsageError
 from validate.installation import install_command
-from validate.report.stored.folder import Json
+from validate.report.stored.json_values import Json
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -21,10 +21,11 @@ from validate.report.export.fields import write_fields
 from validate.report.export.table_file import write_long_table
 from validate.report.long_table import LongTable, long_table, traces_of
 from validate.report.sections.observations import signals
-from validate.report.sections.sections import band
+from validate.report.sections.verdicts import band
 from validate.report.stored.environment import Made
-from validate.report.stored.folder import MARK, STUDIES, Json, replace_folder, write_json
+from validate.report.stored.folder import MARK, STUDIES, replace_folder
 from validate.report.stored.history import carried, write_lines
+from validate.report.stored.json_values import Json, write_json
 from validate.report.stored.store import document
 
 if TYPE_CHECKING:  # what draws is imported when something is drawn

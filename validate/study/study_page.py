@@ -1,4 +1,4 @@
-"""Folder and page of a finished study, or of several stored runs; its cells stay."""
+"""Folder of a finished study: results.json, tables, figures and a page; its cells stay."""
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.compare.result import Result
 from validate.engine.execution import CELLS
 from validate.parameters import Parameter
 from validate.pipeline.experiment.experiment import Experiment
 from validate.report.export.tables import write_csv
 from validate.report.stored.environment import Made
-from validate.report.stored.folder import MARK, Json, replace_folder, write_json
+from validate.report.stored.folder import replace_folder
 from validate.report.stored.history import carried, write_lines
 from validate.report.stored.store import document
+from validate.study.loose_page import fill_page, without_runs
 
 
 @dataclass(frozen=True)
@@ -68,46 +68,3 @@ def write_study(
         write_csv(fresh / "tables" / "cells.csv", told.cells.headings, told.cells.rows)
 
     return replace_folder(folder, fill, (CELLS,)) / "report.html"
-
-
-# --- page of a study or of several stored runs, without methods and recordings of its own --------
-
-
-def write_loose(
-    told: tuple[str, str, str, str], exhibits: tuple[Exhibit, ...], document: dict[str, Any],
-    folder: Path, band: str, warnings: tuple[str, ...] = (),
-) -> Path:  # fmt: skip
-    """Replace `folder` by a page over stored runs, where nothing was run: page, tables, figures and
-    `document` as its results.json; returns the path of report.html.
-
-    `told` are name, title, source and sentence, `band` a word before the sentence. Raises what
-    `replace_folder` does.
-    """
-    result = replace(without_runs(*told), warnings=warnings, exhibits=exhibits)
-    created = datetime.now(UTC).isoformat(timespec="seconds")
-
-    def fill(fresh: Path) -> None:
-        fill_page(result, document, created, ("plain", band), fresh)
-
-    return replace_folder(folder, fill, ()) / "report.html"
-
-
-def without_runs(name: str, title: str, source: str, sentence: str) -> Result:
-    """Return what a page says that has neither methods nor recordings of its own."""
-    return Result(name, title, source, sentence, (), (), (), (), (), ())
-
-
-def fill_page(
-    result: Result, content: Json, created: str, band: tuple[str, str], folder: Path
-) -> None:
-    # What draws is imported when something is drawn: matplotlib takes half a second.
-    from validate.report.exhibits import draw_all, write_files
-    from validate.report.page.html import page
-
-    for name in ("tables", "figures"):
-        (folder / name).mkdir()
-    write_json(content, folder / MARK)
-    drawn = draw_all(result, result.exhibits)
-    for exhibit in drawn:
-        write_files(exhibit, folder)
-    (folder / "report.html").write_text(page(result, drawn, created, band), encoding="utf-8")

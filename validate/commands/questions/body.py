@@ -46,8 +46,8 @@ from validate.commands.questions.scene import CELLS, answered_mesh, imports, ren
 from validate.commands.recordings import beside
 from validate.errors import UsageError
 from validate.pipeline.bodies.markers import AS_SEEN
-from validate.pipeline.bodies.own_body import PLATES, sizes_of_mesh, unknowns_of
-from validate.pipeline.run.estimate import FEWEST_STATES, RUNS, newton_seconds, states_within
+from validate.pipeline.bodies.mesh import PLATES, sizes_of_mesh, unknowns_of
+from validate.pipeline.run.cost import FEWEST_STATES, RUNS, newton_seconds, states_within
 from validate.recording.scales import another_unit
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile

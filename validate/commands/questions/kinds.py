@@ -12,7 +12,7 @@ from validate.pipeline.bodies.body_dynamics import MeasuredBody
 from validate.pipeline.bodies.drive import FEWEST
 from validate.pipeline.bodies.markers import AS_SEEN
 from validate.pipeline.plates.scene import recorded_sides
-from validate.pipeline.run.estimate import MESHES, linear_seconds
+from validate.pipeline.run.cost import MESHES, linear_seconds
 from validate.recording.types import Recording
 from validate.scene.body_facts import SAME, largest_side, odd_size
 from validate.scene.contact import Indenter, RigidContact

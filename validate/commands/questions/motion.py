@@ -30,7 +30,7 @@ from validate.pipeline.bodies.drive import drive_kind, mover, weight_beside
 from validate.pipeline.bodies.dynamics_registration import started, steps_of, without_rest
 from validate.pipeline.bodies.markers import leading
 from validate.pipeline.bodies.measured import static_scene
-from validate.pipeline.bodies.own_body import mesh_of, unknowns_of
+from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import MeshFile

@@ -15,7 +15,7 @@ from validate.commands.questions.law import coefficient_values, left_open
 from validate.errors import SceneError, UsageError
 from validate.parameters import describe, with_values
 from validate.pipeline.bodies.body_dynamics import WATER, MeasuredBody
-from validate.pipeline.bodies.own_body import grid_unknowns
+from validate.pipeline.bodies.mesh import grid_unknowns
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
 from validate.scene.contact import Indenter, RigidContact

@@ -10,7 +10,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.fem.kernels import explicit as explicit_kernels
 from validate.fem.kernels.explicit import add_forces_and_blocks, pull
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.large_strain.explicit import PackedBody
 
 _UNSIGNED = np.int64(0x7FFFFFFFFFFFFFFF)  # all bits of a double but its sign

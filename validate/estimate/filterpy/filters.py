@@ -1,4 +1,4 @@
-"""filterpy (2.0, MIT) and its filters as methods of an experiment, with checks of their arrays.
+"""filterpy's filters as methods of an experiment, with checks of their array shapes.
 
 filterpy accepts a P of the wrong size, and a 1-D z with a column x turns x into a matrix. The
 checks here refuse both, before the first step and after every step.
@@ -10,15 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import filterpy.kalman.ensemble_kalman_filter as fp_ensemble
 import numpy as np
-from filterpy.kalman import (
-    EnsembleKalmanFilter,
-    ExtendedKalmanFilter,
-    KalmanFilter,
-    MerweScaledSigmaPoints,
-    UnscentedKalmanFilter,
-)
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
@@ -62,7 +54,7 @@ def seeded(seed: int) -> Iterator[None]:
 
 def kalman(model: LinearModel) -> Any:
     """filterpy's `KalmanFilter` of a model."""
-    from validate.estimate.filterpy.filters import KalmanFilter  # filterpy takes 0.6 s
+    from validate.estimate.filterpy.classes import KalmanFilter  # filterpy takes 0.6 s
 
     kf = KalmanFilter(model.size, len(model.H), model.B.shape[1])
     kf.F, kf.B, kf.H = model.F.copy(), model.B.copy(), model.H.copy()
@@ -74,7 +66,7 @@ def unscented(model: LinearModel) -> Any:
 
     Its f takes the loads as keyword `u` of `predict`.
     """
-    from validate.estimate.filterpy.filters import MerweScaledSigmaPoints, UnscentedKalmanFilter
+    from validate.estimate.filterpy.classes import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
     points = MerweScaledSigmaPoints(model.size, 1.0, 2.0, 0.0, sqrt_method=_root)
 
@@ -89,7 +81,7 @@ def unscented(model: LinearModel) -> Any:
 
 def ensemble(model: LinearModel) -> Any:
     """filterpy's `EnsembleKalmanFilter` with 50 members, whose `predict` takes the loads."""
-    from validate.estimate.filterpy.filters import Ensemble
+    from validate.estimate.filterpy.classes import Ensemble
 
     enkf = Ensemble(model)
     enkf.Q, enkf.R = model.Q.copy(), model.R.copy()
@@ -193,7 +185,7 @@ def require_exact_covariances(filter_: Any) -> None:
     """Raise `UsageError` unless P and gain of the filter are those of the linear model.
 
     filterpy's unscented filter computes its gain from points without the step's noise."""
-    from validate.estimate.filterpy.filters import KalmanFilter
+    from validate.estimate.filterpy.classes import KalmanFilter
 
     if not isinstance(filter_, KalmanFilter) or filter_.alpha != 1.0:
         raise UsageError(
@@ -280,58 +272,3 @@ class FilterpyCore:
 
     def numbers(self, inner: Visit) -> Mapping[str, float]:
         return {}
-
-
-# --- classes of filterpy (2.0, MIT): the only import of it, which takes 0.6 s --------------------
-
-__all__ = [
-    "Ensemble",
-    "EnsembleKalmanFilter",
-    "ExtendedKalmanFilter",
-    "KalmanFilter",
-    "MerweScaledSigmaPoints",
-    "UnscentedKalmanFilter",
-    "drawing",
-]
-
-
-@contextmanager
-def drawing(draws: Callable[..., Any]) -> Iterator[None]:
-    """The ensemble filter draws from `draws` (mean, covariance, size) instead."""
-    before = fp_ensemble.multivariate_normal
-    fp_ensemble.multivariate_normal = draws
-    try:
-        yield
-    finally:
-        fp_ensemble.multivariate_normal = before
-
-
-_MEMBERS = 50
-_BOUND = ("fx", "hx", "model", "inv")
-
-
-class Ensemble(EnsembleKalmanFilter):  # type: ignore[misc]
-    """filterpy's ensemble filter of a linear model, with loads in `predict`."""
-
-    def __init__(self, model: LinearModel) -> None:
-        self.model, self.loads = model, np.zeros(model.B.shape[1])
-        m = len(model.H)
-        super().__init__(
-            model.x0, model.P0, m, 1.0, _MEMBERS, lambda x: model.H @ x, lambda x, _: self._moved(x)
-        )
-
-    def _moved(self, x: Floats) -> Floats:
-        return self.model.F @ x + self.model.B @ self.loads
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Ensemble":
-        """Without drawing anew; its functions are bound to the copy."""
-        other = object.__new__(Ensemble)
-        other.__dict__.update(self.__dict__)
-        own = {k: copy.deepcopy(v, memo) for k, v in self.__dict__.items() if k not in _BOUND}
-        other.__dict__.update(own)
-        other.fx = lambda x, _: other._moved(x)
-        return other
-
-    def predict(self, u: Floats) -> None:
-        self.loads = u
-        super().predict()

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.estimate.filterpy.filters import (
+from validate.estimate.filterpy.classes import (
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
     MerweScaledSigmaPoints,
     UnscentedKalmanFilter,
     drawing,
-    kalman,
 )
+from validate.estimate.filterpy.filters import kalman
 from validate.estimate.kalman.formulas import (
     Gaussian,
     SigmaPoints,

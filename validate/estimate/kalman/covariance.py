@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 from validate.arrays import Floats, Ints
 from validate.estimate.kalman.formulas import Gain, Seen, best_gain, joseph, propagated
 from validate.estimate.measurements import Timetable
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.system import System, once
 
 

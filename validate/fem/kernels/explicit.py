@@ -30,6 +30,7 @@ from validate.fem.kernels.cells import (
     bricks_looked_at,
     cells_looked_at,
 )
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.kernels.lanes import BLOCK, FOUR
 from validate.fem.kernels.points import FAST, INVARIANTS, inlined
 from validate.fem.kernels.tetrahedra_in_lanes import (
@@ -37,7 +38,6 @@ from validate.fem.kernels.tetrahedra_in_lanes import (
     add_lane_forces,
     add_lane_products,
 )
-from validate.fem.kernels.threads import compiled
 
 Cells = NDArray[np.int32]
 

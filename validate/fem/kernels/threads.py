@@ -1,4 +1,4 @@
-"""Compiled loops: their cache on disk, and the threads of an explicit step by a pilot.
+"""Number of threads of an explicit step, chosen by a measured pilot.
 
 Threads meet at the end of every step: where another process has a core, all wait for the one that
 it keeps, and a step takes several times as long as alone. So the machine is asked first, then a
@@ -12,11 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from time import perf_counter, sleep
-from types import ModuleType
-from typing import Any, TypeVar, cast
-from uuid import uuid4
-
-from numba import njit
 
 CLEARLY = 0.9  # of one thread's time, by medians and by minima: less is no gain worth a risk
 _ROUNDS = 15
@@ -144,36 +139,3 @@ class Team:
                 f"; then 1, as {self.choice.threads} took {1e6 * now:.3g} us, because the "
                 "machine became busy"
             )
-
-
-# --- cache of compiled loops on disk, safe with several processes --------------------------------
-
-_Function = TypeVar("_Function", bound=Callable[..., object])
-
-
-def compiled(*inlined: ModuleType, **options: Any) -> Callable[[_Function], _Function]:
-    """`numba.njit` with these options, its code kept beside the function's own file.
-
-    `inlined`: other modules whose functions are in it; a change of theirs compiles it anew, too.
-    """
-    stamps = tuple(Path(str(module.__file__)).stat().st_mtime_ns for module in inlined)
-
-    def made(function: _Function) -> _Function:
-        dispatcher = njit(cache=True, **options)(function)
-        stored: Any = dispatcher._cache._cache_file
-        stored._source_stamp = (stored._source_stamp, stamps)
-        name_apart(stored)
-        return cast(_Function, dispatcher)
-
-    return made
-
-
-def name_apart(stored: Any) -> None:
-    """Lets a `numba.core.caching.IndexDataCacheFile` give each code that it saves its own name."""
-
-    def save(key: object, data: object) -> None:
-        name = stored._data_name_pattern.format(number=uuid4().int)
-        stored._save_data(name, data)
-        stored._save_index({**stored._load_index(), key: name})
-
-    stored.save = save

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.memory import free_memory, require_memory
 
 

@@ -59,7 +59,7 @@ from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
-from validate.report.sections.sections import motion_words, rests
+from validate.report.sections.motion_words import motion_words, rests
 from validate.scene.material import LawName
 from validate.scene.scene import Probe, Scene, Weight
 from validate.solve.dynamic.implicit import FromEquilibrium

@@ -28,8 +28,7 @@ from validate.pipeline.bodies.body_dynamics import (
 )
 from validate.pipeline.bodies.body_registration import place
 from validate.pipeline.bodies.drive import drive_kind, mover, placed_points, pressing
-from validate.pipeline.bodies.modulus import identify_body, model_name
-from validate.pipeline.bodies.own_body import (
+from validate.pipeline.bodies.mesh import (
     costs_of,
     even_axes,
     grid_unknowns,
@@ -37,6 +36,7 @@ from validate.pipeline.bodies.own_body import (
     mesh_of,
     unknowns_of,
 )
+from validate.pipeline.bodies.modulus import identify_body, model_name
 from validate.pipeline.calibration.fitted_moduli import modulus_in
 from validate.pipeline.experiment.experiment import (
     CORNER_ORDER,
@@ -51,7 +51,7 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import CellSize, Tree, beside, changed_by
 from validate.pipeline.plates.scene import doubt, yielding
-from validate.pipeline.run.estimate import (
+from validate.pipeline.run.cost import (
     INPUTS,
     MESHES,
     affordable,

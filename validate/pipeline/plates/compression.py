@@ -15,7 +15,7 @@ from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
 from validate.identify.modulus import MIN_SAMPLES, fit_modulus
-from validate.pipeline.bodies.own_body import DIAMETER
+from validate.pipeline.bodies.mesh import DIAMETER
 from validate.pipeline.calibration.fitted_moduli import toe_in
 from validate.pipeline.experiment.experiment import (
     CORNER_ORDER,
@@ -45,7 +45,7 @@ from validate.pipeline.plates.scene import (
     pressed_size,
     stated_sizes,
 )
-from validate.pipeline.run.estimate import INPUTS, NODAL_MEAN, affordable, linear_seconds
+from validate.pipeline.run.cost import INPUTS, NODAL_MEAN, affordable, linear_seconds
 from validate.recording.merge import repeats_share
 from validate.recording.types import Recording
 from validate.register.registration import Registered

@@ -21,7 +21,7 @@ from validate.fem.system import responses
 from validate.identify.budget import NOISE, IdentifiedValue, pattern
 from validate.identify.modulus import MIN_SAMPLES, ModulusFit, fit_modulus, loading
 from validate.identify.scaled_curve import ScaledFit, UnitCurve, fit_modulus_of, fit_scaled
-from validate.pipeline.bodies.own_body import DIAMETER, HEIGHT
+from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT
 from validate.pipeline.calibration.fitted_moduli import (
     COMMON,
     Moves,

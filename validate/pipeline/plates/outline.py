@@ -12,7 +12,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError, UsageError
 from validate.parameters import known, quantity, value_at
-from validate.pipeline.bodies.own_body import HEIGHT
+from validate.pipeline.bodies.mesh import HEIGHT
 from validate.pipeline.experiment.experiment import Input, vary
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Recording

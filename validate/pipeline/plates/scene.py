@@ -25,7 +25,7 @@ import numpy as np
 from validate.errors import ComparisonError, UsageError
 from validate.identify.modulus import CylinderSize, ModulusFit, TestKind, loading, stated_test
 from validate.parameters import Ranges, known, quantity
-from validate.pipeline.bodies.own_body import DIAMETER, HEIGHT, PLATES, sizes_of_mesh
+from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT, PLATES, sizes_of_mesh
 from validate.pipeline.calibration.fitted_moduli import modulus_in
 from validate.pipeline.experiment.tree import Built, Meshes, Tree, changed_by, mesh_of
 from validate.pipeline.plates.outline import PressedOutline

@@ -1,19 +1,20 @@
 """Time, memory and unknowns of a run before its start, and its check against free memory."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from validate.errors import ValidateError
 from validate.fem.linear_solvers.factor import solvable_bytes
-from validate.memory import MemoryShortError, free_memory
+from validate.memory import MemoryShortError
 from validate.parameters import Parameter, describe, with_values
 from validate.pipeline.checks.checks import variants_of
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.origins import opened
+from validate.pipeline.run.cost import NODAL_MEAN, linear_seconds, newton_seconds
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Recording
 from validate.scene.scene import Scene
@@ -118,49 +119,3 @@ def _estimated(experiment: Experiment) -> RunEstimate | None:
         largest = max(largest, N)
         memory = max(memory, solvable_bytes(N, scene.mesh.dimension) * (1 if linear else 3))
     return RunEstimate(seconds, _PROGRAM + memory, largest)
-
-
-# --- computing time of a body's runs, estimated from its unknowns before a solve -----------------
-
-_Level = TypeVar("_Level")
-
-#: Shares of the time of a first answer, s: the judged runs, the meshes of u_num, uncertain inputs.
-RUNS, MESHES, INPUTS = 12.0, 16.0, 8.0
-FEWEST_STATES = 8
-#: Unknowns that cost as much as one of nodal mean dilatation, whose rows reach two cells far:
-#: measured on blocks of 2 000 to 28 000 unknowns (2.7 times the time of other tetrahedra).
-NODAL_MEAN = 1.75
-
-
-def linear_seconds(unknowns: float) -> float:
-    """Return the time s of one linear static solution with all its load steps."""
-    return 2e-5 * unknowns + 1.6e-9 * unknowns**2
-
-
-def newton_seconds(unknowns: float) -> float:
-    """Return the time s of one load step at large strain, of two factorisations."""
-    return 4e-5 * unknowns + 18e-9 * unknowns**2
-
-
-def affordable(
-    levels: Sequence[_Level], unknowns: Sequence[float], *, budget: bool
-) -> tuple[_Level, ...]:
-    """Return the levels of a mesh file whose systems fit into the memory and, where there is a
-    `budget`, into the time of a first answer."""
-    limit = MESHES if budget else None
-    pairs = zip(levels, unknowns, strict=True)
-    return tuple(level for level, N in pairs if fits(N, linear_seconds(N), limit))
-
-
-def states_within(seconds: float, unknowns: float, wanted: int) -> int:
-    """Return how many load steps at large strain fit, from `FEWEST_STATES` to `wanted`."""
-    fit = int(seconds / newton_seconds(unknowns))
-    return max(min(FEWEST_STATES, wanted), min(wanted, fit))
-
-
-def fits(unknowns: float, seconds: float, limit: float | None) -> bool:
-    """Return whether a system in space fits into the memory, and its run into the limit s."""
-    free = free_memory()
-    if free is not None and solvable_bytes(unknowns, 3) >= free:
-        return False
-    return limit is None or seconds <= limit

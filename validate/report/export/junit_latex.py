@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from validate.compare.exhibit import Entry, NumberTable, TableCell
 from validate.numbers import MISSING, significant
 from validate.report.export.tables import sheet, word_columns
-from validate.report.stored.folder import Json
+from validate.report.stored.json_values import Json
 
 _FAILS = ("not good enough", "undecided", "differs", "no answer", "nothing compared")
 _NO_EVIDENCE = ("fitted", "same model")

@@ -9,7 +9,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
-from validate.fem.assembly.locate import cell_fields
+from validate.fem.assembly.cell_fields import cell_fields
 from validate.files import safe_name
 from validate.register.markers.markers import MarkerObservation
 from validate.report.sections.observations import markers_seen

@@ -31,8 +31,9 @@ from validate.errors import RecordingError
 from validate.files import LARGEST, json_value, read_bytes
 from validate.report.export import parquet
 from validate.report.long_table import LongTable, long_table, traces_of
-from validate.report.stored.folder import MARK, Json
-from validate.report.stored.store import exhibit_rows
+from validate.report.stored.exhibit_rows import exhibit_rows
+from validate.report.stored.folder import MARK
+from validate.report.stored.json_values import Json
 
 PARQUET, CSV = "results.parquet", "results.csv.gz"
 _LAST = (POINT, SAMPLE)  # parts that are read only where they are asked for

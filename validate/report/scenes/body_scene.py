@@ -11,7 +11,8 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.compare.result import MethodResult, Result
-from validate.fem.assembly.locate import cell_fields, probe_rows
+from validate.fem.assembly.cell_fields import cell_fields
+from validate.fem.assembly.locate import probe_rows
 from validate.numbers import significant, spaced, with_unit
 from validate.register.clocks import interpolated
 from validate.register.markers.displacements import DisplacementObservation

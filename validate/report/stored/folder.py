@@ -1,4 +1,4 @@
-"""Result folders: written beside their place, synced and exchanged; their JSON and figures.
+"""Result folders: written beside their place, synced, and exchanged when complete.
 
 One process writes a folder at a time, by a lock that ends with it. What an interrupted process left
 is put back or removed by the next one that takes the lock.
@@ -9,30 +9,18 @@ import errno
 import fcntl
 import json
 import logging
-import math
 import os
-import re
 import shlex
 import shutil
 import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
-from functools import partial
 from glob import escape
-from io import BytesIO
 from pathlib import Path
-from typing import Any
 from uuid import uuid4
 
-import numpy as np
-from matplotlib.figure import Figure
-from PIL import Image
-
-from validate.checksums import sealed
-from validate.compare.exhibit import Pixels
 from validate.engine.execution import CELLS
 from validate.errors import UsageError
 from validate.places import (
@@ -44,8 +32,6 @@ from validate.places import (
     try_folder,
     why_not,
 )
-from validate.report.charts.style import painted
-from validate.report.stored.environment import without_folder
 
 MARK = "results.json"  # what tells a report folder from a folder of the user
 STUDIES = "study-*"  # what a new report leaves, as it does `CELLS`
@@ -313,72 +299,3 @@ def _inside(folder: Path) -> list[Path]:
     names = [f".{STUDIES}.{what}-????????" for what in _LEFT]
     names += [f".{CELLS}.try-????????", f"{STUDIES}/.{CELLS}.try-????????"]
     return sorted(p for name in names for p in folder.glob(name))
-
-
-# --- pictures of a stored run or study as figures, for notebooks ---------------------------------
-
-_DPI = 130
-
-
-def figure_of_file(file: Path) -> Figure:
-    """Return a picture as a figure of its size."""
-    with Image.open(file) as image:
-        return figure_of_pixels(np.asarray(image.convert("RGB")))
-
-
-def figure_of_pixels(pixels: Pixels) -> Figure:
-    """Return an image (h, w, 3) sRGB as a figure of its size."""
-
-    def paint(figure: Figure) -> None:
-        figure.set_layout_engine("none")
-        figure.add_axes((0.0, 0.0, 1.0, 1.0)).set_axis_off()
-        figure.axes[0].imshow(pixels)
-
-    height, width, _ = pixels.shape
-    return painted(paint, width / _DPI, height / _DPI)
-
-
-def shown_in_notebooks(figure: Figure) -> Figure:
-    """Return the figure, which a notebook then shows without a set-up of matplotlib."""
-    vars(figure)["_repr_png_"] = partial(_png, figure)
-    return figure
-
-
-def _png(figure: Figure) -> bytes:
-    out = BytesIO()
-    figure.savefig(out, format="png", dpi=_DPI)
-    return out.getvalue()
-
-
-# --- JSON values: dataclasses as objects, no non-finite number, no absolute path -----------------
-
-Json = dict[str, Any]
-_NUMBERS_ONLY = re.compile(r"\[\s+(-?[\d.eE+-]+(?:,\s+-?[\d.eE+-]+)*)\s+\]")
-
-
-def recorded(value: object) -> Any:
-    """Return the value as JSON can hold it; the fields of a dataclass by their names."""
-    if is_dataclass(value):
-        return members(value)
-    if isinstance(value, (list, tuple)):
-        return [recorded(v) for v in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return without_folder(value)
-
-
-def members(value: object, *names: str) -> Json:
-    """Some of an object's members by their names; all fields of a dataclass without names."""
-    return {name: recorded(getattr(value, name)) for name in names or _fields(value)}
-
-
-def _fields(value: object) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(value)) if is_dataclass(value) else ()
-
-
-def write_json(content: Json, path: Path) -> None:
-    """The document as text, sealed; a NaN that slipped through is a bug: `ValueError`."""
-    text = json.dumps(sealed(content), allow_nan=False, ensure_ascii=False, indent=1)
-    # No string holds a line break, so only arrays match.
-    text = _NUMBERS_ONLY.sub(lambda m: "[" + " ".join(m.group(1).split()) + "]", text)
-    path.write_text(text + "\n", encoding="utf-8")

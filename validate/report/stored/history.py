@@ -14,7 +14,8 @@ from validate.errors import RecordingError
 from validate.files import json_value
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, checks_of, long_table
-from validate.report.stored.folder import MARK, Json
+from validate.report.stored.folder import MARK
+from validate.report.stored.json_values import Json
 
 LINES = "history.jsonl"
 LOG = logging.getLogger(__name__)

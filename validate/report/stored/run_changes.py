@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from validate.errors import UsageError
-from validate.report.stored.folder import Json
 from validate.report.stored.history import LINES, lines_of
+from validate.report.stored.json_values import Json
 from validate.report.stored.tables import is_called
 
 BEYOND = 2.0  # standard uncertainties of the difference: as a check's |E| against u_val

@@ -20,9 +20,9 @@ from validate.errors import RecordingError, UsageError
 from validate.parameters import nearest_names
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, frame
+from validate.report.stored.exhibit_rows import stored_exhibits
 from validate.report.stored.folder import MARK
 from validate.report.stored.history import current
-from validate.report.stored.store import stored_exhibits
 from validate.report.views.drawers import drawable
 from validate.report.views.standard import VIEWS
 from validate.report.views.view_filling import explained, filled_views

@@ -1,17 +1,13 @@
-"""Output of views and report items: files, figures, HTML, terminal text in a given width.
+"""Output of views and report items: files, figures, HTML, terminal text.
 
 Each takes an exhibit, and the run whose methods have their colours.
 """
 
-import math
-import os
-import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from itertools import cycle
 from pathlib import Path
 from string import ascii_lowercase
-from textwrap import wrap
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import plotille
@@ -20,6 +16,8 @@ from validate.compare.exhibit import Chart, Exhibit, Heat, Intervals, NumberTabl
 from validate.errors import UsageError
 from validate.numbers import significant
 from validate.report.export.tables import Row, chart_rows, sheet, write_csv
+from validate.report.views.bars import bar, legend
+from validate.report.views.layout import laid, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,8 +27,8 @@ if TYPE_CHECKING:
 
 # --- A chart in characters. The only file that imports plotille.
 
-_HIGH, _AXIS = 14, 24  # lines of a chart; columns that its axis and the margin take
 _LEAST = 20  # columns of the area
+_HIGH, _AXIS = 14, 24  # lines of a chart; columns that its axis and the margin take
 
 
 def plotted(chart: Chart, width: int) -> list[str]:
@@ -211,134 +209,5 @@ def _bars(one: Intervals, width: int) -> list[str]:
 
 # --- error, uncertainty and limit as one bar of characters ---------------------------------------
 
-_BAR = 14  # characters of a bar
-_LIMIT = 10  # of them up to the limit
 
-
-def bar(error: float, doubt: float, limit: float) -> str:
-    """Return an error, `doubt` above it, and a limit, all in one unit, as characters.
-
-    The limit always stands at the same place; what goes beyond the bar ends in ">". An error or a
-    doubt that is not finite fills the bar.
-    """
-    full, soft, mark = _characters()
-    size = abs(error) if math.isfinite(error) else math.inf
-    reach = size + (doubt if math.isfinite(doubt) else math.inf)
-    places = [(i + 0.5) * limit / _LIMIT for i in range(_BAR)]
-    text = "".join(full if x < size else soft if x < reach else " " for x in places)
-    text = f"{text[:_LIMIT]}{mark}{text[_LIMIT:]}"
-    return f"{text[:-1]}>" if reach > _BAR / _LIMIT * limit else text
-
-
-def legend(limit: str) -> str:
-    """What the characters of a bar are."""
-    full, soft, mark = _characters()
-    return f"{full} error, {soft} 2 u_val, {mark} {limit}"
-
-
-def _characters() -> tuple[str, str, str]:
-    unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().startswith("utf")
-    return ("█", "░", "│") if unicode else ("#", "-", "|")
-
-
-# --- tables and sentences in a given width, with unbroken words ----------------------------------
-
-_WIDTH = 80  # columns where neither COLUMNS nor a terminal says how many there are
-_GAP = "  "
 _NARROWEST = 28  # characters of a column of sentences: a narrower one is a ribbon
-_BELOW = "    "  # before what has no room beside the rest of its row
-
-
-def width(stream: TextIO) -> int:
-    """COLUMNS, else those of the terminal that the stream is, else 80."""
-    given = os.environ.get("COLUMNS", "")
-    if given.isdigit() and int(given) > 0:
-        return int(given)
-    try:
-        return os.get_terminal_size(stream.fileno()).columns or _WIDTH
-    except (OSError, ValueError):  # a pipe, a file, no stream of the system
-        return _WIDTH
-
-
-def wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """Lines of at most `width`, longer only where a single word is; `indent` from the second on."""
-    return [
-        line
-        for part in text.split("\n")
-        for line in wrap(
-            part, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-        ) or [""]
-    ]  # fmt: skip
-
-
-def laid(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[str]:
-    """Return a table as lines, as flat as the width allows.
-
-    Columns of sentences share what the others leave. Where that is too little, the last of them
-    goes below its row; where even names and numbers have no room, each row becomes a paragraph.
-    """
-    columns = range(len(head))
-    found = _aligned(head, rows, width, columns)
-    if found is None and (last := _last_sentences(head, rows)) is not None:
-        found = _aligned(head, rows, width, [c for c in columns if c != last], last)
-    return found or [line for row in rows for line in _paragraph(head, row, width)]
-
-
-def _aligned(
-    head: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    width: int,
-    columns: Sequence[int],
-    below: int | None = None,
-) -> list[str] | None:
-    """The columns side by side, that of `below` under each row; None where they have no room."""
-    widths = _widths([head[c] for c in columns], [[row[c] for c in columns] for row in rows], width)
-    if widths is None:
-        return None
-    found = list(_side_by_side([head[c] for c in columns], widths))
-    for row in rows:
-        found += _side_by_side([row[c] for c in columns], widths)
-        if below is not None and row[below]:
-            found += wrapped(_BELOW + row[below], width, _BELOW)
-    return found
-
-
-def _widths(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[int] | None:
-    """Of every column; sentences are cut down to one common width, the largest that fits."""
-    natural, least = [], []
-    for name, *cells in zip(head, *rows, strict=True):
-        words = max(max(map(len, text.split()), default=0) for text in (name, *cells))
-        longest = max(map(len, cells))
-        natural.append(max(len(name), longest))
-        least.append(max(words, _NARROWEST if _sentences(cells) else longest))
-    room = width - len(_GAP) * (len(natural) - 1)
-    caps = ([max(low, min(n, cap)) for low, n in zip(least, natural, strict=True)]
-            for cap in range(max(natural), 0, -1))  # fmt: skip
-    return next((found for found in caps if sum(found) <= room), None)
-
-
-def _sentences(column: Sequence[str]) -> bool:
-    return max(map(len, column)) > _NARROWEST and any(" " in cell for cell in column)
-
-
-def _last_sentences(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int | None:
-    """The last column that may go below its row; the first one names it and stays."""
-    soft = [c for c in range(1, len(head)) if _sentences([row[c] for row in rows])]
-    return soft[-1] if soft else None
-
-
-def _side_by_side(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
-    parts = [wrapped(cell, w) for cell, w in zip(cells, widths, strict=True)]
-    for i in range(max(map(len, parts))):
-        line = [part[i] if i < len(part) else "" for part in parts]
-        yield _GAP.join(f"{t:<{w}}" for t, w in zip(line, widths, strict=True)).rstrip()
-
-
-def _paragraph(head: Sequence[str], row: Sequence[str], width: int) -> list[str]:
-    """The first cell, then the others with their names."""
-    named = [f"{h}: {cell}" if h else cell for h, cell in zip(head[1:], row[1:], strict=True)]
-    rest = "; ".join(text for text, cell in zip(named, row[1:], strict=True) if cell)
-    return [
-        *wrapped(row[0], width, _BELOW),
-        *(wrapped(_BELOW + rest, width, _BELOW) if rest else []),
-    ]

@@ -1,13 +1,8 @@
 """Small scenes with exact solutions: capabilities and accuracy of an external simulator."""
 
-import os
-import resource
-import signal
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -216,29 +211,3 @@ def _ringing() -> SmallScene:
 def _shaped(mesh: Mesh, facets: str, field_: Floats, name: str = "base") -> Drive:
     shape = DriveShape(field_[mesh.facet_nodes(facets)])
     return Drive(name, facets, (1.0, 0.0, 0.0), shape=shape)
-
-
-# --- a program within limits: its exit code and peak memory --------------------------------------
-
-
-def become(command: list[str], memory: int, size: int) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-    try:
-        os.execvp(command[0], command)
-    except OSError as error:
-        print(f"{command[0]}: {error.strerror}", flush=True)
-        os._exit(127)
-
-
-if __name__ == "__main__":
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    child = os.fork()
-    if child == 0:
-        become(sys.argv[4:], int(sys.argv[1]), int(sys.argv[2]))
-    _, status, used = os.wait4(child, 0)
-    Path(sys.argv[3]).write_text(str(1024 * used.ru_maxrss), "ascii")
-    if os.WIFSIGNALED(status):
-        signal.signal(os.WTERMSIG(status), signal.SIG_DFL)
-        os.kill(os.getpid(), os.WTERMSIG(status))
-    raise SystemExit(os.waitstatus_to_exitcode(status))

@@ -22,7 +22,7 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.cavity import volume_form
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.condense import (
     Condensed,
     Imposed,

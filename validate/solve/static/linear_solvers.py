@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.kernels.threads import compiled
+from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.factor import factorise
 
 

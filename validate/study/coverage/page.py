@@ -8,7 +8,7 @@ from typing import Any
 
 from validate.compare.coverage import FALSE_ACCEPTANCE, LEAST, MOST, Share
 from validate.compare.exhibit import Chart, Emphasis, Entry, Exhibit, NumberTable, TableCell
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 from validate.report.views.view_filling import Shown, chart, grouped, sized, table
 from validate.study.coverage.plan import CHECKS, WRONG
 from validate.study.coverage.study import Coverage, Power, Quantity

@@ -12,7 +12,7 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, Heat, NumberTable, S
 from validate.engine.cell import Record
 from validate.parameters import describe
 from validate.pipeline.experiment.options import Options, configure
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 from validate.report.views.view_filling import Shown, chart, grouped, objects, table
 from validate.study.filters.plan import METHODS, FilterCell
 from validate.study.filters.ranking import NEAR, SAME_TIME, Ranked, Ranking

@@ -42,7 +42,7 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, all_methods, configure
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.run.job import Job, file_sha256, study_folder
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 from validate.report.views.view_filling import Shown, sized, table
 from validate.study.study_page import Findings
 

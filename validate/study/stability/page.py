@@ -10,7 +10,7 @@ import numpy as np
 from validate.compare.exhibit import Exhibit, Mark, NumberTable, Panel, RegimeMap
 from validate.engine.cell import Record
 from validate.pipeline.ladder.ladder import PaperSetting, Turned
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 from validate.report.views.view_filling import Shown, table
 from validate.study.stability.cell import DRIFT_STEPS, STEPS, Stepped
 from validate.study.stability.plan import StabilityCell, axis, drift_variant

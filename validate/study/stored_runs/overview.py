@@ -12,7 +12,7 @@ from validate.errors import UsageError
 from validate.report.stored.run_changes import PastRun, Since, history, since
 from validate.report.stored.tables import report_folders
 from validate.report.views.view_filling import WORDS
-from validate.study.study_page import write_loose
+from validate.study.loose_page import write_loose
 
 FOLDER = "overview"
 _OVER = {

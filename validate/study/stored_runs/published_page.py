@@ -17,7 +17,7 @@ from validate.report.long_table import long_table
 from validate.report.stored.folder import MARK
 from validate.report.views.standard import view_of
 from validate.report.views.view_filling import filled
-from validate.study.study_page import write_loose
+from validate.study.loose_page import write_loose
 
 Json = dict[str, Any]
 LOG = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ from validate.report.long_table import LongTable, long_table
 from validate.report.stored.folder import MARK
 from validate.report.stored.store import SCHEMA_VERSION
 from validate.report.views.view_filling import table
-from validate.study.study_page import write_loose
+from validate.study.loose_page import write_loose
 
 T = TypeVar("T")
 

@@ -17,10 +17,10 @@ from validate.errors import RecordingError, UsageError
 from validate.numbers import scale, shown_unit, significant, text, to_decimal_of, with_unit
 from validate.report.export.table_file import stored_table
 from validate.report.long_table import LongTable, checks_of
-from validate.report.stored.folder import Json
+from validate.report.stored.json_values import Json
 from validate.report.stored.tables import report_folders
 from validate.report.views.view_filling import Shown, chart, grouped, table, value
-from validate.study.study_page import write_loose
+from validate.study.loose_page import write_loose
 
 # --- predictions of stored runs, and why others do not count -------------------------------------
 

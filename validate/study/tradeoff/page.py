@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from validate.compare.exhibit import NumberTable
-from validate.report.stored.folder import members
+from validate.report.stored.json_values import members
 from validate.report.views.view_filling import Shown, table
 from validate.study.choose.exhibits import choose_exhibits, words
 from validate.study.choose.study import Choice, error_of
