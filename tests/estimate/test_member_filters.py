@@ -20,7 +20,7 @@ from validate.estimate.ensemble.ensemble_kf import EnsembleKf, along_mesh, gaspa
 from validate.estimate.ensemble.member_filter import MemberModel, MemberStepper
 from validate.estimate.ensemble.members import doubts, parts
 from validate.estimate.ensemble.roukf import Roukf, reduced_update, spread, unit_points
-from validate.estimate.filterpy.filters import UnscentedKalmanFilter
+from validate.estimate.filterpy.classes import UnscentedKalmanFilter
 from validate.estimate.kalman.formulas import (
     Gaussian,
     Reach,

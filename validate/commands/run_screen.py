@@ -245,6 +245,3 @@ def _next(result: Result, name: str) -> Iterator[str]:
 
 def _filters(result: Result) -> bool:
     return any("nis" in m.run.traces for m in result.methods)
-
-
-# --- in full --------------------------------------------------------------------------------------

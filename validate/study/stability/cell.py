@@ -271,6 +271,3 @@ def _locking(pulled: Scene) -> float | None:
     system = build(pulled)
     f = system.loads[system.free, 0]
     return float(f @ system.factor().solve(f)) / mixed
-
-
-# --- kept ----------------------------------------------------------------------------------------
