@@ -187,3 +187,12 @@ def test_a_private_name_in_a_test_has_its_reason(project_root: Path) -> None:
     assert {n: v for n, v in left.items() if v != ["_arrays", "_density", "_exit"]} == {}
     stale = {f.name: sorted(n) for f in files if (n := _reasons(f) - _private_names(f))}
     assert stale == {}
+
+
+def test_refusals_pin_key_and_number_not_wording(project_root: Path) -> None:
+    """What `match` holds of a message has at most 44 letters: a better sentence breaks no test."""
+    match = re.compile(r'\bmatch=\s*[rf]*"((?:[^"\\]|\\.)*)"')
+    texts = (
+        (f, t) for f in (project_root / "tests").rglob("*.py") for t in match.findall(f.read_text())
+    )
+    assert [(f.name, t) for f, t in texts if len(re.sub(r"{.*?}|\\\\", "", t)) > 44] == []
