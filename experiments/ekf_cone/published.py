@@ -1,6 +1,6 @@
 """Figures of paper 003, section 3.4, for the cone."""
 
-from validate.compare.published import INPUT, Figure, uncompared
+from validate.compare.published import Figure
 
 from ..ekf_cube.published import NO_UNIT, count, fields_near, held_errors, noise_left
 
@@ -34,18 +34,18 @@ CONE_FIGURES = (
         "Poisson ratio", None, 0.5, None, "1", "not reproducible as printed",
         "lambda = E nu / ((1 + nu)(1 - 2 nu)) is infinite at 0.5", "section 3.4, eq 8",
     ),
-    uncompared("bottom diameter", 0.068, "m", "section 3.4", _MEASURED),
-    uncompared("top diameter", 0.058, "m", "section 3.4", _MEASURED),
-    uncompared("height of the cone", 0.028, "m", "section 3.4", _MEASURED),
-    uncompared("density of Ecoflex 0030", 1060.0, "kg/m3", "section 3.4", _MEASURED),
-    uncompared(
+    Figure.uncompared("bottom diameter", 0.068, "m", "section 3.4", _MEASURED),
+    Figure.uncompared("top diameter", 0.058, "m", "section 3.4", _MEASURED),
+    Figure.uncompared("height of the cone", 0.028, "m", "section 3.4", _MEASURED),
+    Figure.uncompared("density of Ecoflex 0030", 1060.0, "kg/m3", "section 3.4", _MEASURED),
+    Figure.uncompared(
         "force on the top face", 0.15, "N", "section 3.4",
         "an input: as a total it moves this cone by less than the noise (see the force "
         "readings); the recording has 15 N as well",
     ),
-    uncompared("initial displacement of the cone", 0.0, "m", "section 3.4", INPUT),
-    uncompared("initial error covariance of the cone", 1e-3, "1", "section 3.4", NO_UNIT),
-    uncompared(
+    Figure.uncompared("initial displacement of the cone", 0.0, "m", "section 3.4", Figure.INPUT),
+    Figure.uncompared("initial error covariance of the cone", 1e-3, "1", "section 3.4", NO_UNIT),
+    Figure.uncompared(
         "Fig. 5 (a, d): mesh and machine", None, "1", "section 3.4, Fig. 5",
         "a drawing and a photograph: mesh, log and sensor are not printed",
     ),

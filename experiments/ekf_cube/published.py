@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from validate.compare.published import INPUT, Figure, Values, uncompared
+from validate.compare.published import Figure, Values
 
 PRINTED_STEP, PRINTED_LIVER_STEP = 1e-3, 1e-4  # s
 
@@ -140,25 +140,25 @@ CUBE_FIGURES = (
     _reached("implicit", 30, 600.0),
     _reached("filter", 1000, 400.0),
     _reached("implicit", 1000, 30.0),
-    uncompared(
+    Figure.uncompared(
         "Fig. 1: the algorithm", None, "1", "section 2.3, Fig. 1",
         "a diagram: ekf_printed takes its steps i to iv; eq 15 prints one U too many, and eq 28's "
         "Jacobian is that of z",
     ),
-    uncompared("side of the cube", 0.1, "m", "section 3.1", INPUT),
-    uncompared("density of the cube", 1000.0, "kg/m3", "section 3.1", INPUT),
-    uncompared("Young's modulus", 30e3, "Pa", "section 3.1", INPUT),
-    uncompared("Poisson ratio", 0.49, "1", "section 3.1", INPUT),
-    uncompared(
+    Figure.uncompared("side of the cube", 0.1, "m", "section 3.1", Figure.INPUT),
+    Figure.uncompared("density of the cube", 1000.0, "kg/m3", "section 3.1", Figure.INPUT),
+    Figure.uncompared("Young's modulus", 30e3, "Pa", "section 3.1", Figure.INPUT),
+    Figure.uncompared("Poisson ratio", 0.49, "1", "section 3.1", Figure.INPUT),
+    Figure.uncompared(
         "force on the left face", 0.5, "N", "section 3.1",
         "an input, read as a total; on every node it goes beyond the law's validity, see the force "
         "readings",
     ),
-    uncompared("initial displacement", 0.0, "m", "section 3.1", INPUT),
-    uncompared("initial error covariance", 1e-3, "1", "section 3.1", NO_UNIT),
-    uncompared("process noise covariance", 0.1, "1", "section 3.1", NO_UNIT),
-    uncompared("measurement noise covariance", 1e-3, "1", "section 3.1", NO_UNIT),
-    uncompared(
+    Figure.uncompared("initial displacement", 0.0, "m", "section 3.1", Figure.INPUT),
+    Figure.uncompared("initial error covariance", 1e-3, "1", "section 3.1", NO_UNIT),
+    Figure.uncompared("process noise covariance", 0.1, "1", "section 3.1", NO_UNIT),
+    Figure.uncompared("measurement noise covariance", 1e-3, "1", "section 3.1", NO_UNIT),
+    Figure.uncompared(
         "Fig. 2 (a): loaded face, A and B", None, "1", "section 3.1, Fig. 2",
         "printed in words too, and taken so: the middles of the left and of the top face",
     ),
@@ -167,8 +167,8 @@ CUBE_FIGURES = (
         "section 3.1, Fig. 2", float(np.sqrt(1e-9)), "",
         "; the printed RMSE at A is .68 of a noise of .001 mm2",
     ),
-    uncompared("rate of visual feedback", 30.0, "Hz", "section 3.3", _DEMAND),
-    uncompared("rate of haptic feedback", 1000.0, "Hz", "section 3.5", _DEMAND),
-    uncompared("clock of the processor", 2.2e9, "Hz", "section 3.3", _MACHINE),
-    uncompared("memory of the computer", 16e9, "B", "section 3.3", _MACHINE),
+    Figure.uncompared("rate of visual feedback", 30.0, "Hz", "section 3.3", _DEMAND),
+    Figure.uncompared("rate of haptic feedback", 1000.0, "Hz", "section 3.5", _DEMAND),
+    Figure.uncompared("clock of the processor", 2.2e9, "Hz", "section 3.3", _MACHINE),
+    Figure.uncompared("memory of the computer", 16e9, "B", "section 3.3", _MACHINE),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validate.compare.published import Figure, Values, uncompared
+from validate.compare.published import Figure, Values
 
 from ..ekf_cube.published import (
     PRINTED_LIVER_STEP,
@@ -89,7 +89,7 @@ def _figures(ours: Ours) -> tuple[Figure, ...]:
             "time step", "told:critical_step", PRINTED_LIVER_STEP, None, "s", "not comparable",
             _sound, "section 3.2", ours.critical, 1e-6, setting=True,
         ),
-        uncompared(
+        Figure.uncompared(
             "force on the right lobe", 0.5, "N", "section 3.2",
             "an input, read as a total: on every node it has no static solution here, see the "
             "force readings",
@@ -99,7 +99,7 @@ def _figures(ours: Ours) -> tuple[Figure, ...]:
             "not printed; MAE, RMSE and SD of Table 2 go together for 186 to 343 samples, 19 to 34 "
             "ms at the printed step; ours takes the cube's 0.15 s", "section 3.2", 0.15, 1e-9,
         ),
-        uncompared(
+        Figure.uncompared(
             "Fig. 3 (a): held and loaded nodes", None, "1", "section 3.2, Fig. 3",
             "drawn, not printed: ours follow rules, and the report draws them",
         ),

@@ -1,6 +1,6 @@
 """Figures of paper 000, section 3.3, for the planar block."""
 
-from validate.compare.published import Figure, setting
+from validate.compare.published import Figure
 from validate.solve.fluid.pressure_loop import PressureLoop
 
 from .block import PressedBlock
@@ -32,22 +32,22 @@ FIGURES = (
     ),
     _drawn("updates to 1 %, cold start, .3..15 % strain, under a patch", "patch.cold", 1.0, "1",
            "section 3.3", _ASSUMED),
-    setting("width of the block", 0.05, SCENE.body.width, "m", "section 3.3"),
-    setting("height of the block", 0.05, SCENE.body.height, "m", "section 3.3"),
+    Figure.of_setup("width of the block", 0.05, SCENE.body.width, "m", "section 3.3"),
+    Figure.of_setup("height of the block", 0.05, SCENE.body.height, "m", "section 3.3"),
     Figure(
         "thickness of the block", None, 0.012, None, "m", "not comparable",
         "plane: forces are per metre, and a thickness changes neither pressure nor volume ratio",
         "section 3.3", setting=True,
     ),
-    setting("modulus of the block", 34e3, SCENE.material.E, "Pa", "section 3.3"),
-    setting("Poisson ratio of the block", 0.35, SCENE.material.nu, "1", "section 3.3"),
-    setting("least strain", 0.003, _P.strains[0], "1", "section 3.3",
-            "read as displacement over height"),
-    setting("largest strain", 0.15, _P.strains[-1], "1", "section 3.3",
-            "read as displacement over height"),
-    setting("tolerance of the volume", 0.01, PressureLoop().tolerance, "1", "section 3.3"),
-    setting("least volume of the curve", 0.7, float(RATIOS[0]), "1", "section 3.3"),
-    setting("largest volume of the curve", 1.3, float(RATIOS[-1]), "1", "section 3.3"),
+    Figure.of_setup("modulus of the block", 34e3, SCENE.material.E, "Pa", "section 3.3"),
+    Figure.of_setup("Poisson ratio of the block", 0.35, SCENE.material.nu, "1", "section 3.3"),
+    Figure.of_setup("least strain", 0.003, _P.strains[0], "1", "section 3.3",
+                    "read as displacement over height"),
+    Figure.of_setup("largest strain", 0.15, _P.strains[-1], "1", "section 3.3",
+                    "read as displacement over height"),
+    Figure.of_setup("tolerance of the volume", 0.01, PressureLoop().tolerance, "1", "section 3.3"),
+    Figure.of_setup("least volume of the curve", 0.7, float(RATIOS[0]), "1", "section 3.3"),
+    Figure.of_setup("largest volume of the curve", 1.3, float(RATIOS[-1]), "1", "section 3.3"),
     _drawn("Fig. 4a: the curve is not linear, largest departure", "off.line", None, "Pa",
            "section 3.3, Fig. 4a"),
     _drawn("Fig. 4a: R2 of its line", "r_squared", None, "1", "section 3.3, Fig. 4a",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from validate.compare.published import MACHINE, Figure, Values, drawn, setting, uncompared
+from validate.compare.published import Figure, Values
 
 from .block import PulledBlock
 from .scene import SCENE
@@ -15,40 +15,40 @@ _A, _B, _ = (probe.point[2] for probe in SCENE.probes)
 _BELOW = _A - _B
 
 STATED = (
-    uncompared("Fig. 1: block diagram of the filter", None, "1", "section 2.2, Fig. 1",
-               "a diagram; `kf_dense` is what it draws"),
-    setting("width of the block", 0.004, _WIDE, "m", _TABLE),
-    setting("depth of the block", 0.004, _DEEP, "m", _TABLE),
-    setting("height of the block", 0.007, _HIGH, "m", _TABLE),
-    setting("analysis time", 1.0, _P.clock.steps * _P.clock.dt, "s", _TABLE),
-    setting("time increment", 0.002, _P.clock.dt, "s", _TABLE),
-    setting("applied force over its area", 3000.0, _P.loading.traction, "Pa", _TABLE,
+    Figure.uncompared("Fig. 1: block diagram of the filter", None, "1", "section 2.2, Fig. 1",
+                      "a diagram; `kf_dense` is what it draws"),
+    Figure.of_setup("width of the block", 0.004, _WIDE, "m", _TABLE),
+    Figure.of_setup("depth of the block", 0.004, _DEEP, "m", _TABLE),
+    Figure.of_setup("height of the block", 0.007, _HIGH, "m", _TABLE),
+    Figure.of_setup("analysis time", 1.0, _P.clock.steps * _P.clock.dt, "s", _TABLE),
+    Figure.of_setup("time increment", 0.002, _P.clock.dt, "s", _TABLE),
+    Figure.of_setup("applied force over its area", 3000.0, _P.loading.traction, "Pa", _TABLE,
             "an input; taken as a consistent traction, because equal nodal forces pull 7 % less"),
-    setting("Rayleigh's alpha 0", 0.0, SCENE.material.mass_damping, "1/s", _TABLE),
-    setting("Rayleigh's alpha 1", 0.1, SCENE.material.stiffness_damping, "s", _TABLE),
-    setting("density", 1068.0, SCENE.material.rho, "kg/m^3", _TABLE),
-    setting("Poisson's ratio", 0.47, SCENE.material.nu, "1", _TABLE),
-    setting("Young's modulus", 10e3, SCENE.material.E, "Pa", _TABLE),
-    setting("edge of an element", 1e-3, _HIGH / SCENE.body.cells[2], "m", "section 3",
-            "an input; the cells' edges, diagonals of the tetrahedra are longer"),
-    uncompared("Fig. 2: mesh with the observation point", None, "1", "section 3, Fig. 2",
-               "a figure without numbers: the report draws ours"),
-    drawn("Fig. 3: noise of the measurement over its range", "told:nrmse.raw", "1",
+    Figure.of_setup("Rayleigh's alpha 0", 0.0, SCENE.material.mass_damping, "1/s", _TABLE),
+    Figure.of_setup("Rayleigh's alpha 1", 0.1, SCENE.material.stiffness_damping, "s", _TABLE),
+    Figure.of_setup("density", 1068.0, SCENE.material.rho, "kg/m^3", _TABLE),
+    Figure.of_setup("Poisson's ratio", 0.47, SCENE.material.nu, "1", _TABLE),
+    Figure.of_setup("Young's modulus", 10e3, SCENE.material.E, "Pa", _TABLE),
+    Figure.of_setup("edge of an element", 1e-3, _HIGH / SCENE.body.cells[2], "m", "section 3",
+                    "an input; the cells' edges, diagonals of the tetrahedra are longer"),
+    Figure.uncompared("Fig. 2: mesh with the observation point", None, "1", "section 3, Fig. 2",
+                      "a figure without numbers: the report draws ours"),
+    Figure.drawn("Fig. 3: noise of the measurement over its range", "told:nrmse.raw", "1",
           "section 3, Fig. 3", "a curve without numbers; mean over the seeds, with the variance "
-          "read as .001 mm2"),
-    setting("depth of evaluation point 2", 0.002, _BELOW, "m", "section 3"),
-    setting("intensity of the measurement noise", 0.001, PRINTED, "1", "section 3",
-            "an input without unit: read as a variance of .001 mm2"),
-    uncompared("clock of the machine", 3.4e9, "Hz", "section 3", MACHINE),
-    uncompared("memory of the machine", 8e9, "1", "section 3", MACHINE),
-    drawn("Fig. 4: error at evaluation point 1", "kf_printed:node_A.nrmse", "1",
+                 "read as .001 mm2"),
+    Figure.of_setup("depth of evaluation point 2", 0.002, _BELOW, "m", "section 3"),
+    Figure.of_setup("intensity of the measurement noise", 0.001, PRINTED, "1", "section 3",
+                    "an input without unit: read as a variance of .001 mm2"),
+    Figure.uncompared("clock of the machine", 3.4e9, "Hz", "section 3", Figure.MACHINE),
+    Figure.uncompared("memory of the machine", 8e9, "1", "section 3", Figure.MACHINE),
+    Figure.drawn("Fig. 4: error at evaluation point 1", "kf_printed:node_A.nrmse", "1",
           "section 3, Fig. 4", "a curve without numbers; over the range, on the shipped twin"),
-    drawn("Fig. 5: error at evaluation point 2", "kf_printed:node_B.nrmse", "1",
+    Figure.drawn("Fig. 5: error at evaluation point 2", "kf_printed:node_B.nrmse", "1",
           "section 3, Fig. 5", "a curve without numbers; over the range: with a perfect model "
-                               "the point follows the prediction of FEM"),
-    setting("steps of the run", 500.0, float(_P.clock.steps), "1", "section 3"),
-    uncompared("'in the first 0.05 seconds'", 0.05, "s", "section 3",
-               "25 steps of 2 ms: compared as steps"),
+                                      "the point follows the prediction of FEM"),
+    Figure.of_setup("steps of the run", 500.0, float(_P.clock.steps), "1", "section 3"),
+    Figure.uncompared("'in the first 0.05 seconds'", 0.05, "s", "section 3",
+                      "25 steps of 2 ms: compared as steps"),
 )  # fmt: skip
 
 

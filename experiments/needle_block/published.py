@@ -3,14 +3,7 @@
 The paper prints few numbers; its figures are curves. Each claim is turned into one number of ours.
 """
 
-from validate.compare.published import (
-    MACHINE,
-    Figure,
-    Values,
-    drawn,
-    setting,
-    uncompared,
-)
+from validate.compare.published import Figure, Values
 from validate.scene.material import Material
 from validate.solve.dynamic.newmark_rule import rule_of
 
@@ -25,11 +18,11 @@ def material(name: str, ours: Material, theirs: tuple[float, ...], place: str) -
     E, nu, rho, alpha, beta = theirs
     assert ours.rho is not None
     return (
-        setting(f"{name}: Young's modulus", E, ours.E, "Pa", place),
-        setting(f"{name}: Poisson ratio", nu, ours.nu, "1", place),
-        setting(f"{name}: density", rho, ours.rho, "kg/m^3", place),
-        setting(f"{name}: Rayleigh damping alpha", alpha, ours.mass_damping, "1/s", place),
-        setting(f"{name}: Rayleigh damping beta", beta, ours.stiffness_damping, "s", place),
+        Figure.of_setup(f"{name}: Young's modulus", E, ours.E, "Pa", place),
+        Figure.of_setup(f"{name}: Poisson ratio", nu, ours.nu, "1", place),
+        Figure.of_setup(f"{name}: density", rho, ours.rho, "kg/m^3", place),
+        Figure.of_setup(f"{name}: Rayleigh damping alpha", alpha, ours.mass_damping, "1/s", place),
+        Figure.of_setup(f"{name}: Rayleigh damping beta", beta, ours.stiffness_damping, "s", place),
     )
 
 
@@ -82,45 +75,49 @@ def ways(body: str, moving: float, whole: float, restricted: float) -> tuple[Fig
 _AVERAGE = rule_of("average", 1.0)
 _SIDE = float(needle_block(2).mesh.nodes.max())
 _STATED = (
-    uncompared("Fig. 1: symmetric difference of two shapes", None, "1", "section III.B, Fig. 1",
-               "a sketch; E_s is exact, and 'Deformed shapes' draws the areas it counts"),
-    uncompared("Fig. 2: block and needle", None, "1", "section IV.A, Fig. 2",
-               "a figure without numbers: 'Deformed shapes' draws ours"),
+    Figure.uncompared("Fig. 1: symmetric difference of two shapes", None, "1",
+                      "section III.B, Fig. 1",
+                      "a sketch; E_s is exact, and 'Deformed shapes' draws the areas it counts"),
+    Figure.uncompared("Fig. 2: block and needle", None, "1", "section IV.A, Fig. 2",
+                      "a figure without numbers: 'Deformed shapes' draws ours"),
     *material("MP1", MP1, (200.0, 0.47, 2000.0, 1.0, 0.1), "section IV.A, Table 1"),
     *material("MP2", MP2, (60e3, 0.495, 1140.0, 1.0, 0.1), "section IV.A, Table 2"),
-    setting("height and width of the block", 1.0, _SIDE, "m", "section IV.A, Tables 1 and 2"),
-    setting("speed of the needle", 0.08, SPEED, "m/s", "section IV.A"),
-    setting("time for which it moves", 2.0, STOP, "s", "section IV.A"),
-    setting("time step", 1 / 30, STEP, "s", "section IV.A"),
-    setting("implicit rule: beta, in the paper's notation", 0.5, 2 * _AVERAGE.b1, "1",
-            "section V.A", "an input; twice the usual beta"),
-    setting("implicit rule: gamma", 0.5, _AVERAGE.g1, "1", "section V.A"),
+    Figure.of_setup("height and width of the block", 1.0, _SIDE, "m",
+                    "section IV.A, Tables 1 and 2"),
+    Figure.of_setup("speed of the needle", 0.08, SPEED, "m/s", "section IV.A"),
+    Figure.of_setup("time for which it moves", 2.0, STOP, "s", "section IV.A"),
+    Figure.of_setup("time step", 1 / 30, STEP, "s", "section IV.A"),
+    Figure.of_setup("implicit rule: beta, in the paper's notation", 0.5, 2 * _AVERAGE.b1, "1",
+                    "section V.A", "an input; twice the usual beta"),
+    Figure.of_setup("implicit rule: gamma", 0.5, _AVERAGE.g1, "1", "section V.A"),
     Figure(
         "order of the integration with gamma = 1/2", "told:order", 2.0, 0.2, "1", "reproduced",
         "of the implicit rod's tip at 1 s, by three steps", "section V.A",
     ),
-    uncompared("Fig. 4: relations of the solvers", None, "1", "section V, Fig. 4",
-               "a diagram; 'Time per step' measures the speeds"),
-    uncompared("clock of the machine", 750e6, "Hz", "section VI", MACHINE),
-    uncompared("memory of the machine", 128e6, "1", "section VI", MACHINE),
-    drawn("Fig. 5: E_n at 2 s, explicit with lumped masses", "told:E_n@2s", "1",
-          "section VI.A, Fig. 5", CURVE),
-    drawn("Fig. 6: E_s at 2 s, explicit with lumped masses", "told:E_s@2s", "1",
-          "section VI.A, Fig. 6", CURVE),
-    drawn("Fig. 7: E_i at 2 s, explicit with lumped masses", "told:E_i@2s", "m^2",
-          "section VI.A, Fig. 7", CURVE),
-    drawn("Fig. 8: E_i at 2 s, quasi-static", "told:E_i@2s.quasi_static", "m^2",
-          "section VI.A, Fig. 8", CURVE),
-    drawn("Fig. 11: E_s at 10 s, implicit with MP1", "told:E_s@10s.MP1", "1",
-          "section VI.B, Fig. 11", f"{CURVE}; the 'different steady-state solution'"),
-    uncompared("Poisson ratio of the incompressible", 0.5, "1", "section VI.B",
+    Figure.uncompared("Fig. 4: relations of the solvers", None, "1", "section V, Fig. 4",
+                      "a diagram; 'Time per step' measures the speeds"),
+    Figure.uncompared("clock of the machine", 750e6, "Hz", "section VI", Figure.MACHINE),
+    Figure.uncompared("memory of the machine", 128e6, "1", "section VI", Figure.MACHINE),
+    Figure.drawn("Fig. 5: E_n at 2 s, explicit with lumped masses", "told:E_n@2s", "1",
+                 "section VI.A, Fig. 5", CURVE),
+    Figure.drawn("Fig. 6: E_s at 2 s, explicit with lumped masses", "told:E_s@2s", "1",
+                 "section VI.A, Fig. 6", CURVE),
+    Figure.drawn("Fig. 7: E_i at 2 s, explicit with lumped masses", "told:E_i@2s", "m^2",
+                 "section VI.A, Fig. 7", CURVE),
+    Figure.drawn("Fig. 8: E_i at 2 s, quasi-static", "told:E_i@2s.quasi_static", "m^2",
+                 "section VI.A, Fig. 8", CURVE),
+    Figure.drawn("Fig. 11: E_s at 10 s, implicit with MP1", "told:E_s@10s.MP1", "1",
+                 "section VI.B, Fig. 11", f"{CURVE}; the 'different steady-state solution'"),
+    Figure.uncompared("Poisson ratio of the incompressible", 0.5, "1", "section VI.B",
                "refused by displacement elements with the reason; mixed ones run to .4999999"),
-    drawn("Picinbono's penalty: least displacement error over its weights", "told:penalty.best",
-          "1", "sections VI.B and VII", "future work in the paper; against the exact "
-                                        "constraint, compared with a high Poisson ratio of "
-                                        "the same critical step"),
-    drawn("diagonal damping: E_n at 2 s of C = αM", "told:damping.papers", "1", "section VII",
-          "future work in the paper; consistent mass, so the damping alone"),
+    Figure.drawn("Picinbono's penalty: least displacement error over its weights",
+                 "told:penalty.best",
+                 "1", "sections VI.B and VII", "future work in the paper; against the exact "
+                                               "constraint, compared with a high Poisson ratio of "
+                                               "the same critical step"),
+    Figure.drawn("diagonal damping: E_n at 2 s of C = αM", "told:damping.papers", "1",
+                 "section VII",
+                 "future work in the paper; consistent mass, so the damping alone"),
 )  # fmt: skip
 
 

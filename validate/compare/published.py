@@ -6,7 +6,7 @@ A figure belongs to the data it was printed for: beside other data it is not com
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal, Self
 
 from validate.errors import ComparisonError
 
@@ -14,10 +14,6 @@ Claim = Literal["reproduced", "not reproduced", "not reproducible as printed", "
 PublishedVerdict = Claim | Literal["moved", "not computed", "other data"]
 Values = Mapping[str, Mapping[str, float]]  # scores by owner (a method, "told", ...) and name
 _WIDEST = 0.1  # of a reference's scale; a wider tolerance decides nothing
-#: Reasons why a printed number is no result that a run could reproduce.
-INPUT = "an input, taken as printed"
-CITED = "cited from other work, not a result of the paper"
-MACHINE = "another machine: ours is in the environment section of the report"
 
 
 @dataclass(frozen=True)
@@ -127,6 +123,35 @@ class Figure:
     other: str = ""
     setting: bool = False
 
+    #: Reasons why a printed number is no result that a run could reproduce.
+    INPUT: ClassVar[str] = "an input, taken as printed"
+    CITED: ClassVar[str] = "cited from other work, not a result of the paper"
+    MACHINE: ClassVar[str] = "another machine: ours is in the environment section of the report"
+
+    @classmethod
+    def of_setup(
+        cls, name: str, theirs: float, ours: float, unit: str, source: str, reason: str = INPUT
+    ) -> Self:
+        """Return the row of a printed number of the set-up, with the one that is used here."""
+        return cls(
+            name, lambda _: ours, theirs, None, unit, "not comparable", reason, source, ours,
+            1e-12 * max(1.0, abs(ours)), setting=True,
+        )  # fmt: skip
+
+    @classmethod
+    def uncompared(
+        cls, name: str, theirs: float | None, unit: str, source: str, reason: str
+    ) -> Self:
+        """Return the row of a printed number or picture without a value of ours beside it."""
+        return cls(
+            name, None, theirs, None, unit, "not comparable", reason, source, setting=True
+        )  # fmt: skip
+
+    @classmethod
+    def drawn(cls, name: str, score: str, unit: str, source: str, reason: str) -> Self:
+        """Return the row of a curve or picture without a printed number, with a score of ours."""
+        return cls(name, score, None, None, unit, "not comparable", reason, source)
+
     def __post_init__(self) -> None:
         numbers = (self.theirs, self.tolerance, self.expected, self.drift)
         if not all(x is None or math.isfinite(x) for x in numbers):
@@ -172,25 +197,3 @@ class Figure:
             self.name, ours, self.theirs, self.tolerance, self.unit, self.claim, reason,
             self.source, self.expected, self.drift, missing, self.window, self.other, self.setting,
         )  # fmt: skip
-
-
-def setting(
-    name: str, theirs: float, ours: float, unit: str, source: str, reason: str = INPUT
-) -> Figure:
-    """Return the row of a printed number of the set-up, with the one that the experiment uses."""
-    return Figure(
-        name, lambda _: ours, theirs, None, unit, "not comparable", reason, source, ours,
-        1e-12 * max(1.0, abs(ours)), setting=True,
-    )  # fmt: skip
-
-
-def uncompared(name: str, theirs: float | None, unit: str, source: str, reason: str) -> Figure:
-    """Return the row of a printed number or picture with which no value of ours is compared."""
-    return Figure(
-        name, None, theirs, None, unit, "not comparable", reason, source, setting=True
-    )  # fmt: skip
-
-
-def drawn(name: str, score: str, unit: str, source: str, reason: str) -> Figure:
-    """Return the row of a curve or picture without a printed number, with a score of ours."""
-    return Figure(name, score, None, None, unit, "not comparable", reason, source)
