@@ -24,7 +24,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.fem.cavity import CavitySurface, volume_form
 from validate.fem.kernels.jit_cache import compiled
-from validate.fem.linear_solvers.condense import condense
+from validate.fem.linear_solvers.condense import Condensed
 from validate.fem.system import build
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
@@ -61,7 +61,7 @@ def phantom() -> Loop:
     fixed = Scene(mesh, Material(15.2e3, 0.485), held, pins, cavities=cavities)
     system = build(fixed)
     top = [mesh.nearest_node(np.array([0.03, 0.045, z])) for z in (0.030, 0.040)]
-    small = condense(system, np.array(top))
+    small = Condensed.of(system, np.array(top))
     A = np.ascontiguousarray(small.compliance)
     at = [3 * int(np.searchsorted(small.nodes, n)) + c for n in top for c in range(3)]
     load = np.linalg.lstsq(A, small.fields[0], rcond=None)[0]

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from validate.arrays import Floats
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.mesh import Kind, Mesh, boundary_facets, kuhn_cells, quadratic
@@ -57,7 +57,9 @@ def phantom_responses(
     dilatation: Dilatation = "pointwise",
 ) -> Responses:
     mesh = phantom_mesh(grid, order)
-    return responses(build(phantom_scene(mesh, E=E, nu=nu, bonded=bonded, dilatation=dilatation)))
+    return Responses.of(
+        build(phantom_scene(mesh, E=E, nu=nu, bonded=bonded, dilatation=dilatation))
+    )
 
 
 def grid_mesh(

@@ -7,9 +7,9 @@ from typing import Any
 
 from validate.datasets.home import data_path
 from validate.errors import RecordingError
+from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.fem.system import responses
-from validate.identify.modulus import CylinderSize, fit_modulus
+from validate.identify.modulus import CylinderSize, ModulusFit
 from validate.parameters import Ranges, known, quantity
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
@@ -99,7 +99,7 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """
     p: LoggedCylinder = tree.settings
     limit: float = getattr(p, f"limit_{scene.material.law}")
-    fit, height = fit_modulus(recording, size(tree), (p.fit_from, p.fit_to)), size(tree).height
+    fit, height = ModulusFit.of(recording, size(tree), (p.fit_from, p.fit_to)), size(tree).height
     d = recording.signal("displacement", "m").y
     reached = float(d.max() - fit.contact) / height - fit.toe
     strains = pairwise((p.fit_from, p.fit_to, *_limits(p)))
@@ -116,5 +116,5 @@ def stiffening(tree: Tree, method: Method) -> float:
     At small strain, where every law is the linear one.
     """
     scene = model_scene(tree, method, E=1.0, law="linear")
-    force = responses(build_system(scene)).reactions[0, 0]
+    force = Responses.of(build_system(scene)).reactions[0, 0]
     return float(force * size(tree).height / size(tree).area)

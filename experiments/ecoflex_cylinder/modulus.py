@@ -15,8 +15,8 @@ from validate.arrays import Floats, rms
 from validate.compare.score import Score
 from validate.errors import ComparisonError
 from validate.fem.system import build as build_system
-from validate.identify.budget import Votes, by_specimen
-from validate.identify.modulus import fit_modulus
+from validate.identify.budget import Votes
+from validate.identify.modulus import ModulusFit
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Identified
 from validate.pipeline.experiment.method import Method
@@ -59,11 +59,11 @@ def identified(
     apart = split(recordings, p.judged)
     mine = [r for r in recordings if apart.calibrates(r)]
     every_log, own_size = with_given(tree, {"judged": None}), size(tree)
-    fits = [fit_modulus(r, own_size, (p.fit_from, p.fit_to)) for r in recordings]
+    fits = [ModulusFit.of(r, own_size, (p.fit_from, p.fit_to)) for r in recordings]
     every, names = ([specimen_of(r) for r in logs] for logs in (recordings, mine))
     calibrating = [f for f, s in zip(fits, every, strict=True) if s in apart.calibrating]
     found = summarised(calibrating, names)
-    own = by_specimen([f.E_apparent for f in calibrating], names)
+    own = Votes.by_specimen([f.E_apparent for f in calibrating], names)
     factors = {name: _stiffening(tree, methods[name]) for name in ("slip", "bonded")}
     laws = {name: _law_fit(mine, every_log, methods[name]) for name in LAWS}
     moduli = {name: found.mean / factor for name, (factor, _) in factors.items()}

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.compare.score import Score
 from validate.errors import RecordingError, UsageError
-from validate.identify.budget import Votes, by_specimen
+from validate.identify.budget import Votes
 from validate.identify.modulus import ModulusFit
 from validate.recording.types import Recording
 
@@ -99,14 +99,14 @@ class ModulusSummary:
 
 def summarised(fits: Sequence[ModulusFit], specimens: Sequence[str]) -> ModulusSummary:
     """The mean over specimens, and its sd by what scatters most: specimens, repeats, the fit."""
-    found = by_specimen([f.E_apparent for f in fits], specimens)
+    found = Votes.by_specimen([f.E_apparent for f in fits], specimens)
     sd_mean = fits[0].sd if found.sd_mean is None else found.sd_mean
     return ModulusSummary(found.mean, found.within, sd_mean, tuple(fits))
 
 
 def left_out(values: Sequence[float], specimens: Sequence[str]) -> tuple[Score, ...]:
     """What the others say of every specimen less its own, relative: leave one specimen out."""
-    means = by_specimen(values, specimens).means
+    means = Votes.by_specimen(values, specimens).means
     found = []
     for name, own in means.items():
         others = [E for other, E in means.items() if other != name]

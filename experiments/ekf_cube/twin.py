@@ -8,7 +8,7 @@ from typing import Any
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
@@ -83,4 +83,4 @@ def record(tree: Tree, progress: Progress) -> Recording:
 def truth(tree: Tree, seen: Registered) -> Truth:
     """The twin's displacements at the steps, and its fields at 200 of them."""
     made = twin_of(tree)
-    return truth_of(made.run(output_frames(tree.settings.clock.steps, 200)), made.scene)
+    return Truth.of(made.run(output_frames(tree.settings.clock.steps, 200)), made.scene)

@@ -14,7 +14,7 @@ import numpy as np
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
@@ -136,7 +136,7 @@ def record(tree: Tree, progress: Progress) -> Recording:
 def truth(tree: Tree, seen: Registered) -> Truth:
     """The twin's displacements at the steps; its fields at 200 of them where it has our mesh."""
     own, made = tree.settings, twin_of(tree)
-    found = truth_of(made.run(output_frames(own.clock.steps, 200)), made.scene)
+    found = Truth.of(made.run(output_frames(own.clock.steps, 200)), made.scene)
     return found if own.twin.halved == 0 else Truth(found.probes)
 
 

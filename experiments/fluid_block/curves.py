@@ -12,8 +12,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Exhibit, NodeMap, NumberTable, Series
 from validate.errors import SceneError
-from validate.fem.cavity import pressure_load, volume_of
-from validate.fem.linear_solvers.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import Condensed
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.tree import Tree
@@ -57,7 +56,7 @@ class PressureCurve:
 def condensed_block(p: Tree, order: int) -> Condensed:
     """The block without a tool, on the walls of its cavities."""
     scene = slab(p, None, {"body.element": "tri6" if order == 2 else "tri3"})
-    return condense(build_system(scene), np.zeros(0, dtype=np.int64))
+    return Condensed.of(build_system(scene), np.zeros(0, dtype=np.int64))
 
 
 def curve_of(small: Condensed, cavity: int = 0) -> PressureCurve:
@@ -76,7 +75,7 @@ def follower_pressures(small: Condensed, cavity: int, guess: Floats) -> Floats:
     the pressure a secant's root. Raises `SceneError` where either does not settle.
     """
     surface, x = small.surfaces[cavity], small.positions
-    A, V0 = small.compliance, volume_of(surface, x)
+    A, V0 = small.compliance, surface.volume(x)
     found, u = np.empty(len(RATIOS)), np.zeros_like(x)
     middle = int(np.argmin(np.abs(RATIOS - 1)))
     for way in (range(middle, len(RATIOS)), range(middle - 1, -1, -1)):
@@ -91,7 +90,7 @@ def _follower(surface, x: Floats, A: Floats, u: Floats, V: float, P: float):  # 
     last, error = None, 0.0
     for _ in range(_TURNS):
         u = _wall(surface, x, A, u, P)
-        error = volume_of(surface, x + u) - V
+        error = surface.volume(x + u) - V
         if abs(error) < 1e-12 * V:
             return P, u
         if last is None or last[1] == error:
@@ -106,7 +105,7 @@ def _follower(surface, x: Floats, A: Floats, u: Floats, V: float, P: float):  # 
 
 def _wall(surface, x: Floats, A: Floats, u: Floats, P: float) -> Floats:  # type: ignore[no-untyped-def]
     for _ in range(_TURNS):
-        new = (A @ (P * pressure_load(surface, x + u)).ravel()).reshape(x.shape)
+        new = (A @ (P * surface.pressure_load(x + u)).ravel()).reshape(x.shape)
         moved, u = float(np.abs(new - u).max()), new
         if moved <= _CLOSE * float(np.ptp(x, axis=0).max()):
             return u

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.fem.linear_solvers.condense import Condensed, condense
+from validate.fem.linear_solvers.condense import Condensed
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress
@@ -36,7 +36,7 @@ def exactness_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, f
 def _small(p: Tree, nu: float) -> tuple[System, Condensed]:
     scene = slab(p, None, {"material.nu": nu})
     system = build_system(scene)
-    return system, condense(system, nodes_of(scene.mesh, "top"))
+    return system, Condensed.of(system, nodes_of(scene.mesh, "top"))
 
 
 def _swaps(p: Tree) -> tuple[NumberTable, float]:

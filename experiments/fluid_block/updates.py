@@ -14,7 +14,6 @@ from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.errors import SceneError
 from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.fem.system import responses as responses_of
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree
 from validate.scene.geometries.hollow_block import HollowBlock
@@ -45,7 +44,7 @@ def pressed(p: Tree, tool: ToolName, finer: int = 1, **cavities: Any) -> Respons
     body: HollowBlock = p.scene.body
     made = replace(body.cavities, **cavities)
     scene = slab(p, tool, {"body.cells": finer * body.cells, "body.cavities": made})
-    return responses_of(build_system(scene))
+    return Responses.of(build_system(scene))
 
 
 def updates_exhibit(p: Tree, progress: Progress) -> tuple[Exhibit, dict[str, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.published import Figure, Values
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
@@ -96,7 +96,7 @@ def _fig_4() -> Responses:
     held = (Support("bottom", (0, 1)),)
     cavity = (Cavity("hole", "cavity"),)
     mesh = square_with_hole(0.05, 0.01, 50)
-    return responses(build(Scene(mesh, Material(34e3, 0.35), held, cavities=cavity)))
+    return Responses.of(build(Scene(mesh, Material(34e3, 0.35), held, cavities=cavity)))
 
 
 @cache
@@ -111,7 +111,7 @@ def _phantom() -> Responses:
         (Drive("stage", "x1", (-1.0, 0.0, 0.0)),),
         (Cavity("inclusion", "cavity"),),
     )
-    return responses(build(scene))
+    return Responses.of(build(scene))
 
 
 def _largest_pressure(_: Values) -> float:

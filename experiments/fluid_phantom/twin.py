@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
-from validate.register.outlines.plane import SurfaceSampler, cavity_sampler
+from validate.register.outlines.plane import SurfaceSampler
 from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
 from validate.scene.material import LawName, Material
 from validate.scene.mesh import quadratic
@@ -93,7 +93,7 @@ def record_phantom(
     layout = marker_layout(size, rng["layout"])
     pen = Pen(twin.sd_tip, twin.sd_hand, PEN_TURN, PEN_SHIFT)
     outline = OutlineSensor(IMAGE_POSE, points=72, sd=twin.sd_outline, frame=FRAME)
-    wall = cavity_sampler(mesh, "cavity", capsule)
+    wall = SurfaceSampler.of_cavity(mesh, "cavity", capsule)
     position, slices = _sweep(twin, run.u[:1], wall, rng["sweep"])
     force, pressure = (run.traces[n].y for n in ("stage.force", "inclusion.pressure"))
     return Recording(

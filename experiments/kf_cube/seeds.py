@@ -13,7 +13,7 @@ from validate.compare.row import LongRow, RowBlock
 from validate.compare.view import View
 from validate.estimate.filterpy.oracle import oracle_table
 from validate.estimate.kalman.modal_kf import ModalKf
-from validate.estimate.measurements import measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
@@ -70,7 +70,7 @@ def _printed(parameters: Any, followed: MethodRun, system: System, Q: float, rec
         parameters.settings.clock.dt, Q * _MM2, PRINTED * _MM2, PRINTED * _MM2,
         recursion=recursion, gains="shared", a0=parameters.settings.loading.a0,
     )  # fmt: skip
-    given = measurements(followed.seen, system.scene.mesh).of("node_A")
+    given = Measurements.taken(followed.seen, system.scene.mesh).of("node_A")
     every = replace(given, t=followed.seen.t, z=np.zeros((len(followed.run.t), 3)))
     return settings.prepare(system, every)
 

@@ -17,7 +17,7 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, TimeSteps, Tree
-from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
@@ -118,7 +118,7 @@ class Benchmark:
     def truth(self, p: Tree, seen: Registered) -> Truth:
         """The twin's displacements at the steps, and its fields at the frames."""
         made = self.twin(p)
-        return truth_of(made.run(output_frames(p.settings.clock.steps, FRAMES)), made.scene)
+        return Truth.of(made.run(output_frames(p.settings.clock.steps, FRAMES)), made.scene)
 
 
 def _require_node(scene: Scene, drive: Drive) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
 from validate.solve.dynamic.newmark import Newmark
@@ -56,7 +56,7 @@ def damping_exhibit(
 def damping_ratios(system: System) -> tuple[Floats, Mapping[str, Floats]]:
     """Frequencies w (r,) 1/s of all modes, and phi^T C phi / (2 w) (r,) of each by the form of C;
     the last two are exact on the diagonal, what they couple is left out."""
-    modes = modes_of(system)
+    modes = Modes.of(system)
     w = modes.omega
     alpha = system.scene.material.mass_damping
     C = system.C.diagonal()[system.free]

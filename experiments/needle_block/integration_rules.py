@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.system import build as build_system
 from validate.solve.amplification import amplification
-from validate.solve.dynamic.newmark_rule import Rule, rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.march import march
 from validate.solve.study_entries import newmark_maps
 
@@ -17,7 +17,7 @@ from ..bending_rod.body import bending_rod, gravity_inputs
 from .benchmark import IMPLICIT
 from .body import MP1, MP2, needle_block
 
-_AVERAGE = rule_of("average", 1.0)
+_AVERAGE = Rule.of("average", 1.0)
 #: beta = .25, gamma = .5 in the paper's notation, where beta is twice the usual one.
 _QUARTER = Rule(1.0, 0.5 * (1 - 0.25), 0.5 * 0.25, 0.5, 0.5)
 _DAMPING = (0.0, 0.1, 0.3)

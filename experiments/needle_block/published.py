@@ -5,7 +5,7 @@ The paper prints few numbers; its figures are curves. Each claim is turned into 
 
 from validate.compare.published import Figure, Values
 from validate.scene.material import Material
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 
 from .body import MP1, MP2, SPEED, STEP, STOP, needle_block
 
@@ -72,7 +72,7 @@ def ways(body: str, moving: float, whole: float, restricted: float) -> tuple[Fig
     )  # fmt: skip
 
 
-_AVERAGE = rule_of("average", 1.0)
+_AVERAGE = Rule.of("average", 1.0)
 _SIDE = float(needle_block(2).mesh.nodes.max())
 _STATED = (
     Figure.uncompared("Fig. 1: symmetric difference of two shapes", None, "1",

@@ -8,7 +8,7 @@ mass, less with one.
 import numpy as np
 
 from validate.errors import ComparisonError
-from validate.identify.recorded_motion import ringing
+from validate.identify.recorded_motion import Ringing
 from validate.parameters import known
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
@@ -64,6 +64,6 @@ def _ringing(recording: Recording, p: ReleasedBeam) -> float | None:
     z = fallen(moving.x[:, : len(TIPS)] - moving.x[0, : len(TIPS)])
     kept = (moving.t >= p.swing.ringing) & (moving.t <= p.swing.length) & np.isfinite(z)
     try:
-        return ringing(moving.t[kept], z[kept]).frequency
+        return Ringing.of(moving.t[kept], z[kept]).frequency
     except ComparisonError:
         return None

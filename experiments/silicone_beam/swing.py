@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from validate.arrays import Floats
 from validate.errors import ComparisonError
-from validate.identify.recorded_motion import Ringing, ringing
+from validate.identify.recorded_motion import Ringing
 from validate.register.observation import AnyDraw, Deviation, Role, Selection, Simulated
 
 from .recording import over
@@ -124,7 +124,7 @@ class Swing:
         t, z = self.t[self.compared][late], moved[late][..., _UP].mean(axis=1)
         seen = np.isfinite(z)
         try:
-            return ringing(t[seen], z[seen])
+            return Ringing.of(t[seen], z[seen])
         except ComparisonError:
             return None
 

@@ -13,7 +13,7 @@ from scipy.spatial.distance import pdist
 
 from validate.arrays import Floats
 from validate.errors import RegistrationError
-from validate.register.markers.transform import Similarity, fit_rigid
+from validate.register.markers.transform import Similarity
 
 _WINDOW, _STANDS = 0.2, 1.0  # s
 _TIP, _SHAFT = 1.5e-3, 30e-3  # m: diagonals of the boxes around tip and shaft
@@ -59,5 +59,5 @@ def _box(points: Floats) -> float:
 
 
 def _registered(known: Floats, found: Floats) -> ByPlus:
-    pose = fit_rigid(known, found)
+    pose = Similarity.rigid(known, found)
     return ByPlus(pose, float(np.linalg.norm(pose.apply(known) - found, axis=1).mean()))

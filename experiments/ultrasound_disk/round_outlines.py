@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Frames
 from validate.register.observation import AnyDraw, Deviation, Role, Selection, Simulated
-from validate.register.outlines.plane import Circle, fit_circle
+from validate.register.outlines.plane import Circle
 
 ENDS = ("left", "right")  # two points of the body, a diameter apart
 
@@ -40,7 +40,7 @@ class RoundOutlines:
     @cached_property
     def circles(self) -> tuple[Circle, ...]:
         """Least squares through every outline; `RegistrationError` for one that is no circle."""
-        return tuple(fit_circle(o, self.scale * self.contours.sd) for o in self.outlines)
+        return tuple(Circle.fit(o, self.scale * self.contours.sd) for o in self.outlines)
 
     @property
     def diameters(self) -> Floats:

@@ -17,7 +17,7 @@ from validate.commands.questions.new import fitting
 from validate.commands.questions.new import written as filled
 from validate.compare.score import bias
 from validate.errors import RecordingError
-from validate.identify.modulus import fit_modulus
+from validate.identify.modulus import ModulusFit
 from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.plates.scene import stated_sizes
@@ -262,7 +262,7 @@ def test_other_recordings_are_refused_with_what_they_hold(tmp_path: Path) -> Non
 
 def test_a_test_in_tension_is_not_pressed() -> None:
     with pytest.raises(RecordingError, match=r"tension, .* --map test=compression"):
-        fit_modulus(log(test="tension", **SIZES))
+        ModulusFit.of(log(test="tension", **SIZES))
 
 
 def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from validate.fem.assembly.locate import nearest_node_rows
 from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Selection
 from validate.register.outlines.outlines import Corner, OutlineObservation
-from validate.register.outlines.plane import cavity_sampler
+from validate.register.outlines.plane import SurfaceSampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.solve.fluid.cavities import ExactPressure
@@ -138,7 +138,7 @@ def registered(run: Run) -> Registered:
         "markers", "validates", T, ("a", "b", "c"), rest + run.u[:, top], rest,
         nearest_node_rows(mesh, rest), 1e-4, np.full(3, 3e-4), None, GATHERED,  # type: ignore[arg-type]
     )  # fmt: skip
-    wall = cavity_sampler(mesh, "cavity", CAPSULE)
+    wall = SurfaceSampler.of_cavity(mesh, "cavity", CAPSULE)
     outline = OutlineObservation(
         "outline", "validates", T, (), POSE, 1.5e-4, wall, 0.0, (CORNER,)
     )  # fmt: skip

@@ -38,7 +38,7 @@ from validate.fem.system import build
 from validate.scene.material import Region
 from validate.scene.scene import Drive
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.dynamic.newmark_rule import propagation, rule_of
+from validate.solve.dynamic.newmark_rule import Rule, propagation
 from validate.solve.march import march
 from validate.solve.types import Run, Stepper
 from validate.testing.pulled_cube import (
@@ -93,7 +93,7 @@ def test_dense_shared_and_modal_are_one_filter(
 def test_the_printed_filter_is_filterpys(pulled: PulledCase, recursion: str) -> None:
     """filterpy's KalmanFilter on paper 001's matrices (eqs 11-14), v and a recursed beside it."""
     seen, free = pulled.measured(4), pulled.system.free
-    p = propagation(pulled.system, rule_of("average", DT))
+    p = propagation(pulled.system, Rule.of("average", DT))
     n = len(free)
     kf = KalmanFilter(n, 3, n)
     kf.x, kf.F, kf.B = np.zeros(n), p.transition(), np.eye(n)
@@ -167,7 +167,7 @@ def test_gains_of_what_is_observed_are_those_of_the_whole(structure: Structure) 
     other variances, too; what a P0 of its own leaves is in it where it must be."""
     big = case(40, PAPER)
     seen = with_gaps(big, 1)
-    modes = in_modes(big.system, rule_of("average", DT))
+    modes = in_modes(big.system, Rule.of("average", DT))
     whole = modal_covariance(KfFem(structure=structure), big.system, seen, modes)
     assert isinstance(whole, Decoupled)
     known: Spaces = {}
@@ -195,7 +195,7 @@ def test_gains_of_what_is_observed_are_those_of_the_whole(structure: Structure) 
 def test_modes_that_decay_each_in_its_own_time_leave_no_narrow_space(pulled: PulledCase) -> None:
     scene = pulled.system.scene
     system = build(replace(scene, material=replace(scene.material, stiffness_damping=1e-4)))
-    modes = in_modes(system, rule_of("average", DT))
+    modes = in_modes(system, Rule.of("average", DT))
     whole = modal_covariance(KfFem(), system, pulled.measured(1), modes)
     assert isinstance(whole, Decoupled)
     assert observed(whole, 60, {}) is None
@@ -305,7 +305,7 @@ def test_truth_of_the_filters_own_model_is_consistent(
     """
     pulled = case(steps, shape)
     stepper = KfFem(gains="every_step").prepare(pulled.system, pulled.measured(1))
-    A = propagation(pulled.system, rule_of("average", DT)).transition()
+    A = propagation(pulled.system, Rule.of("average", DT)).transition()
     H, n = pulled.measured(1).free(pulled.system.free), len(A)
     rng = np.random.default_rng(0)
     error, claim, nis = SD * rng.normal(size=(n, seeds)), stepper.covariance.start(), []

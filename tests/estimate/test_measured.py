@@ -10,7 +10,7 @@ from scipy import sparse
 from validate.errors import ComparisonError, SceneError
 from validate.estimate.kalman.displacement_filter import load_shapes
 from validate.estimate.kalman.formulas import best_gain, innovation
-from validate.estimate.measurements import Measurements, measurements, on_steps, timetable
+from validate.estimate.measurements import Measurements, on_steps, timetable
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.system import build
@@ -85,7 +85,7 @@ def test_a_jittering_camera_is_taken() -> None:
     (markers,) = even.of(MarkerObservation)
     late = markers.t + np.random.default_rng(2).uniform(0.0, 0.02, 12)
     jittered = replace(even, observations=(*even.drives, replace(markers, t=late)))
-    found = measurements(jittered, case().system.scene.mesh)
+    found = Measurements.taken(jittered, case().system.scene.mesh)
     assert len(timetable(found, 0.1).z) >= 10
     assert (found.sd > 2e-5).all()
 
@@ -120,15 +120,15 @@ def test_markers_become_measurements_of_displacements() -> None:
     A = np.array([[0.1, 0.2, 0.0], [0.0, 0.1, 0.3], [0.2, 0.0, 0.1]])
     x = np.array([points, points + points @ A, points + points @ A])
     x[2, 0] = np.nan
-    found = measurements(observed(("a", "b"), points, x), mesh)
+    found = Measurements.taken(observed(("a", "b"), points, x), mesh)
     assert found.names == ("a.x", "a.y", "a.z", "b.x", "b.y", "b.z")
     assert found.sd.tolist() == [2e-5] * 6
     assert found.z[1] == pytest.approx(found.H @ (mesh.nodes @ A).ravel(), abs=1e-15)
     assert np.isnan(found.z[2]).tolist() == [True] * 3 + [False] * 3
     with pytest.raises(ComparisonError, match="rows of 27 nodes on a mesh of 200"):
-        measurements(observed(("a", "b"), points, x), cube(shape=PAPER).scene.mesh)
+        Measurements.taken(observed(("a", "b"), points, x), cube(shape=PAPER).scene.mesh)
     with pytest.raises(ComparisonError, match="no markers"):
-        measurements(Registered((stage(np.arange(3.0)),)), mesh)
+        Measurements.taken(Registered((stage(np.arange(3.0)),)), mesh)
 
 
 @pytest.mark.parametrize(

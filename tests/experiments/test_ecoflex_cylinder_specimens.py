@@ -19,8 +19,8 @@ from experiments.ecoflex_cylinder.specimens import (
     summarised,
 )
 from validate.errors import RecordingError, UsageError
-from validate.identify.budget import by_specimen
-from validate.identify.modulus import fit_modulus
+from validate.identify.budget import Votes
+from validate.identify.modulus import ModulusFit
 from validate.parameters import with_values
 from validate.pipeline.experiment.experiment import Identified
 from validate.recording.types import Recording, Signal, Source
@@ -66,12 +66,12 @@ def test_header_and_file_name_say_material_and_specimen() -> None:
 def test_repeats_of_one_specimen_have_one_vote() -> None:
     """By hand: specimens 102, 111 and 92 kPa."""
     every = [specimen_of(r) for r in LOGS]
-    found = by_specimen([100.0, 102, 104, 111, 90, 94], every)
+    found = Votes.by_specimen([100.0, 102, 104, 111, 90, 94], every)
     assert list(found.means.values()) == [102, 111, 92]
     assert found.mean == pytest.approx(305 / 3)
     assert found.between == pytest.approx(np.std([102, 111, 92], ddof=1))
     assert found.within == pytest.approx(np.sqrt((8 + 8) / 3))
-    fits = [fit_modulus(r, size(SMALL)) for r in LOGS]
+    fits = [ModulusFit.of(r, size(SMALL)) for r in LOGS]
     mean = summarised(fits, every)
     assert mean.mean == pytest.approx(305e3 / 3, rel=1e-6)
     assert mean.sd_mean == pytest.approx(found.between * 1e3 / np.sqrt(3), rel=1e-6)
@@ -156,7 +156,7 @@ def test_a_prediction_of_another_specimen_is_judged_where_it_was_fitted_too() ->
 
 
 def test_notes_tell_one_log_from_several() -> None:
-    own = by_specimen([1.0], ["A"])
+    own = Votes.by_specimen([1.0], ["A"])
     assert apart_notes(split(LOGS[:1], None), own, 0.043)[0].startswith("All 1 log is of one")
 
 

@@ -11,7 +11,7 @@ from beside import beside, experiment
 from validate.arrays import Floats
 from validate.errors import RegistrationError, SceneError
 from validate.fem.large_strain.hyperelastic import Body
-from validate.fem.system import build, responses
+from validate.fem.system import Responses, build
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.reader import digest
@@ -66,7 +66,7 @@ def test_a_small_load_meets_another_element() -> None:
     mesh = quarter_cone(CONE.bottom, CONE.top, CONE.height, 6, 8, small.grading)
     linear = replace(scene, body=mesh, material=replace(scene.material, law="linear"))
     softer = replace(linear, dilatation="nodal_mean")
-    mean, pointwise = (0.15 / responses(build(s)).reactions[0, 0] for s in (softer, linear))
+    mean, pointwise = (0.15 / Responses.of(build(s)).reactions[0, 0] for s in (softer, linear))
     assert ours == pytest.approx(mean, rel=0.025)
     assert pointwise < 0.6 * ours
 

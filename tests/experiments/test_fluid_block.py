@@ -240,10 +240,9 @@ def test_a_twin_that_ends_early_is_no_recording(monkeypatch: pytest.MonkeyPatch)
 def test_a_volume_that_no_pressure_gives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall that does not move keeps its volume at any pressure: 1 of the wanted 3."""
     monkeypatch.setattr(curves, "_wall", lambda surface, x, A, u, P: u)
-    monkeypatch.setattr(curves, "volume_of", lambda surface, x: 1.0)
-    still = np.zeros((2, 2))
+    wall, still = SimpleNamespace(volume=lambda x: 1.0), np.zeros((2, 2))
     with pytest.raises(SceneError, match=r"no pressure.*volume 3"):
-        curves._follower(None, still, None, still, 3.0, 0.0)
+        curves._follower(wall, still, None, still, 3.0, 0.0)
 
 
 def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
@@ -268,11 +267,10 @@ def test_septa_that_cannot_be_meshed_are_rows_with_their_reason(
 def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(curves, "pressure_load", lambda surface, x: x)
-    x = np.array([[1.0], [2.0]])
+    surface, x = SimpleNamespace(pressure_load=lambda x: x), np.array([[1.0], [2.0]])
     with pytest.raises(SceneError, match=r"the wall does not settle at 1 Pa.* m"):
-        curves._wall(None, x, 2.0 * np.eye(2), np.zeros_like(x), 1.0)
-    settled = curves._wall(None, x, 0.5 * np.eye(2), np.zeros_like(x), 1.0)
+        curves._wall(surface, x, 2.0 * np.eye(2), np.zeros_like(x), 1.0)
+    settled = curves._wall(surface, x, 0.5 * np.eye(2), np.zeros_like(x), 1.0)
     assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2
     recording = Recording("r", Source("r", "", 0, ""), 0)
     for name in ("driving", "validating"):

@@ -16,8 +16,8 @@ from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, sym_grad, trace
 
 from validate.arrays import Floats
+from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.fem.system import responses
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Tree, mesh_of
 from validate.solve.fluid.cavities import ExactPressure
@@ -110,7 +110,7 @@ def test_every_cavity_swells_as_computed_apart(values: dict[str, Any], order: in
     moved = [apart.solve(f, apart.held, np.zeros(len(apart.held))) for f in apart.loads]
     V0 = p.scene.body.cavities.width * p.scene.body.cavities.height
     theirs = np.array([[f @ u / V0 for u in moved] for f in apart.loads])
-    ours = responses(build_system(slab(p, None, {"body.element": ELEMENTS[order]})))
+    ours = Responses.of(build_system(slab(p, None, {"body.element": ELEMENTS[order]})))
     assert slopes(ours, still(ours)) == pytest.approx(theirs, rel=1e-9, abs=1e-15)
 
 
@@ -137,7 +137,7 @@ def test_pressure_and_force_under_a_tool_are_those_computed_apart(
     P = float(brentq(lambda P: apart.area(0, dry + P * wet) - V0, 0, 1e5, xtol=1e-9))
     u = dry + P * wet
     force = -float((apart.K @ u - P * apart.loads[0])[pressed].sum())
-    ours = responses(build_system(slab(p, tool)))
+    ours = Responses.of(build_system(slab(p, tool)))
     stepper = ExactPressure().on(ours)
     state = stepper.step(stepper.rest(), np.array([down]))
     assert state.numbers["cavity0.pressure"] == pytest.approx(P, rel=1e-9)
@@ -151,7 +151,7 @@ def test_pressure_and_force_under_a_tool_are_those_computed_apart(
 def test_slopes_of_the_note(squares: int, order: int, slope: float) -> None:
     """An earlier study, cavity of 10 mm, plane strain."""
     changes = {"body.cells": squares, "body.element": ELEMENTS[order]}
-    r = responses(build_system(slab(COARSE, None, changes)))
+    r = Responses.of(build_system(slab(COARSE, None, changes)))
     assert 1 / float(slopes(r, still(r))[0, 0]) == pytest.approx(slope, abs=0.06)
 
 

@@ -7,14 +7,14 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 from experiments.fluid_block.boundary_swap import Swapped, mixed
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.linear_solvers.condense import condense
+from validate.fem.linear_solvers.condense import Condensed
 from validate.fem.system import build
 
 
 @pytest.fixture(scope="module")
 def A() -> Floats:
     """The compliance of the phantom on its cavity and its plate."""
-    small = condense(build(phantom_scene(phantom_mesh(COARSE_GRID))), np.arange(12))
+    small = Condensed.of(build(phantom_scene(phantom_mesh(COARSE_GRID))), np.arange(12))
     return np.asarray(small.compliance[np.ix_(small.free, small.free)])
 
 

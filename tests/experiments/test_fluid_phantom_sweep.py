@@ -12,7 +12,7 @@ from sweeps import LeaningCapsule, sweep_frames
 from experiments.fluid_phantom.effects import INPUTS
 from experiments.fluid_phantom.phantom import place, read
 from validate.errors import UsageError, ValidateError
-from validate.fem.cavity import cavity_surface, volume_of
+from validate.fem.cavity import cavity_surface
 from validate.parameters import with_given
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.plates.inclusion import (
@@ -57,7 +57,7 @@ def test_its_mesh_holds_the_cavity_and_the_wall_is_the_sweeps(recorded: Recordin
     mesh = build(recorded, SWEPT).mesh
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(inclusion(recorded, SWEPT).distance(wall)).max() < 1e-12
-    hole = volume_of(cavity_surface(mesh, "cyst", "cavity"), mesh.nodes)
+    hole = cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes)
     assert hole == pytest.approx(TRUE.volume, rel=0.2)  # facets of the nominal mesh cut corners
 
 

@@ -36,7 +36,7 @@ from experiments.needle_block.sensitivity import (
     slope,
     solve,
 )
-from validate.fem.critical import lanczos_step, modes_of
+from validate.fem.critical import Modes, lanczos_step
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 
@@ -208,7 +208,7 @@ def test_damping_ratios_by_the_form_of_c() -> None:
 def test_diagonal_damping_is_shown_with_its_numbers() -> None:
     shown, numbers = damping_exhibit(needle_block(6), needle_depth, 1 / 30)
     by_mode, errors = shown.tables
-    assert by_mode.rows[-1][0] == len(modes_of(build(needle_block(6))).omega)
+    assert by_mode.rows[-1][0] == len(Modes.of(build(needle_block(6))).omega)
     at_2 = {row[0]: row[4] for row in errors.rows if row[1] == "E_n / 1"}
     assert at_2 == pytest.approx(
         {PAPERS: numbers["damping.papers"], MATCHED: numbers["damping.matched"]}

@@ -9,13 +9,7 @@ from phantoms import CAPSULE, COARSE_GRID, PAPER_GRID, grid_mesh, phantom_mesh
 
 from validate.errors import SceneError
 from validate.fem import cavity as module
-from validate.fem.cavity import (
-    CavitySurface,
-    cavity_surface,
-    pressure_load,
-    volume_form,
-    volume_of,
-)
+from validate.fem.cavity import CavitySurface, cavity_surface, volume_form
 from validate.scene.mesh import Kind, Mesh
 
 # private: _require_closed_line: called alone, case by case.
@@ -34,7 +28,7 @@ def box(kind: Kind) -> tuple[Mesh, CavitySurface]:
 @kinds
 def test_volume_of_a_box_is_exact(kind: Kind) -> None:
     mesh, surface = box(kind)
-    assert volume_of(surface, mesh.nodes) == pytest.approx(BOX, rel=1e-14)
+    assert surface.volume(mesh.nodes) == pytest.approx(BOX, rel=1e-14)
     assert np.array_equal(surface.nodes, mesh.facet_nodes("hole0"))
 
 
@@ -43,7 +37,7 @@ def test_volume_of_a_box_is_exact(kind: Kind) -> None:
 @given(arrays(float, (3, 3), elements=st.floats(-3, 3)))
 def test_affine_maps_scale_the_volume_by_the_determinant(kind: Kind, A: np.ndarray) -> None:
     mesh, surface = box(kind)
-    mapped = volume_of(surface, mesh.nodes @ A.T + [1.0, -2.0, 3.0])
+    mapped = surface.volume(mesh.nodes @ A.T + [1.0, -2.0, 3.0])
     assert mapped == pytest.approx(np.linalg.det(A) * BOX, abs=1e-13 * (1 + np.abs(A).max() ** 3))
 
 
@@ -52,10 +46,10 @@ def test_curved_quadratic_facets_are_integrated_exactly() -> None:
     mesh, surface = box("tet10")
     x, y, z = mesh.nodes.T
     sheared = np.stack([x, y, z + 0.7 * x**2 - 0.4 * x * y], axis=1)
-    assert volume_of(surface, sheared) == pytest.approx(BOX, rel=1e-13)
+    assert surface.volume(sheared) == pytest.approx(BOX, rel=1e-13)
     stretched = np.stack([x + 0.3 * x**2, y, z], axis=1)
     mean_x = 0.5  # of the hole
-    assert volume_of(surface, stretched) == pytest.approx(BOX * (1 + 0.6 * mean_x), rel=1e-13)
+    assert surface.volume(stretched) == pytest.approx(BOX * (1 + 0.6 * mean_x), rel=1e-13)
 
 
 @kinds
@@ -64,7 +58,7 @@ def test_far_origin_loses_no_digits(kind: Kind) -> None:
     near = 1e-2 * mesh.nodes
     far = near + [1e3, -1e3, 1e3]
     # Data rounding is 1e-13 m of 1e-2 m; without the centroid 1e-5 of the volume would be lost.
-    assert volume_of(surface, far) == pytest.approx(volume_of(surface, near), rel=1e-9)
+    assert surface.volume(far) == pytest.approx(surface.volume(near), rel=1e-9)
     ours = volume_form(surface, np.stack([far, near]))
     assert ours == pytest.approx(volume_form(surface, np.stack([near, near])), rel=1e-9)
 
@@ -77,7 +71,7 @@ def test_far_origin_loses_nothing_of_exact_data(kind: Kind) -> None:
     surface = cavity_surface(mesh, "box", "hole0")
     far = mesh.nodes + 2.0**20
     exact = (2 / 4) * (1 / 4) * (3 / 8)
-    assert volume_of(surface, far) == pytest.approx(exact, rel=1e-14)
+    assert surface.volume(far) == pytest.approx(exact, rel=1e-14)
     form = volume_form(surface, np.stack([far, far]))
     assert form == pytest.approx(exact, rel=1e-14)
 
@@ -86,7 +80,7 @@ def test_volume_of_the_capsule_converges_from_below() -> None:
     volumes = []
     for grid in (COARSE_GRID, PAPER_GRID):
         mesh = phantom_mesh(grid)
-        volumes.append(volume_of(cavity_surface(mesh, "cyst", "cavity"), mesh.nodes))
+        volumes.append(cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes))
     assert volumes[0] < volumes[1] < CAPSULE.volume
 
 
@@ -95,11 +89,11 @@ def test_load_is_the_derivative_of_the_volume(kind: Kind) -> None:
     mesh, surface = box(kind)
     rng = np.random.default_rng(5)
     positions = mesh.nodes + 0.05 * rng.normal(size=mesh.nodes.shape)
-    load = pressure_load(surface, positions)
+    load = surface.pressure_load(positions)
     for _ in range(5):
         move = rng.normal(size=positions.shape)
         # V is cubic along a line: this difference formula of order 4 is exact.
-        V = {s: volume_of(surface, positions + s * move) for s in (-2, -1, 1, 2)}
+        V = {s: surface.volume(positions + s * move) for s in (-2, -1, 1, 2)}
         slope = (8 * (V[1] - V[-1]) - (V[2] - V[-2])) / 12
         assert (load * move).sum() == pytest.approx(slope, rel=1e-10, abs=1e-11)
 
@@ -107,7 +101,7 @@ def test_load_is_the_derivative_of_the_volume(kind: Kind) -> None:
 @kinds
 def test_load_is_in_balance_and_pushes_the_wall_outward(kind: Kind) -> None:
     mesh, surface = box(kind)
-    load = pressure_load(surface, mesh.nodes)
+    load = surface.pressure_load(mesh.nodes)
     assert np.abs(load.sum(axis=0)).max() < 1e-15
     assert np.abs(np.cross(mesh.nodes, load).sum(axis=0)).max() < 1e-15
     # Euler: x . dV/dx = 3 V, so the fluid's push outward has positive work.
@@ -130,7 +124,7 @@ def test_volume_form_gives_the_volume_of_any_combination(
     )
     form = volume_form(surface, columns)
     one = np.concatenate([[1.0], z])
-    combined = volume_of(surface, np.tensordot(one, columns, 1))
+    combined = surface.volume(np.tensordot(one, columns, 1))
     scale = (1 + np.abs(z).max()) ** 3
     assert form @ one @ one @ one == pytest.approx(combined, abs=1e-12 * scale)
 

@@ -5,8 +5,8 @@ import pytest
 
 from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.errors import SceneError
-from validate.fem.cavity import cavity_surface, pressure_load, volume_of
-from validate.fem.system import Responses, build, responses
+from validate.fem.cavity import cavity_surface
+from validate.fem.system import Responses, build
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, quadratic
 from validate.scene.scene import Cavity, Drive, Scene, Support
@@ -18,7 +18,7 @@ def block(n: int, order: int = 1) -> Responses:
     held = (Support("bottom", (0, 1)),)
     cavity = (Cavity("hole", "cavity"),)
     made = mesh if order == 1 else quadratic(mesh)
-    return responses(build(Scene(made, Material(34e3, 0.35), held, cavities=cavity)))
+    return Responses.of(build(Scene(made, Material(34e3, 0.35), held, cavities=cavity)))
 
 
 def slope(r: Responses) -> float:
@@ -56,8 +56,8 @@ def test_the_load_is_the_derivative_of_the_area(order: int) -> None:
     x = mesh.nodes + 1e-4 * rng.standard_normal(mesh.nodes.shape)
     way = rng.standard_normal(x.shape)
     h = 1e-6
-    difference = (volume_of(surface, x + h * way) - volume_of(surface, x - h * way)) / (2 * h)
-    load = pressure_load(surface, x)
+    difference = (surface.volume(x + h * way) - surface.volume(x - h * way)) / (2 * h)
+    load = surface.pressure_load(x)
     assert float((load * way).sum()) == pytest.approx(difference, rel=1e-9)
     assert np.abs(load.sum(axis=0)).max() < 1e-15
 
@@ -70,7 +70,7 @@ def test_uniaxial_plane_strain_is_exact() -> None:
                 {k: np.array(v) for k, v in facets.items()})  # fmt: skip
     held = (Support("low", (1,)), Support("left", (0,)))
     drive = (Drive("stage", "high", (0.0, -1.0)),)
-    r = responses(build(Scene(mesh, Material(2e4, 0.3), held, drives=drive)))
+    r = Responses.of(build(Scene(mesh, Material(2e4, 0.3), held, drives=drive)))
     assert r.reactions[0, 0] == pytest.approx(2e4 / (1 - 0.3**2), rel=1e-12)
 
 

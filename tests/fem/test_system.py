@@ -7,7 +7,7 @@ import pytest
 from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, phantom_scene
 
 from validate.errors import SceneError
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.scene.geometries.box import box
 from validate.scene.geometries.specification import quarter_cylinder
 from validate.scene.material import Material
@@ -32,7 +32,7 @@ def compressed(
     mesh = quadratic(mesh) if order == 2 else mesh
     supports = SYMMETRY + (BONDED if bonded else ())
     scene = Scene(mesh, Material(1e5, nu), supports, (), PRESS, (), dilatation)
-    return responses(build(scene))
+    return Responses.of(build(scene))
 
 
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999, 0.4999999999])
@@ -103,7 +103,7 @@ def test_reciprocity_of_a_driven_cavity_wall() -> None:
         drives=(Drive("piston", "piston", (-1.0, 0.0, 0.0)),),
         cavities=(Cavity("box", "hole0"),),
     )
-    r = responses(build(scene))
+    r = Responses.of(build(scene))
     squeezed = 3 * r.volumes[0, 0, 0, 1]
     assert len(wetted) == 8
     assert squeezed < 0
@@ -112,7 +112,7 @@ def test_reciprocity_of_a_driven_cavity_wall() -> None:
 
 def test_parts_of_a_symmetric_body_add_up() -> None:
     quarter = compressed(1, 0.3, bonded=False).scene
-    one, whole = (responses(build(replace(quarter, copies=n))) for n in (1, 4))
+    one, whole = (Responses.of(build(replace(quarter, copies=n))) for n in (1, 4))
     assert whole.reactions == pytest.approx(4 * one.reactions, rel=1e-15)
     assert np.array_equal(whole.fields, one.fields)
 
@@ -128,7 +128,7 @@ def two_drives() -> Scene:
 
 
 def test_reciprocity_of_two_plates() -> None:
-    r = responses(build(two_drives()))
+    r = Responses.of(build(two_drives()))
     assert r.drives == 2
     assert r.reactions.shape == (2, 3)
     assert r.reactions[0, 1] == pytest.approx(r.reactions[1, 0], rel=1e-12)
@@ -137,7 +137,7 @@ def test_reciprocity_of_two_plates() -> None:
 
 def test_columns_meet_their_supports_and_drives() -> None:
     scene = two_drives()
-    r = responses(build(scene))
+    r = Responses.of(build(scene))
     stage, lid = (scene.mesh.facet_nodes(n) for n in ("x1", "y1"))
     assert r.fields[0][stage, 0] == pytest.approx(-1.0, abs=0)
     assert r.fields[0][lid, 1] == pytest.approx(0.0, abs=0)
@@ -186,7 +186,7 @@ def test_numbering_of_nodes_and_cells_does_not_matter() -> None:
         mesh.kind,
         {name: new[f] for name, f in mesh.facets.items()},
     )
-    one, other = responses(build(scene)), responses(build(phantom_scene(shuffled)))
+    one, other = Responses.of(build(scene)), Responses.of(build(phantom_scene(shuffled)))
     for name in ("reactions", "volumes"):
         a, b = getattr(one, name), getattr(other, name)
         assert b == pytest.approx(a, rel=1e-11, abs=1e-13 * np.abs(a).max())
@@ -199,7 +199,7 @@ def test_scene_without_cavity_or_without_drive() -> None:
     assert r.rest_volumes.shape == (0,)
     scene = phantom_scene(phantom_mesh((5, 5, 6)))
     held = Scene(scene.mesh, scene.material, (Support("x0", (0, 1, 2)),), (), (), scene.cavities)
-    only_pressure = responses(build(held))
+    only_pressure = Responses.of(build(held))
     assert only_pressure.fields.shape == (1, len(scene.mesh.nodes), 3)
     assert only_pressure.reactions.shape[0] == 0
     assert 3 * only_pressure.volumes[0, 0, 0, 1] > 0
@@ -242,7 +242,7 @@ def test_columns_know_no_loads_and_no_large_strain() -> None:
         loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),
     )  # fmt: skip
     with pytest.raises(SceneError, match="response columns support drives"):
-        responses(build(scene))
+        Responses.of(build(scene))
     large = replace(scene, material=Material(1.0, 0.3, "svk"))
     with pytest.raises(SceneError, match="a linear scheme cannot solve the law"):
-        responses(build(large))
+        Responses.of(build(large))

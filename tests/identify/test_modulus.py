@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from validate.arrays import Floats, rms
 from validate.errors import RecordingError, UsageError
 from validate.identify import modulus
-from validate.identify.modulus import (
-    CylinderSize,
-    cylinder_of,
-    fit_modulus,
-    load_noise,
-    loading,
-)
+from validate.identify.modulus import CylinderSize, ModulusFit, cylinder_of, load_noise, loading
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording, Signal, Source
 
@@ -63,7 +57,7 @@ def test_force_is_read_at_the_time_of_the_displacement(t: Floats) -> None:
     """Other rates, and a force that begins later: sample by sample it would be another one."""
     moved = on_its_clock(t, log(*linear()))
     window = (0.02, 0.05)
-    assert fit_modulus(moved, window=window).E_apparent == pytest.approx(E, rel=1e-9)
+    assert ModulusFit.of(moved, window=window).E_apparent == pytest.approx(E, rel=1e-9)
     seen = loading(moved)
     assert seen.t[0] == pytest.approx(np.ceil(10 * t[0]) / 10)
     assert seen.force == pytest.approx(E * DISC.area / DISC.height * seen.d)
@@ -72,7 +66,7 @@ def test_force_is_read_at_the_time_of_the_displacement(t: Floats) -> None:
 
 def test_a_force_of_another_time_is_refused() -> None:
     with pytest.raises(RecordingError, match="covers 5 of the displacement's samples"):
-        fit_modulus(on_its_clock(np.arange(19.5, 30.0, 0.1), log(*linear())))
+        ModulusFit.of(on_its_clock(np.arange(19.5, 30.0, 0.1), log(*linear())))
 
 
 def test_what_interpolation_leaves_is_counted() -> None:
@@ -85,7 +79,7 @@ def test_what_interpolation_leaves_is_counted() -> None:
 
 
 def test_a_linear_log_gives_its_modulus_exactly() -> None:
-    fit = fit_modulus(log(*linear()))
+    fit = ModulusFit.of(log(*linear()))
     assert fit.E_apparent == pytest.approx(E, rel=1e-12)
     assert fit.sd == pytest.approx(0.0, abs=1e-6 * E)
     assert fit.offset == pytest.approx(0.0, abs=1e-12)
@@ -93,43 +87,43 @@ def test_a_linear_log_gives_its_modulus_exactly() -> None:
     assert fit.residual_rms < 1e-12
     assert fit.r_squared == pytest.approx(1.0, abs=1e-12)
     assert (fit.name, fit.window) == ("synthetic", (0.005, 0.05))
-    inside = fit_modulus(log(*linear()), window=(0.0051, 0.0499))
+    inside = ModulusFit.of(log(*linear()), window=(0.0051, 0.0499))
     assert inside.count == 80  # 0.153 to 1.497 mm at 1/60 mm a sample: 9.18 to 89.82, so 10..89
 
 
 @pytest.mark.parametrize("offset", [-0.7, 0.04, 12.0])
 def test_the_cell_offset_is_removed_and_reported(offset: float) -> None:
-    fit = fit_modulus(log(*linear(offset=offset)))
+    fit = ModulusFit.of(log(*linear(offset=offset)))
     assert fit.E_apparent == pytest.approx(E, rel=1e-11)
     assert fit.offset == pytest.approx(offset, rel=1e-9)
 
 
 def test_a_toe_is_where_the_fitted_line_reaches_zero_force() -> None:
     d, force = linear()
-    assert fit_modulus(log(d, force)).toe == pytest.approx(0.0, abs=1e-9)
+    assert ModulusFit.of(log(d, force)).toe == pytest.approx(0.0, abs=1e-9)
     soft = 0.0002  # m of seating with a third of the stiffness, then the full one
     k = E * DISC.area / DISC.height
     seated = np.where(d < soft, k / 3 * d, k * (d - soft) + k / 3 * soft)
-    fit = fit_modulus(log(d, seated), window=(0.01, 0.05))
+    fit = ModulusFit.of(log(d, seated), window=(0.01, 0.05))
     assert fit.toe * DISC.height == pytest.approx(2 / 3 * soft, rel=0.1)
 
 
 def test_a_force_that_falls_is_refused() -> None:
     d, force = linear()
     with pytest.raises(RecordingError, match="force falls with strain"):
-        fit_modulus(log(d, -force))
+        ModulusFit.of(log(d, -force))
 
 
 def test_noise_alone_is_no_contact() -> None:
     d, _ = linear()
     force = np.random.default_rng(1).normal(0, 0.02, len(d))
     with pytest.raises(RecordingError, match="no contact in 200 samples"):
-        fit_modulus(log(d, force))
+        ModulusFit.of(log(d, force))
 
 
 def test_an_approach_before_contact_is_found() -> None:
     slack = 40.5 * SPEED * 0.1
-    fit = fit_modulus(log(*linear(slack=slack, offset=0.3)))
+    fit = ModulusFit.of(log(*linear(slack=slack, offset=0.3)))
     assert fit.contact == pytest.approx(slack, rel=1e-9)
     assert fit.offset == pytest.approx(0.3, rel=1e-12)
     assert fit.E_apparent == pytest.approx(E, rel=1e-11)
@@ -138,7 +132,7 @@ def test_an_approach_before_contact_is_found() -> None:
 def test_an_approach_is_found_in_noise() -> None:
     d, force = linear(slack=40.5 * SPEED * 0.1, offset=0.3)
     noisy = force + np.random.default_rng(3).normal(0, 0.02, len(force))
-    fit = fit_modulus(log(d, noisy))
+    fit = ModulusFit.of(log(d, noisy))
     assert fit.contact == pytest.approx(40.5 * SPEED * 0.1, abs=3 * 0.02 * 0.03 / (E * DISC.area))
     assert fit.offset == pytest.approx(0.3, abs=3 * 0.02 / math.sqrt(35))
 
@@ -146,7 +140,7 @@ def test_an_approach_is_found_in_noise() -> None:
 def test_noise_is_within_three_standard_errors_and_the_standard_error_is_right() -> None:
     d, force = linear(offset=-0.03)
     rng = np.random.default_rng(11)
-    fits = [fit_modulus(log(d, force + rng.normal(0, 0.02, len(d)))) for _ in range(200)]
+    fits = [ModulusFit.of(log(d, force + rng.normal(0, 0.02, len(d)))) for _ in range(200)]
     off = np.array([(fit.E_apparent - E) / fit.sd for fit in fits])
     assert np.mean(np.abs(off) < 3) > 0.98  # 0.9963 expected with 79 degrees of freedom
     assert off.std() == pytest.approx(1.0, abs=0.15)  # sd of an sd over 200: 0.05
@@ -158,7 +152,7 @@ def test_noise_is_within_three_standard_errors_and_the_standard_error_is_right()
 def test_the_standard_error_is_that_of_a_straight_line_fit() -> None:
     d, force = linear()
     noisy = force + np.random.default_rng(2).normal(0, 0.02, len(force))
-    fit = fit_modulus(log(d, noisy), window=(0.0051, 0.0499))
+    fit = ModulusFit.of(log(d, noisy), window=(0.0051, 0.0499))
     inside = slice(10, 90)
     (slope, _), cov = np.polyfit(d[inside] / DISC.height, noisy[inside] / DISC.area, 1, cov=True)
     assert fit.E_apparent == pytest.approx(slope, rel=1e-10)
@@ -168,15 +162,15 @@ def test_the_standard_error_is_that_of_a_straight_line_fit() -> None:
 def test_unloading_is_not_fitted() -> None:
     d, force = linear()
     softer = log(np.append(d, d[::-1]), np.append(force, 0.5 * force[::-1]))
-    assert fit_modulus(softer).E_apparent == pytest.approx(E, rel=1e-12)
-    assert fit_modulus(softer).count == fit_modulus(log(d, force)).count
+    assert ModulusFit.of(softer).E_apparent == pytest.approx(E, rel=1e-12)
+    assert ModulusFit.of(softer).count == ModulusFit.of(log(d, force)).count
 
 
 def test_the_window_holds_its_ends() -> None:
     """Strains of 1/64 are exact in binary: 16 + 1 of them from 0 to a quarter."""
     d = np.arange(33) / 64 * DISC.height
     cylinder = CylinderSize(DISC.diameter, 1.0)
-    fit = fit_modulus(log(np.arange(33) / 64, 10.0 * d), cylinder, window=(0.0, 0.25))
+    fit = ModulusFit.of(log(np.arange(33) / 64, 10.0 * d), cylinder, window=(0.0, 0.25))
     assert fit.count == 17
 
 
@@ -184,7 +178,7 @@ def test_definition_is_the_mean_slope_with_free_intercept() -> None:
     """F = A0 (a e + b e^2) densely sampled: slope a + b (low + high), by hand."""
     e = np.linspace(0, 0.06, 60001)
     force = DISC.area * (50e3 * e + 400e3 * e**2)
-    fit = fit_modulus(log(e * DISC.height, force), window=(0.01, 0.05))
+    fit = ModulusFit.of(log(e * DISC.height, force), window=(0.01, 0.05))
     assert fit.E_apparent == pytest.approx(50e3 + 400e3 * 0.06, rel=1e-6)
 
 
@@ -198,7 +192,7 @@ def test_scale_invariance(stiff: float, size: float, offset: float) -> None:
     """Geometrically similar discs of one material have one modulus."""
     d, force = linear(modulus=stiff)
     disc = CylinderSize(DISC.diameter * size, DISC.height * size)
-    fit = fit_modulus(log(d * size, force * size**2 + offset), disc)
+    fit = ModulusFit.of(log(d * size, force * size**2 + offset), disc)
     assert fit.E_apparent == pytest.approx(stiff, rel=1e-8)
 
 
@@ -214,11 +208,11 @@ def test_noise_of_a_known_series() -> None:
 def test_refusals_hold_the_numbers() -> None:
     d, force = linear()
     with pytest.raises(RecordingError, match=r"from 0.0000 to 0.0272 with 41 samples"):
-        fit_modulus(log(d[:50], force[:50]))
+        ModulusFit.of(log(d[:50], force[:50]))
     with pytest.raises(RecordingError, match="with 9 samples in the window"):
-        fit_modulus(log(d, force), window=(0.005, 0.0099))
+        ModulusFit.of(log(d, force), window=(0.005, 0.0099))
     with pytest.raises(UsageError, match="expected 0 <= low < high"):
-        fit_modulus(log(d, force), window=(0.05, 0.005))
+        ModulusFit.of(log(d, force), window=(0.05, 0.005))
     with pytest.raises(RecordingError, match="expected a size above 0"):
         CylinderSize(0.05, -0.03)
     unknown = Recording("bare", Source("none", "", 0, ""), 0, metadata={"specimen": {}})
@@ -233,7 +227,7 @@ def real(folder: Path, name: str) -> Recording:
 @pytest.mark.slow
 def test_ecoflex_00_30_five_repeats(shared_data: Path) -> None:
     """Data README: E over 0.5-5 % 107.7 kPa, sd 1.1 kPa; noise 0.017-0.021 N, offset 0.04 N."""
-    fits = [fit_modulus(real(shared_data, f"EF30_0T_A{i}")) for i in range(1, 6)]
+    fits = [ModulusFit.of(real(shared_data, f"EF30_0T_A{i}")) for i in range(1, 6)]
     moduli = [fit.E_apparent for fit in fits]
     assert np.mean(moduli) == pytest.approx(107.7e3, abs=50)  # printed with one decimal of kPa
     assert np.std(moduli, ddof=1) == pytest.approx(1.1e3, abs=50)
@@ -264,8 +258,8 @@ def test_modulus_does_not_depend_on_how_the_file_is_written(
     path = tmp_path / "same.csv"
     path.write_text("\r\n".join(head + lines), encoding="utf-16")
     here, there = (
-        fit_modulus(real(shared_data, "EF30_0T_A1")),
-        fit_modulus(read_instron(path, {"test": "compression"})),
+        ModulusFit.of(real(shared_data, "EF30_0T_A1")),
+        ModulusFit.of(read_instron(path, {"test": "compression"})),
     )
     assert there.E_apparent == pytest.approx(here.E_apparent, rel=1e-7)
     assert there.noise == pytest.approx(here.noise, rel=1e-4)
@@ -284,7 +278,7 @@ def test_a_signal_of_two_columns_and_one_strain_are_refused() -> None:
     two = log(d, force)
     wide = Signal(two.signals["force"].t, np.column_stack([force, force]), "N", 0.0, "machine")
     with pytest.raises(RecordingError, match="'force' has 2 columns, expected 1"):
-        fit_modulus(replace(two, signals={**two.signals, "force": wide}))
+        ModulusFit.of(replace(two, signals={**two.signals, "force": wide}))
     with pytest.raises(RecordingError, match=r"synthetic: 12 samples.*strain 0\.031250"):
         modulus._fit("synthetic", np.full(12, 0.03125), np.arange(12.0), 1.0, 0.0, 0.0, (0.0, 0.1))
 

@@ -12,7 +12,7 @@ from machine_logs import pressed_cylinder
 from validate.commands.main import run
 from validate.compare.verdict import Accept
 from validate.errors import RecordingError, UsageError
-from validate.identify.budget import averaged, by_specimen, labels_of
+from validate.identify.budget import Votes, averaged, labels_of
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.plates.compression import compression
 from validate.pipeline.plates.scene import Compression
@@ -187,12 +187,12 @@ def test_what_are_no_repeats_is_refused(tmp_path: Path) -> None:
 
 
 def test_votes_by_hand() -> None:
-    found = by_specimen([1.0, 3.0, 6.0], ["A", "A", "B"])
+    found = Votes.by_specimen([1.0, 3.0, 6.0], ["A", "A", "B"])
     assert found.means == {"A": 2.0, "B": 6.0}
     assert found.mean == 4.0
     assert found.within == pytest.approx(np.sqrt(2.0))
     assert found.sd_mean == pytest.approx(2.0)  # sd of 2 and 6 is 2.83, over root 2
-    assert by_specimen([1.0], ["A"]).sd_mean is None
+    assert Votes.by_specimen([1.0], ["A"]).sd_mean is None
 
 
 def test_a_damaged_share_is_refused(tmp_path: Path) -> None:

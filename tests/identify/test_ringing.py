@@ -5,7 +5,7 @@ import pytest
 
 from validate.errors import ComparisonError
 from validate.identify import recorded_motion as module
-from validate.identify.recorded_motion import ringing, spectrum
+from validate.identify.recorded_motion import Ringing, spectrum
 
 # private: _peak: replaced, to bring a case about.
 
@@ -21,7 +21,7 @@ def rung(f: float, zeta: float, phase: float = 0.3, creep: float = 0.0) -> np.nd
 
 @pytest.mark.parametrize(("f", "zeta"), [(7.7, 0.055), (4.3, 0.02), (9.0, 0.1)])
 def test_frequency_and_damping_are_exact_without_noise(f: float, zeta: float) -> None:
-    found = ringing(T + 3.0, rung(f, zeta))
+    found = Ringing.of(T + 3.0, rung(f, zeta))
     assert found.frequency == pytest.approx(f, rel=2e-5)
     assert found.damping == pytest.approx(zeta, rel=1e-3)
     assert found.periods == pytest.approx(f * T[-1], rel=2e-5)
@@ -34,7 +34,7 @@ def test_its_error_is_what_it_says_of_noise_and_creep() -> None:
     for _ in range(60):
         f, zeta = rng.uniform(3.5, 9), rng.uniform(0.02, 0.1)
         y = rung(f, zeta, rng.uniform(0, 6), 5e-4) + 1e-5 * rng.normal(size=len(T))
-        found = ringing(T, y)
+        found = Ringing.of(T, y)
         errors.append(
             (found.frequency - f, found.frequency_sd, found.damping - zeta, found.damping_sd)
         )
@@ -47,9 +47,9 @@ def test_its_error_is_what_it_says_of_noise_and_creep() -> None:
 
 def test_what_does_not_ring_is_refused() -> None:
     with pytest.raises(ComparisonError, match=r"1\.\d periods .* 1\.39 s: 3 are needed"):
-        ringing(T, rung(1.2, 0.05))
+        Ringing.of(T, rung(1.2, 0.05))
     with pytest.raises(ComparisonError, match=r"5 samples.*least 20"):
-        ringing(T[:5], T[:5])
+        Ringing.of(T[:5], T[:5])
 
 
 def test_the_spectrum_peaks_where_it_rings_with_its_amplitude() -> None:
@@ -65,4 +65,4 @@ def test_a_frequency_that_runs_away_from_the_peak_is_no_ringing(
     y = rung(7.7, 0.055)
     monkeypatch.setattr(module, "_peak", lambda t, y: 3.0)
     with pytest.raises(ComparisonError, match=r"no ringing near 3\.00 Hz was found: "):
-        ringing(T, y)
+        Ringing.of(T, y)

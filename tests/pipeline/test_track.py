@@ -44,7 +44,7 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import CellSize, Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.run.method_run import Cases, Truth, truth_of
+from validate.pipeline.run.method_run import Cases, Truth
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording
 from validate.register.registration import Registered
@@ -383,7 +383,7 @@ def test_maps_compare_equal_times_only() -> None:
 
     def few(tree: Tree, seen: Registered) -> Truth:
         true, run = true_run(tree, 10)
-        return truth_of(run, true)
+        return Truth.of(run, true)
 
     twin = Twin(record, few, kind="same model")
     result = run(replace(TINY, twin=twin, frames=10, cases=()), "fem", "kf", "slow")

@@ -16,7 +16,7 @@ from validate.pipeline.experiment.experiment import Case, Experiment, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.experiment.variation import change_of
-from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.method_run import Truth
 from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.register.markers.markers import placed_markers
@@ -86,7 +86,7 @@ def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
 
 def truth(tree: Tree, seen: Registered) -> Truth:
     true, run = true_run(tree)
-    return truth_of(run, true)
+    return Truth.of(run, true)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def record_moved(tree: Tree, progress: Callable[[str], None]) -> Recording:
 def moved_truth(tree: Tree, seen: Registered) -> Truth:
     """The twin's motion at the recorded samples, rest first."""
     true, run = moved_run(tree)
-    probes = truth_of(run, true).probes
+    probes = Truth.of(run, true).probes
     return Truth({name: np.vstack([np.zeros((1, 3)), u]) for name, u in probes.items()})
 
 

@@ -13,7 +13,6 @@ from validate.register.markers.measures import target_covariance
 from validate.register.markers.transform import (
     Similarity,
     covariance_of,
-    fit_rigid,
     fit_weighted,
     weighted_covariance,
 )
@@ -33,7 +32,7 @@ def test_exact_points_are_met_and_equal_noise_is_the_plain_fit() -> None:
     found = fit_weighted(X, Y, covariance_of(DEEP), start)
     np.testing.assert_allclose(found.matrix, TRUE.matrix, atol=1e-12)
     noisy = X + RNG.normal(0, 1e-3, X.shape)
-    plain = fit_rigid(noisy, Y)
+    plain = Similarity.rigid(noisy, Y)
     same = fit_weighted(noisy, Y, covariance_of(np.full(3, 1e-3)), start)
     np.testing.assert_allclose(same.matrix, plain.matrix, atol=1e-11)
 
@@ -45,7 +44,7 @@ def test_the_covariance_is_that_of_many_draws_and_less_than_the_plain_fits() -> 
     weighted, plain = [], []
     for _ in range(800):
         x = X + rng.normal(0, 1, X.shape) * DEEP
-        start = fit_rigid(x, Y)
+        start = Similarity.rigid(x, Y)
         plain.append((start.apply(TRUE.inverse().apply(at)) - at)[0])
         weighted.append((fit_weighted(x, Y, C, start).apply(TRUE.inverse().apply(at)) - at)[0])
     predicted = weighted_covariance(at, Y, C, TRUE)[0]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from validate.errors import RegistrationError
 from validate.recording.types import Contours
-from validate.register.outlines.plane import fit_circle, outlined_capsule
+from validate.register.outlines.plane import Circle, outlined_capsule
 
 
 def circle(centre, radius, k, first=0.0):
@@ -21,14 +21,14 @@ def circle(centre, radius, k, first=0.0):
     st.floats(0, 6),
 )  # fmt: skip
 def test_exact_circle_is_recovered(x, y, radius, k, first):
-    found = fit_circle(circle((x, y), radius, k, first), 0.0)
+    found = Circle.fit(circle((x, y), radius, k, first), 0.0)
     assert found.centre == pytest.approx([x, y], abs=1e-10)
     assert found.radius == pytest.approx(radius, abs=1e-10)
     assert found.rms < 1e-10
 
 
 def test_half_a_circle_is_recovered():
-    found = fit_circle(circle((0.01, 0.02), 0.008, 60)[:30], 0.0)
+    found = Circle.fit(circle((0.01, 0.02), 0.008, 60)[:30], 0.0)
     assert found.centre == pytest.approx([0.01, 0.02], abs=1e-9)
     assert found.radius == pytest.approx(0.008, abs=1e-9)
 
@@ -40,7 +40,7 @@ def test_stated_sd_is_the_scatter_of_repeated_fits():
     fits = []
     for _ in range(400):
         points = circle((0.0, 0.0), 0.0085, 48)
-        fits.append(fit_circle(points * (1 + rng.normal(0, 0.15e-3, (48, 1)) / 0.0085), 0.15e-3))
+        fits.append(Circle.fit(points * (1 + rng.normal(0, 0.15e-3, (48, 1)) / 0.0085), 0.15e-3))
     centres, radii = np.array([f.centre for f in fits]), np.array([f.radius for f in fits])
     assert centres.std(axis=0) == pytest.approx(0.15e-3 * np.sqrt(2 / 48), rel=0.12)
     assert radii.std() == pytest.approx(0.15e-3 / np.sqrt(48), rel=0.12)
@@ -52,23 +52,23 @@ def test_stated_sd_is_the_scatter_of_repeated_fits():
 
 def test_larger_of_stated_noise_and_misfit_counts():
     points = circle((0, 0), 1.0, 8) * np.tile([1.1, 0.9], 4)[:, None]
-    found = fit_circle(points, 0.01)
+    found = Circle.fit(points, 0.01)
     assert found.radius == pytest.approx(1.0)
     assert found.rms == pytest.approx(0.1)
     assert found.sd_radius == pytest.approx(0.1 / np.sqrt(8))
     assert found.sd_centre == pytest.approx(0.1 / 2)
-    assert fit_circle(points, 0.5).sd_radius == pytest.approx(0.5 / np.sqrt(8))
+    assert Circle.fit(points, 0.5).sd_radius == pytest.approx(0.5 / np.sqrt(8))
 
 
 def test_too_few_points_are_refused():
     with pytest.raises(RegistrationError, match=r"5 points.*needs 6"):
-        fit_circle(circle((0, 0), 1.0, 5), 0.0)
+        Circle.fit(circle((0, 0), 1.0, 5), 0.0)
 
 
 def test_outline_far_from_a_circle_is_refused():
     stretched = circle((0, 0), 0.01, 40) * [1.0, 0.2]
     with pytest.raises(RegistrationError, match=r"not a circle: \d\.\d\d mm rms"):
-        fit_circle(stretched, 0.0)
+        Circle.fit(stretched, 0.0)
 
 
 POSE = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0.0225], [0, 1, 0, 0], [0, 0, 0, 1]])

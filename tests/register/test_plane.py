@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
 from validate.register.outlines.plane import (
-    cavity_sampler,
+    SurfaceSampler,
     from_image,
     require_rigid,
     section,
@@ -33,7 +33,7 @@ def signed_area(outline: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def wall():
-    return cavity_sampler(phantom_mesh(PAPER_GRID), "cavity", CAPSULE)
+    return SurfaceSampler.of_cavity(phantom_mesh(PAPER_GRID), "cavity", CAPSULE)
 
 
 @pytest.mark.parametrize("height", [-0.0055, -0.003, 0.0, 0.002, 0.00549, 0.009, -0.012])
@@ -53,7 +53,7 @@ def test_level_section_is_a_circle_of_known_radius(wall, height):
 def test_section_converges_at_second_order():
     errors = []
     for parts in (4, 8, 16):
-        wall = cavity_sampler(phantom_mesh(PAPER_GRID), "cavity", CAPSULE, parts)
+        wall = SurfaceSampler.of_cavity(phantom_mesh(PAPER_GRID), "cavity", CAPSULE, parts)
         area = signed_area(section(wall.rest, wall.triangles, pose_at(0.002)))
         errors.append(1 - area / (np.pi * 0.0085**2))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.3)
@@ -70,7 +70,7 @@ def test_tilted_section_of_the_cylinder_is_an_ellipse(wall, tilt):
 
 
 def test_facets_as_they_are_give_a_smaller_outline(wall):
-    flat = cavity_sampler(phantom_mesh(PAPER_GRID), "cavity", None)
+    flat = SurfaceSampler.of_cavity(phantom_mesh(PAPER_GRID), "cavity", None)
     areas = [signed_area(section(s.rest, s.triangles, pose_at(0.0))) for s in (flat, wall)]
     assert 0.7 * areas[1] < areas[0] < areas[1]
 
@@ -79,7 +79,7 @@ def test_wall_follows_the_displacement(wall):
     mesh = phantom_mesh(PAPER_GRID)
     G = 0.05 * np.random.default_rng(0).normal(size=(3, 3))
     u = (mesh.nodes - CENTRE) @ G.T + [1e-3, 0, 0]
-    flat = cavity_sampler(mesh, "cavity", None, 3)
+    flat = SurfaceSampler.of_cavity(mesh, "cavity", None, 3)
     assert flat.deformed(u) == pytest.approx(flat.rest + (flat.rest - CENTRE) @ G.T + [1e-3, 0, 0])
     shifted = np.tile([1e-3, 0.0, -2e-3], (len(mesh.nodes), 1))
     outline = section(wall.deformed(shifted), wall.triangles, pose_at(0.0))
@@ -91,7 +91,7 @@ def test_wall_follows_the_displacement(wall):
 
 def test_nearest_node_reads_wall_nodes_only():
     mesh = phantom_mesh(PAPER_GRID)
-    wall = cavity_sampler(mesh, "cavity", CAPSULE, 4, nearest=True)
+    wall = SurfaceSampler.of_cavity(mesh, "cavity", CAPSULE, 4, nearest=True)
     assert np.isin(wall.rows.weights.indices, mesh.facet_nodes("cavity")).all()
     assert np.array_equal(np.diff(wall.rows.weights.indptr), np.ones(len(wall.rest)))
     assert (wall.rows.weights.data == 1).all()

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import rms
 from validate.errors import RegistrationError
-from validate.register import Similarity, fit_rigid, fit_similarity, register_points
+from validate.register import Similarity, fit_similarity, register_points
 from validate.register.markers.measures import (
     Reflection,
     chi_square_bound,
@@ -125,7 +125,7 @@ def test_fre_and_tre_match_their_prediction_over_many_draws(d, scaled):
     rng = np.random.default_rng(11)
     y = grid(0.002)[:, :d]
     target = y.mean(axis=0) + ([0, 0, -0.0225] if d == 3 else [0.03, 0.02])
-    fit = fit_similarity if scaled else fit_rigid
+    fit = fit_similarity if scaled else Similarity.rigid
     fre2, tre2 = [], []
     for _ in range(1500):
         x = y + rng.normal(0, SD, y.shape)
@@ -193,7 +193,7 @@ def test_unseen_markers_are_left_out_and_named():
     assert found.missing == ("m03", "m07")
     assert found.findings == ("2 of 42 markers not visible (NaN), left out: m03, m07",)
     kept = np.delete(np.arange(42), [3, 7])
-    np.testing.assert_allclose(found.transform.matrix, fit_rigid(x[kept], y[kept]).matrix)
+    np.testing.assert_allclose(found.transform.matrix, Similarity.rigid(x[kept], y[kept]).matrix)
     assert found.residuals.shape == (40, 3)
     assert found.names == tuple(NAMES[i] for i in kept)
 
@@ -253,7 +253,7 @@ def test_a_mirrored_cloud_is_refused_with_both_residuals(d, seed):
     x = (y + np.random.default_rng(seed).normal(0, SD, y.shape)) * ([-1, 1, 1][:d])
     said = message(x, y)
     assert "seem mirrored" in said
-    found = reflection(x, y, fit_rigid, np.eye(d)[1])
+    found = reflection(x, y, Similarity.rigid, np.eye(d)[1])
     assert f"{1e3 * found.proper:.3g} mm by a rotation" in said
     assert f"{1e3 * found.improper:.3g} mm by a reflection" in said
     assert found.improper < 1.5 * SD * np.sqrt(d) < found.proper
@@ -283,7 +283,9 @@ def test_a_side_may_be_declared_along_any_axis():
 
 def test_the_residual_of_a_reflection_does_not_depend_on_the_mirror():
     x, y = cloud(1), cloud(2)
-    found = [reflection(x, y, fit_rigid, np.array(n)).improper for n in ([1.0, 0, 0], [3, -2, 1])]
+    found = [
+        reflection(x, y, Similarity.rigid, np.array(n)).improper for n in ([1.0, 0, 0], [3, -2, 1])
+    ]
     assert found[0] == pytest.approx(found[1], rel=1e-12)
 
 
@@ -317,7 +319,7 @@ def test_two_swapped_markers_are_named(seed):
     x = measured(y, seed)[0]
     x[[3, 7]] = x[[7, 3]]
     said = message(x, y)
-    before = 1e3 * rms(fit_rigid(x, y).apply(x) - y)
+    before = 1e3 * rms(Similarity.rigid(x, y).apply(x) - y)
     assert said.startswith(f"markers m03 and m07 seem swapped: residual {before:.3g} -> ")
 
 
@@ -337,10 +339,10 @@ def test_any_permutation_of_a_jittered_grid_is_found(seed):
     said = message(x[order], y)
     assert "seem permuted" in said
     assert "ambiguous" not in said
-    found = relabellings(x[order], y, fit_rigid, SD)
+    found = relabellings(x[order], y, Similarity.rigid, SD)
     assert len(found) == 1
     np.testing.assert_array_equal(found[0].order, order)
-    assert found[0].rms == pytest.approx(rms(fit_rigid(x, y).apply(x) - y))
+    assert found[0].rms == pytest.approx(rms(Similarity.rigid(x, y).apply(x) - y))
 
 
 def test_a_permuted_regular_grid_is_called_ambiguous():
@@ -390,7 +392,7 @@ def test_an_outlier_is_named_with_its_distance_and_stays_in_the_fit():
         f"marker m05 is an outlier: {1e3 * outlier.residual:.3g} mm from the position predicted "
         f"by the others"
     )
-    np.testing.assert_allclose(found.transform.matrix, fit_rigid(x, y).matrix)
+    np.testing.assert_allclose(found.transform.matrix, Similarity.rigid(x, y).matrix)
     assert register(x, y, exclude=["m05"]).outliers == ()
 
 
@@ -401,11 +403,13 @@ def test_an_outlier_that_moves_the_result_is_refused_with_its_effect_and_both_se
     x[5] += 0.1 * T.R.T @ [0, 0.6, 0.8]
     said = message(x, y)
     others = np.delete(np.arange(42), 5)
-    moved = fit_rigid(x, y).apply(x[others]) - fit_rigid(x[others], y[others]).apply(x[others])
+    moved = Similarity.rigid(x, y).apply(x[others]) - Similarity.rigid(x[others], y[others]).apply(
+        x[others]
+    )
     assert said.startswith("outliers among the markers (m05 by 1")
     assert f"shift the others by {1e3 * rms(moved):.3g} mm, twice" in said
     assert said.endswith("set registration.exclude=m05 or registration.robust=true")
-    without = fit_rigid(x[others], y[others]).matrix
+    without = Similarity.rigid(x[others], y[others]).matrix
     np.testing.assert_allclose(register(x, y, exclude=["m05"]).transform.matrix, without)
 
 
@@ -419,10 +423,10 @@ def test_a_robust_fit_leaves_outliers_out_and_names_them():
     assert found.rejected == ("m02", "m05") == tuple(o.name for o in found.outliers)
     assert found.names == tuple(NAMES[i] for i in kept)
     assert found.findings[0].endswith("it is left out by the robust fit")
-    np.testing.assert_allclose(found.transform.matrix, fit_rigid(x[kept], y[kept]).matrix)
+    np.testing.assert_allclose(found.transform.matrix, Similarity.rigid(x[kept], y[kept]).matrix)
     clean = measured(y, 10)[0]
     np.testing.assert_allclose(
-        register(clean, y, robust=True).transform.matrix, fit_rigid(clean, y).matrix
+        register(clean, y, robust=True).transform.matrix, Similarity.rigid(clean, y).matrix
     )
 
 

@@ -10,7 +10,7 @@ import pytest
 from sweeps import LeaningCapsule, sweep_frames
 
 from validate.errors import RecordingError, RegistrationError
-from validate.fem.cavity import cavity_surface, volume_of
+from validate.fem.cavity import cavity_surface
 from validate.recording.types import Contours
 from validate.register.outlines import sweep
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
@@ -101,7 +101,7 @@ def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(surface.distance(wall)).max() < 1e-12
     assert cell_volumes(mesh).min() > 0
-    hole = volume_of(cavity_surface(mesh, "cyst", "cavity"), mesh.nodes)
+    hole = cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes)
     assert cell_volumes(mesh).sum() + hole == pytest.approx(np.prod(block.sizes), rel=1e-11)
     assert 0.8 * OVAL.volume < hole < 1.02 * OVAL.volume
 

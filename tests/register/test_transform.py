@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
-from validate.register import Similarity, fit_rigid, fit_similarity
+from validate.register import Similarity, fit_similarity
 from validate.register.markers.transform import spread
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 2, 3]])
@@ -49,7 +49,7 @@ def test_the_inverse_leads_back(seed, d, s):
 def test_rigid_fit_recovers_the_transform_exactly(seed, d, k):
     truth = Similarity(rotation(seed, d), points(seed + 1, 1, d)[0])
     x = points(seed + 2, k, d)
-    found = fit_rigid(x, truth.apply(x))
+    found = Similarity.rigid(x, truth.apply(x))
     np.testing.assert_allclose(found.matrix, truth.matrix, atol=1e-12)
     assert found.s == 1.0
 
@@ -69,7 +69,7 @@ def test_rigid_fit_agrees_with_scipy_on_noisy_weighted_points(seed):
     y = x @ rotation(seed, 3).T + rng.normal(0, 0.1, x.shape)
     a, b = np.average(x, axis=0, weights=w), np.average(y, axis=0, weights=w)
     oracle, _ = Rotation.align_vectors(y - b, x - a, weights=w)
-    found = fit_rigid(x, y, w)
+    found = Similarity.rigid(x, y, w)
     np.testing.assert_allclose(found.R, oracle.as_matrix(), atol=1e-12)
     np.testing.assert_allclose(found.t, b - oracle.apply(a), atol=1e-12)
 
@@ -92,14 +92,14 @@ def test_a_point_of_weight_zero_does_not_count():
     truth = Similarity(rotation(4, 3), [0.1, 0.2, 0.3])
     y = truth.apply(CORNERS)
     y[4] += 7
-    found = fit_rigid(CORNERS, y, [1, 1, 1, 1, 0])
+    found = Similarity.rigid(CORNERS, y, [1, 1, 1, 1, 0])
     np.testing.assert_allclose(found.matrix, truth.matrix, atol=1e-12)
 
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_mirrored_points_still_give_a_proper_rotation(flat):
     x = CORNERS * [1, 1, 0] if flat else CORNERS
-    found = fit_rigid(x, x * [-1, 1, 1])
+    found = Similarity.rigid(x, x * [-1, 1, 1])
     assert np.linalg.det(found.R) == pytest.approx(1, abs=1e-12)
     residual = np.abs(found.apply(x) - x * [-1, 1, 1]).max()
     assert (residual < 1e-12) == flat  # a flat set fits its mirror image exactly, turned over
@@ -127,30 +127,32 @@ LINE = np.linspace(0, 1, 6)[:, None] * [0.01, 0.02, 0.03] + 0.1
 )
 def test_degenerate_sources_are_refused(x, said):
     with pytest.raises(RegistrationError, match=said):
-        fit_rigid(x, x)
+        Similarity.rigid(x, x)
 
 
 def test_degenerate_targets_are_refused():
     with pytest.raises(RegistrationError, match="target points: 5 coincident"):
-        fit_rigid(CORNERS, np.ones((5, 3)))
+        Similarity.rigid(CORNERS, np.ones((5, 3)))
     with pytest.raises(RegistrationError, match=r"target points \[m\]: shape \(4, 3\)"):
-        fit_rigid(CORNERS, CORNERS[:4])
+        Similarity.rigid(CORNERS, CORNERS[:4])
 
 
 @pytest.mark.parametrize("w", [[1, 1, 0, 0, 0], [0, 0, 0, 0, 0]])
 def test_weights_that_leave_too_few_points_are_refused(w):
     with pytest.raises(RegistrationError, match="a fit in 3-D needs 3"):
-        fit_rigid(CORNERS, CORNERS, w)
+        Similarity.rigid(CORNERS, CORNERS, w)
 
 
 def test_negative_weights_are_refused():
     with pytest.raises(RegistrationError, match="weights: 1 below 0, smallest -2"):
-        fit_rigid(CORNERS, CORNERS, [1, 1, 1, 1, -2])
+        Similarity.rigid(CORNERS, CORNERS, [1, 1, 1, 1, -2])
 
 
 def test_two_points_on_a_plane_are_enough():
     x = np.array([[0.0, 0], [1, 0]])
-    np.testing.assert_allclose(fit_rigid(x, [[0, 0], [0, 1]]).R, [[0, -1], [1, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        Similarity.rigid(x, [[0, 0], [0, 1]]).R, [[0, -1], [1, 0]], atol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -174,6 +176,6 @@ def test_four_dimensions_are_refused():
 
 
 def test_arrays_are_read_only():
-    T = fit_rigid(CORNERS, CORNERS)
+    T = Similarity.rigid(CORNERS, CORNERS)
     with pytest.raises(ValueError, match="read-only"):
         T.R[0, 0] = 2

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
-from validate.register import Similarity, fit_rigid, fit_two_step
+from validate.register import Similarity, fit_two_step
 from validate.register.markers.transform import fit_plane
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -28,7 +28,7 @@ def test_agrees_with_rigid_on_exact_planar_points(seed, with_up):
     T = some_pose(seed)
     x, y = flat(seed), T.apply(flat(seed))
     found = fit_two_step(x, y, up=(UP, T.R @ UP) if with_up else None)
-    np.testing.assert_allclose(found.matrix, fit_rigid(x, y).matrix, atol=1e-12)
+    np.testing.assert_allclose(found.matrix, Similarity.rigid(x, y).matrix, atol=1e-12)
     np.testing.assert_allclose(found.matrix, T.matrix, atol=1e-12)
 
 
@@ -58,7 +58,7 @@ def test_noise_keeps_it_near_rigid_but_not_equal():
     rng = np.random.default_rng(6)
     x = flat(6) + rng.normal(0, 0.01, (20, 3))
     y = flat(6)
-    apart = np.abs(fit_two_step(x, y).apply(x) - fit_rigid(x, y).apply(x)).max()
+    apart = np.abs(fit_two_step(x, y).apply(x) - Similarity.rigid(x, y).apply(x)).max()
     assert 1e-6 < apart < 2e-3  # second order in the noise
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validate.errors import SceneError
-from validate.fem.system import build, responses
+from validate.fem.system import Responses, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.refinement import _filling, coarser, size_against
 from validate.scene.material import Material
@@ -74,7 +74,7 @@ def test_its_answer_bounds_the_error_of_the_own_mesh() -> None:
             mesh, Material(1e4, 0.45), (Support("x0"), Support("x1", (1, 2))),
             drives=(Drive("press", "x1", (-1.0, 0.0, 0.0)),), dilatation="nodal_mean",
         )  # fmt: skip
-        return float(responses(build(scene)).reactions[0, 0])
+        return float(Responses.of(build(scene)).reactions[0, 0])
 
     own, finest = box(SIZE, (12, 8, 8)), box(SIZE, (24, 16, 16))
     coarse = coarser(own)

@@ -3,7 +3,7 @@
 import pytest
 from phantoms import grid_mesh, phantom_responses
 
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Scene, Support
 
@@ -27,4 +27,4 @@ def two_cavities() -> Responses:
     supports = (Support("x0", (0, 1, 2)),)
     drives = (Drive("stage", "x1", (-1.0, 0.0, 0.0)),)
     cavities = (Cavity("left", "hole0"), Cavity("right", "hole1"))
-    return responses(build(Scene(mesh, Material(1e4, 0.4), supports, (), drives, cavities)))
+    return Responses.of(build(Scene(mesh, Material(1e4, 0.4), supports, (), drives, cavities)))

@@ -15,7 +15,7 @@ from validate.scene.material import Region
 from validate.solve.amplification import amplification
 from validate.solve.dynamic.linear import Moving
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 from validate.solve.types import Stepper
@@ -87,7 +87,7 @@ def test_the_misprinted_update_is_unstable_from(xi: float, limit: float) -> None
     def radius(x: float) -> float:
         c, k = np.array([2 * xi * x]), np.array([x * x])
         return float(
-            spectral_radii(newmark_maps(rule_of("average", 1.0), c, k, misprinted=True))[0]
+            spectral_radii(newmark_maps(Rule.of("average", 1.0), c, k, misprinted=True))[0]
         )
 
     assert radius(limit - 0.006) < 1 + 1e-9
@@ -97,7 +97,7 @@ def test_the_misprinted_update_is_unstable_from(xi: float, limit: float) -> None
 
 def test_average_acceleration_neither_grows_nor_decays_undamped() -> None:
     x = np.array([0.01, 1.0, 100.0])
-    radii = spectral_radii(newmark_maps(rule_of("average", 1.0), np.zeros(3), x**2))
+    radii = spectral_radii(newmark_maps(Rule.of("average", 1.0), np.zeros(3), x**2))
     assert radii == pytest.approx(np.ones(3), abs=1e-7)
 
 

@@ -11,14 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.linear_solvers.condense import (
-    Condensed,
-    WorkingSet,
-    along,
-    between,
-    condense,
-    displaced,
-)
+from validate.fem.linear_solvers.condense import Condensed, WorkingSet, along, between, displaced
 from validate.fem.system import System, build
 
 
@@ -34,7 +27,7 @@ def body() -> System:
 @pytest.fixture(scope="module")
 def small(body: System) -> Condensed:
     """On the cavity, the plate and 12 nodes of the upper side."""
-    return condense(body, _top(body)[::5])
+    return Condensed.of(body, _top(body)[::5])
 
 
 def _top(body: System) -> Ints:
@@ -88,7 +81,7 @@ def test_what_is_kept_changes_nothing(body: System, small: Condensed, keep: str)
         "cavity": mesh.facet_nodes("cavity")[:1],
         "all": np.arange(len(mesh.nodes)),
     }[keep]
-    other = condense(body, nodes)
+    other = Condensed.of(body, nodes)
     node = int(mesh.facet_nodes("cavity")[3])
     unknowns = [3 * int(np.searchsorted(c.nodes, node)) + 1 for c in (small, other)]
     common = np.intersect1d(small.nodes, other.nodes)
@@ -101,7 +94,7 @@ def test_what_is_kept_changes_nothing(body: System, small: Condensed, keep: str)
 
 def test_order_of_the_nodes_changes_nothing(body: System, small: Condensed) -> None:
     shuffled = np.random.default_rng(0).permutation(_top(body)[::5])
-    again = condense(body, shuffled)
+    again = Condensed.of(body, shuffled)
     assert np.array_equal(again.nodes, small.nodes)
     assert again.compliance == pytest.approx(small.compliance, abs=0)
 
@@ -120,14 +113,14 @@ def test_a_tool_cannot_move_what_is_held(body: System, small: Condensed) -> None
     with pytest.raises(SceneError, match="is held or driven"):
         small.column(held)
     with pytest.raises(SceneError, match="to keep of a mesh of"):
-        condense(body, np.array([10**6]))
+        Condensed.of(body, np.array([10**6]))
 
 
 @pytest.mark.parametrize("short", [1e-2, 1e-4, 1e-6, 1e-8, 2e-10])
 def test_near_incompressibility_costs_the_digits_it_has_to(short: float) -> None:
     """nu = (1 - short)/2 to .4999999999: the condition grows as 1/short, the error no faster."""
     body = system(nu=(1 - short) / 2)
-    small = condense(body, np.zeros(0, dtype=np.int64))
+    small = Condensed.of(body, np.zeros(0, dtype=np.int64))
     i = int(small.free[5])
     error = small.relative_error(i)
     assert 0 < error < 1e-13 / short
@@ -205,7 +198,7 @@ def test_a_point_between_nodes_moves_as_asked(share: float, by: float) -> None:
 
 @cache
 def _phantom() -> Condensed:
-    return condense(system(), np.zeros(0, dtype=np.int64))
+    return Condensed.of(system(), np.zeros(0, dtype=np.int64))
 
 
 def test_the_same_row_twice_is_refused(small: Condensed) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from phantoms import COARSE_GRID, grid_mesh, phantom_mesh, phantom_responses, phantom_scene
 
 from validate.errors import SceneError
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.fluid.cavities import ExactPressure, NoFluid, PulsePressure
@@ -67,7 +67,9 @@ def test_no_drive_gives_no_pressure_and_no_update(scheme: type[Scheme], phantom:
 def test_every_scheme_runs_a_scene_without_cavity(scheme: type[Scheme]) -> None:
     mesh = grid_mesh((3, 3, 3))
     drives = (Drive("press", "x1", (-1.0, 0.0, 0.0)),)
-    dry = responses(build(Scene(mesh, Material(1.0, 0.3), (Support("x0", (0, 1, 2)),), (), drives)))
+    dry = Responses.of(
+        build(Scene(mesh, Material(1.0, 0.3), (Support("x0", (0, 1, 2)),), (), drives))
+    )
     state = stepped(scheme(), dry, 0.1)
     assert pressures(state).shape == (0,)
     assert state.inner.surface.shape == (27,)
@@ -78,7 +80,7 @@ def test_every_scheme_runs_a_scene_without_cavity(scheme: type[Scheme]) -> None:
 def test_scene_that_nothing_moves_is_refused(scheme: type[Scheme]) -> None:
     held = Scene(grid_mesh((3, 3, 3)), Material(1.0, 0.3), (Support("x0", (0, 1, 2)),))
     with pytest.raises(SceneError, match="nothing moves"):
-        scheme().on(responses(build(held)))
+        scheme().on(Responses.of(build(held)))
 
 
 @pytest.mark.parametrize(

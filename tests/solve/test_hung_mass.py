@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
@@ -144,7 +144,7 @@ def beam(hung: float) -> Scene:
 def test_a_beam_with_a_tip_mass_rings_as_rayleigh_says(ratio: float) -> None:
     """omega^2 = 3 E I/L^3/(M + 33/140 m), from above by some tenths of a per cent."""
     body = RHO * 0.05
-    omega = modes_of(build(beam(ratio * body)), 1).omega[0]
+    omega = Modes.of(build(beam(ratio * body)), 1).omega[0]
     exact = np.sqrt(3 * 1e7 * 0.05**3 / 12 / (ratio * body + 33 / 140 * body))
     assert omega == pytest.approx(exact, rel=5e-3)
 

@@ -11,7 +11,7 @@ from inertial_scenes import TOTAL, cube, driven, exact, small
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Material, Region
@@ -63,7 +63,7 @@ def test_a_load_that_is_switched_on_is_followed_exactly(damping: float, dt: floa
 
 def test_critical_damping_has_its_own_formula() -> None:
     """alpha_1 = 2/w makes two roots one in that mode."""
-    omega = float(modes_of(small(0.0, 0.0)).omega[3])
+    omega = float(Modes.of(small(0.0, 0.0)).omega[3])
     test_a_load_that_is_switched_on_is_followed_exactly(2 / omega, 0.01)
     test_a_load_that_is_switched_on_is_followed_exactly(2 / omega * (1 + 1e-9), 0.01)
 
@@ -133,7 +133,7 @@ def twins() -> System:
 def test_clusters_are_taken_whole() -> None:
     system = twins()
     for asked, given in ((1, 2), (2, 2), (3, 4), (5, 6)):
-        modes = modes_of(system, asked)
+        modes = Modes.of(system, asked)
         assert len(modes.omega) == given
         assert modes.omega[::2] == pytest.approx(modes.omega[1::2], rel=1e-10)
     # Half of a cluster would move one twin and not the other.
@@ -150,7 +150,7 @@ def test_modes_are_orthonormal_and_solve_their_equation(order: str) -> None:
         mesh = box((0.1, 0.1, 0.1), (8, 8, 8))
         material = Material(1e4, 0.3, rho=1000.0, mass_damping=3.0, stiffness_damping=0.01)
         system, count = build(Scene(mesh, material, (Support("z0", (0, 1, 2)),))), 6
-    modes, free = modes_of(system, count), system.free
+    modes, free = Modes.of(system, count), system.free
     K, M = (X[free][:, free] for X in (system.K, system.M))
     assert modes.shapes.T @ (M @ modes.shapes) == pytest.approx(np.eye(len(modes.omega)), abs=1e-9)
     residual = K @ modes.shapes - (M @ modes.shapes) * modes.omega**2

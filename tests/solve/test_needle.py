@@ -107,18 +107,18 @@ def test_the_field_holds_equilibrium_and_the_volume() -> None:
     state = walked(stepper, pushed(0.004))[-1]
     system = stepper.small._system
     u = stepper.field(state)
-    from validate.fem.cavity import pressure_load, volume_of
+    pass
 
     pocket = system.cavities[0]
-    left = system.K @ u.ravel() - state.inner.P * pressure_load(pocket, block().nodes).ravel()
+    left = system.K @ u.ravel() - state.inner.P * pocket.pressure_load(block().nodes).ravel()
     nodes = stepper.small.nodes[state.inner.touch.entry.nodes]
     others = np.setdiff1d(system.free, (2 * nodes[:, None] + [0, 1]).ravel())
     assert np.abs(left[others]).max() < 1e-10 * np.abs(left).max()
     total = np.array([left[2 * nodes + c].sum() for c in (0, 1)])
     reaction = -state.inner.forces @ state.inner.touch.axes
     assert -total == pytest.approx(reaction, rel=1e-9)
-    assert volume_of(pocket, block().nodes + u) == pytest.approx(
-        volume_of(pocket, block().nodes), rel=1e-12
+    assert pocket.volume(block().nodes + u) == pytest.approx(
+        pocket.volume(block().nodes), rel=1e-12
     )
 
 

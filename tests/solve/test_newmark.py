@@ -9,14 +9,14 @@ from inertial_scenes import TOTAL, cube, driven, exact, orders, small
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.system import System, build, responses
+from validate.fem.system import Responses, System, build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Scene
 from validate.solve.dynamic.linear import excitation
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
+from validate.solve.dynamic.newmark_rule import Rule, RuleName, propagation
 from validate.solve.march import march
 from validate.solve.static.linear_solvers import SolverName, solver_of
 from validate.solve.static.quasi_static import QuasiStatic
@@ -81,7 +81,7 @@ def test_order_under_a_load_that_grows_from_nothing(rule: RuleName) -> None:
 def test_order_under_a_drive(rule: RuleName) -> None:
     """q = t^3: q, q', q'' push by K, C, M; lumped masses couple no prescribed unknown."""
     system = build(replace(driven().scene, loads=()))
-    columns = excitation(system, rule_of(rule, 1.0), "lumped")
+    columns = excitation(system, Rule.of(rule, 1.0), "lumped")
     assert np.abs(columns.mass).max() == 0.0
     power = np.diag([3.0, 2.0, 1.0], 1)  # (t^3, t^2, t, 1)
     q = np.array([[1.0, 0, 0, 0], [0, 3.0, 0, 0]])
@@ -150,7 +150,7 @@ def test_the_quasi_static_force_is_that_of_the_response_columns() -> None:
     system = build(scene)
     stepper = QuasiStatic().prepare(system)
     force = stepper.step(stepper.rest(), np.array([0.003])).numbers["press.force"]
-    assert force == pytest.approx(0.003 * responses(system).reactions[0, 0], rel=1e-12)
+    assert force == pytest.approx(0.003 * Responses.of(system).reactions[0, 0], rel=1e-12)
     assert force > 0
 
 
@@ -241,7 +241,7 @@ def test_every_solver_makes_the_same_steps(solver: SolverName) -> None:
 
 @pytest.mark.parametrize("solver", get_args(SolverName))
 def test_solvers_take_several_right_hand_sides(solver: SolverName) -> None:
-    p = propagation(driven(), rule_of("average", 0.002))
+    p = propagation(driven(), Rule.of("average", 0.002))
     b = np.random.default_rng(2).standard_normal((len(p.free), 2))
     nodes = driven().scene.mesh.nodes
     x = solver_of(solver, p.J, p.free // 3, nodes, 1e-12).solve(b)
@@ -250,7 +250,7 @@ def test_solvers_take_several_right_hand_sides(solver: SolverName) -> None:
 
 @pytest.mark.parametrize("solver", ["gaussian_elimination", "dense_solve", "dense_inverse"])
 def test_dense_matrices_have_a_largest_size(solver: SolverName) -> None:
-    J = propagation(small(), rule_of("average", 0.002)).J.__class__((4001, 4001))
+    J = propagation(small(), Rule.of("average", 0.002)).J.__class__((4001, 4001))
     with pytest.raises(SceneError, match=rf"{solver} with 4001 unknowns: .* 4000"):
         solver_of(solver, J, np.arange(4001), np.zeros((4001, 3)))
 
@@ -258,7 +258,7 @@ def test_dense_matrices_have_a_largest_size(solver: SolverName) -> None:
 @pytest.mark.parametrize("rule", RULES)
 def test_the_state_equation_is_the_papers(rule: RuleName) -> None:
     """u' = J^-1 (A u + L v + M_a a + f) with the balance it stands for (paper 001, eqs 8-14)."""
-    system, r = driven(), rule_of(rule, 0.002, 0.6)
+    system, r = driven(), Rule.of(rule, 0.002, 0.6)
     p = propagation(system, r)
     u, v, a, f = np.random.default_rng(3).standard_normal((4, len(p.free)))
     new = p.predict(u, v, a, f)
@@ -306,4 +306,4 @@ def test_a_body_without_supports_is_refused_by_statics() -> None:
 
 def test_a_step_whose_square_vanishes_is_refused() -> None:
     with pytest.raises(SceneError, match="time step 1e-300 s: its square"):
-        rule_of("average", 1e-300)
+        Rule.of("average", 1e-300)

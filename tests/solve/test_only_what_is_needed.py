@@ -12,7 +12,7 @@ from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 import validate.fem.system as matrices_module
 import validate.fem.system as system_module
 import validate.solve.explicit.central as central_module
-import validate.solve.static.newton as equilibrium_module
+from validate.fem.cavity import CavitySurface
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.geometries.box import box
@@ -35,15 +35,14 @@ PARTS = {
     "damping": (system_module, "stiffness_damping"),
     "mass of damping": (matrices_module, "mass_matrix"),
     "cavity": (system_module, "cavity_surface"),
-    "pressure load": (system_module, "pressure_load"),
+    "pressure load": (CavitySurface, "pressure_load"),
     "volume": (system_module, "volume_form"),
-    "large volume": (equilibrium_module, "volume_of"),
-    "large pressure": (equilibrium_module, "pressure_load"),
+    "large volume": (CavitySurface, "volume"),
     "mass at large strain": (central_module, "mass"),
     "tangent": (Body, "tangent"),
 }
 INERTIA = {"mass", "damping", "mass of damping", "mass at large strain"}
-PRESSURE = {"cavity", "pressure load", "volume", "large volume", "large pressure"}
+PRESSURE = {"cavity", "pressure load", "volume", "large volume"}
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Contours
 from validate.register.outlines.outlines import observe_outlines
-from validate.register.outlines.plane import cavity_sampler
+from validate.register.outlines.plane import SurfaceSampler
 from validate.scene.geometries.box import box
 from validate.study.filters.cell import folds_of, run_cell
 from validate.study.filters.page import against_first, study_exhibits
@@ -111,7 +111,7 @@ def test_an_outline_moves_along_its_normals_as_the_wall_does() -> None:
     mesh = box((1.0, 1.0, 1.0), (4, 4, 4))
     sides = np.concatenate([mesh.facets[s] for s in ("x0", "x1", "y0", "y1", "z0", "z1")])
     mesh = replace(mesh, facets={**mesh.facets, "all": sides})
-    wall = cavity_sampler(mesh, "all", None, 1)
+    wall = SurfaceSampler.of_cavity(mesh, "all", None, 1)
     pose = np.eye(4)
     pose[2, 3] = 0.4
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

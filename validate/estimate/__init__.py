@@ -4,7 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "filters": ("FILTERS", "Filter"),
-    "measurements": ("Measurements", "measurements"),
+    "measurements": ("Measurements",),
     "consistency": ("Consistency", "nees_consistency", "nis_consistency"),
     "kalman.kf_fem": ("KfFem",),
     "filterpy.filters": ("FilterpyFilter",),

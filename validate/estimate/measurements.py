@@ -96,6 +96,27 @@ class Measurements:
         """H over the free unknowns, dense (m, free)."""
         return np.ascontiguousarray(self.H[:, free].toarray())
 
+    @classmethod
+    def taken(cls, registered: Registered, mesh: Mesh) -> "Measurements":
+        """Displacements of the registered markers from their rest layout, and of outlines along
+        their normals, from rest: `<outline>.<number>`.
+
+        Samples of a jittering camera, which no step meets, are interpolated onto the steps; see
+        `on_steps`. Raises `ComparisonError` without either and for rows of another mesh.
+        """
+        markers, outlines = registered.of(MarkerObservation), registered.of(OutlineObservation)
+        found = [_of_markers(m, registered, mesh) for m in markers[:1]]
+        for outline in outlines:
+            along = outline.along_normals(NORMALS)
+            names = tuple(f"{outline.name}.{i}" for i in range(NORMALS))
+            t, z, sd = on_steps(outline.t, along.z, np.full(NORMALS, along.sd), registered.t)
+            found.append(cls(t, along.H, z, sd, names, outline.sd_t))
+        if not found:
+            raise ComparisonError(
+                "the recording has no markers and no outlines, so the filter has no measurements"
+            )
+        return together(found)
+
 
 @dataclass(frozen=True)
 class Timetable:
@@ -175,27 +196,6 @@ def _landed(t: Floats, dt: float) -> float | None:
     first = int(np.ceil(gap / dt))
     parts = range(first, first + _FINEST)
     return next((gap / n for n in parts if _nearest(t, gap / n)[1].max() <= OFF_STEP), None)
-
-
-def measurements(registered: Registered, mesh: Mesh) -> Measurements:
-    """Displacements of the registered markers from their rest layout, and of outlines along their
-    normals, from rest: `<outline>.<number>`.
-
-    Samples of a jittering camera, which no step meets, are interpolated onto the steps; see
-    `on_steps`. Raises `ComparisonError` without either and for rows of another mesh.
-    """
-    markers, outlines = registered.of(MarkerObservation), registered.of(OutlineObservation)
-    found = [_of_markers(m, registered, mesh) for m in markers[:1]]
-    for outline in outlines:
-        along = outline.along_normals(NORMALS)
-        names = tuple(f"{outline.name}.{i}" for i in range(NORMALS))
-        t, z, sd = on_steps(outline.t, along.z, np.full(NORMALS, along.sd), registered.t)
-        found.append(Measurements(t, along.H, z, sd, names, outline.sd_t))
-    if not found:
-        raise ComparisonError(
-            "the recording has no markers and no outlines, so the filter has no measurements"
-        )
-    return together(found)
 
 
 def together(every: Sequence[Measurements]) -> Measurements:

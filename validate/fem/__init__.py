@@ -3,10 +3,10 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "system": ("Responses", "System", "build", "responses"),
+    "system": ("Responses", "System", "build"),
     "assembly.assemble": ("mass", "stiffness"),
     "laws.law": ("Law", "law_of"),
-    "critical": ("CriticalStep", "critical_step", "Modes", "modes_of"),
+    "critical": ("CriticalStep", "critical_step", "Modes"),
     "assembly.locate": ("Rows",),
 }
 

@@ -35,13 +35,32 @@ class CavitySurface:
         """Return the facets (f, m) in positions of `nodes`."""
         return np.searchsorted(self.nodes, self.facets)
 
+    def volume(self, positions: Floats) -> float:
+        """Volume m^3 for the positions (n, d) m of all mesh nodes; in 2-D m^3 per metre."""
+        return float(volume_form(self, positions[None])[0, 0, 0])
+
+    def pressure_load(self, positions: Floats) -> Floats:
+        """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
+        rule = _rule(self, positions)
+        x = positions[self.facets]
+        along = rule.jacobians(x)
+        # Normals (f, q, d) into the solid, as long as the facet is large
+        if x.shape[2] == 2:
+            normals = np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
+        else:
+            normals = -np.cross(along[..., 0], along[..., 1])
+        nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, normals)
+        load = np.zeros_like(positions)
+        np.add.at(load, self.facets, nodal)
+        return load
+
 
 def cavity_surface(mesh: Mesh, name: str, facets: str) -> CavitySurface:
     """Return the named facet set as a cavity; raises `SceneError` when open, flipped or inside
     out."""
     surface = CavitySurface(name, mesh.facets[facets], mesh.facet_nodes(facets))
     (_require_closed_line if mesh.dimension == 2 else _require_closed)(surface)
-    volume = volume_of(surface, mesh.nodes)
+    volume = surface.volume(mesh.nodes)
     if volume <= 0:
         raise SceneError(f"cavity '{name}' is turned inside out: volume {1e9 * volume:.4g} mm3")
     return surface
@@ -66,27 +85,6 @@ def _require_closed_line(surface: CavitySurface) -> None:
     starts, ends = np.sort(surface.facets[:, 0]), np.sort(surface.facets[:, 1])
     if not np.array_equal(starts, ends) or len(np.unique(starts)) != len(starts):
         raise SceneError(f"cavity '{surface.name}' is open or its facets face opposite ways")
-
-
-def volume_of(surface: CavitySurface, positions: Floats) -> float:
-    """Volume m^3 for the positions (n, d) m of all mesh nodes; in 2-D m^3 per metre."""
-    return float(volume_form(surface, positions[None])[0, 0, 0])
-
-
-def pressure_load(surface: CavitySurface, positions: Floats) -> Floats:
-    """dV/dx (n, d) m^(d - 1): nodal forces of a unit pressure, fluid pushing on the solid."""
-    rule = _rule(surface, positions)
-    x = positions[surface.facets]
-    along = rule.jacobians(x)
-    # Normals (f, q, d) into the solid, as long as the facet is large
-    if x.shape[2] == 2:
-        normals = np.stack([-along[..., 1, 0], along[..., 0, 0]], axis=-1)
-    else:
-        normals = -np.cross(along[..., 0], along[..., 1])
-    nodal = np.einsum("q,qm,fqd->fmd", rule.weights, rule.N, normals)
-    load = np.zeros_like(positions)
-    np.add.at(load, surface.facets, nodal)
-    return load
 
 
 def volume_form(surface: CavitySurface, columns: Floats) -> Floats:

@@ -223,14 +223,14 @@ class Modes:
     omega: Floats
     damping: Floats
 
+    @classmethod
+    def of(cls, system: System, count: int | None = None) -> "Modes":
+        """Return the lowest modes, with the whole of the last cluster of equal frequencies.
 
-def modes_of(system: System, count: int | None = None) -> Modes:
-    """Return the lowest modes, with the whole of the last cluster of equal frequencies.
-
-    They are kept with the system. Raises `SceneError` for more modes than unknowns or a C that they
-    do not make diagonal.
-    """
-    return once(system, ("modes", count), lambda: _modes(system, count))
+        They are kept with the system. Raises `SceneError` for more modes than unknowns or a C that
+        they do not make diagonal.
+        """
+        return once(system, ("modes", count), lambda: _modes(system, count))
 
 
 def _modes(system: System, count: int | None) -> Modes:

@@ -8,7 +8,7 @@ condensed inverse of paper 000, eqs 18-20, for just the inputs that the scene ha
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from validate.fem.assembly.assemble import (
     stiffness_damping,
 )
 from validate.fem.assembly.assemble import mass as mass_matrix
-from validate.fem.cavity import CavitySurface, cavity_surface, pressure_load, volume_form
+from validate.fem.cavity import CavitySurface, cavity_surface, volume_form
 from validate.fem.linear_solvers.factor import Factor, Fronts, factorise, require_assembly
 from validate.scene.mesh import Mesh
 from validate.scene.places import Place, nodes_of
@@ -164,6 +164,45 @@ class Responses:
         """Volume m^3 of every cavity at rest."""
         return np.asarray(self.volumes[:, 0, 0, 0])
 
+    @classmethod
+    def of(cls, system: System) -> Self:
+        """Solve for every response column: one factorisation, one solve per input.
+
+        Raises `SceneError` for a law at large strain: its fields are no sums of columns.
+        """
+        law = system.scene.material.law
+        if law != "linear":
+            raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
+        if system.scene.loads:
+            raise SceneError(
+                "response columns support drives and cavities only; for loads use a dynamic scheme"
+            )
+        mesh, factor = system.scene.mesh, system.factor()
+        loads = [c.pressure_load(mesh.nodes).ravel() for c in system.cavities]
+        columns = []
+        for move in system.moves.T:
+            u = move.copy()
+            u[system.free] = factor.solve(-(system.K @ move)[system.free])
+            columns.append(u)
+        for load in loads:
+            u = np.zeros_like(load)
+            u[system.free] = factor.solve(load[system.free])
+            columns.append(u)
+        fields = np.array(columns).reshape(-1, *mesh.nodes.shape)
+        shapes = np.concatenate([mesh.nodes[None], fields])
+        forms = [volume_form(c, shapes) for c in system.cavities]
+        volumes = np.array(forms).reshape(-1, *(3 * [len(shapes)]))  # also without cavities
+        # Force of each drive on the body along it: residual K u - f of every column
+        drives = len(system.scene.drives)
+        residuals = [system.K @ u for u in columns]
+        for i, load in enumerate(loads):
+            residuals[drives + i] = residuals[drives + i] - load
+        copies = system.scene.copies
+        reactions = np.array(
+            [[copies * float(move @ r) for r in residuals] for move in system.moves.T]
+        )
+        return cls(system.scene, fields, reactions, volumes)
+
 
 def build(scene: Scene) -> System:
     """Assemble the scene; raises `SceneError` for elements, supports or cavities that fail."""
@@ -215,43 +254,6 @@ def build(scene: Scene) -> System:
     _require_felt(scene, held & ~moves.any(axis=1))
     cavities = tuple(cavity_surface(mesh, c.name, c.facets) for c in scene.cavities)
     return System(scene, np.flatnonzero(~held), moves, cavities)
-
-
-def responses(system: System) -> Responses:
-    """Solve for every response column: one factorisation, one solve per input.
-
-    Raises `SceneError` for a law at large strain: its fields are no sums of columns.
-    """
-    law = system.scene.material.law
-    if law != "linear":
-        raise SceneError(f"a linear scheme cannot solve the law '{law}'; use StaticNewton")
-    if system.scene.loads:
-        raise SceneError(
-            "response columns support drives and cavities only; for loads use a dynamic scheme"
-        )
-    mesh, factor = system.scene.mesh, system.factor()
-    loads = [pressure_load(c, mesh.nodes).ravel() for c in system.cavities]
-    columns = []
-    for move in system.moves.T:
-        u = move.copy()
-        u[system.free] = factor.solve(-(system.K @ move)[system.free])
-        columns.append(u)
-    for load in loads:
-        u = np.zeros_like(load)
-        u[system.free] = factor.solve(load[system.free])
-        columns.append(u)
-    fields = np.array(columns).reshape(-1, *mesh.nodes.shape)
-    shapes = np.concatenate([mesh.nodes[None], fields])
-    forms = [volume_form(c, shapes) for c in system.cavities]
-    volumes = np.array(forms).reshape(-1, *(3 * [len(shapes)]))  # also without cavities
-    # Force of each drive on the body along it: residual K u - f of every column
-    drives = len(system.scene.drives)
-    residuals = [system.K @ u for u in columns]
-    for i, load in enumerate(loads):
-        residuals[drives + i] = residuals[drives + i] - load
-    copies = system.scene.copies
-    reactions = np.array([[copies * float(move @ r) for r in residuals] for move in system.moves.T])
-    return Responses(system.scene, fields, reactions, volumes)
 
 
 def _require_felt(scene: Scene, held: NDArray[np.bool_]) -> None:

@@ -7,7 +7,7 @@ _HOMES = {
     "least_squares": ("Fit", "fit", "Range", "Side", "side", "Space", "whitened"),
     "scaled_curve": ("ScaledFit", "UnitCurve", "fit_scaled"),
     "budget": ("IdentifiedValue", "Pattern", "pattern"),
-    "modulus": ("ModulusFit", "fit_modulus"),
+    "modulus": ("ModulusFit",),
 }
 
 __all__ = names(_HOMES)

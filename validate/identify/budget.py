@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf, isfinite, sqrt
 from types import MappingProxyType
-from typing import cast
+from typing import Self, cast
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -55,17 +55,17 @@ class Votes:
             return float(self.between / np.sqrt(len(self.means)))
         return None if self.within is None else float(self.within / np.sqrt(self.logs))
 
-
-def by_specimen(values: Sequence[float], specimens: Sequence[str]) -> Votes:
-    """Values of logs, and the specimen of each; every specimen has one vote."""
-    of = {s: np.array([v for v, o in zip(values, specimens, strict=True) if o == s])
-          for s in dict.fromkeys(specimens)}  # fmt: skip
-    means = {s: float(v.mean()) for s, v in of.items()}
-    between = float(np.std(list(means.values()), ddof=1)) if len(means) > 1 else None
-    freedom = len(values) - len(means)
-    spread = sum(float(((v - v.mean()) ** 2).sum()) for v in of.values())
-    within = float(np.sqrt(spread / freedom)) if freedom > 0 else None
-    return Votes(means, between, within, len(values))
+    @classmethod
+    def by_specimen(cls, values: Sequence[float], specimens: Sequence[str]) -> Self:
+        """Values of logs, and the specimen of each; every specimen has one vote."""
+        of = {s: np.array([v for v, o in zip(values, specimens, strict=True) if o == s])
+              for s in dict.fromkeys(specimens)}  # fmt: skip
+        means = {s: float(v.mean()) for s, v in of.items()}
+        between = float(np.std(list(means.values()), ddof=1)) if len(means) > 1 else None
+        freedom = len(values) - len(means)
+        spread = sum(float(((v - v.mean()) ** 2).sum()) for v in of.values())
+        within = float(np.sqrt(spread / freedom)) if freedom > 0 else None
+        return cls(means, between, within, len(values))
 
 
 # -------------------------------------------------------------------------------------------------
@@ -273,7 +273,7 @@ def averaged(logs: Sequence[Recording], labels: Sequence[str], name: str) -> Rec
         )
     d = np.linspace(start, end, count)
     forces = np.array([np.interp(d, p.d, p.force) for p in paths])
-    votes = [by_specimen(column, labels) for column in forces.T.tolist()]
+    votes = [Votes.by_specimen(column, labels) for column in forces.T.tolist()]
     mean, sd = np.array([v.mean for v in votes]), np.array([v.sd_mean or 0.0 for v in votes])
     t = np.mean([np.interp(d, p.d, p.t) for p in paths], axis=0)
     sign = 1.0 if test == "compression" else -1.0

@@ -70,6 +70,49 @@ class ModulusFit:
     residual_rms: float  # N
     r_squared: float
 
+    @classmethod
+    def of(
+        cls,
+        recording: Recording,
+        cylinder: CylinderSize | None = None,
+        window: tuple[float, float] = WINDOW,
+        test: TestKind = "compression",
+    ) -> "ModulusFit":
+        """E over a strain window of one log with signals `displacement` (m) and `force` (N).
+
+        `cylinder` None: the one in the recording. Raises `UsageError` for an
+        empty window and `RecordingError` when the log does not cover it with 10 samples.
+        """
+        low, high = window
+        if not (math.isfinite(high) and 0 <= low < high):
+            raise UsageError(f"strain window {window}: expected 0 <= low < high, e.g. {WINDOW}")
+        cylinder = cylinder or cylinder_of(recording)
+        log = loading(recording, test)
+        d, force = log.d, log.force
+        # Noise of the log's first part, up to `reach` (m) from its first displacement.
+        beyond = d - d[0] > (cylinder.height * high)
+        count = int(np.argmax(beyond)) if beyond.any() else len(d)
+        noise = load_noise(force[: max(count, MIN_SAMPLES)])
+        offset, contact = zero_of(d, force, noise, cylinder.height * low)
+        strain = (d - contact) / cylinder.height
+        # The first loading: samples before the first beyond the window, else to the largest
+        # strain.
+        beyond = strain > high
+        end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
+        used = np.arange(len(strain)) < end
+        used &= (strain >= low) & (strain <= high)
+        low, high = window
+        count = int(used.sum())
+        if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
+            raise RecordingError(
+                f"{recording.name}: strain from {strain.min():.4f} to {strain.max():.4f} with "
+                f"{count} samples in the window {low}-{high}; expected to cover it with "
+                f"{MIN_SAMPLES}: choose another"
+            )
+        return _fit(
+            recording.name, strain[used], force[used], cylinder.area, offset, contact, window
+        )
+
 
 def cylinder_of(recording: Recording) -> CylinderSize:
     """Return the cylinder in the recording's `specimen` record (`diameter_m`, `height_m`).
@@ -87,46 +130,6 @@ def cylinder_of(recording: Recording) -> CylinderSize:
                 "declare the size of the cylinder"
             ) from error
     return CylinderSize(*sizes)
-
-
-def fit_modulus(
-    recording: Recording,
-    cylinder: CylinderSize | None = None,
-    window: tuple[float, float] = WINDOW,
-    test: TestKind = "compression",
-) -> ModulusFit:
-    """E over a strain window of one log with signals `displacement` (m) and `force` (N).
-
-    `cylinder` None: the one in the recording. Raises `UsageError` for an
-    empty window and `RecordingError` when the log does not cover it with 10 samples.
-    """
-    low, high = window
-    if not (math.isfinite(high) and 0 <= low < high):
-        raise UsageError(f"strain window {window}: expected 0 <= low < high, e.g. {WINDOW}")
-    cylinder = cylinder or cylinder_of(recording)
-    log = loading(recording, test)
-    d, force = log.d, log.force
-    # Noise of the log's first part, up to `reach` (m) from its first displacement.
-    beyond = d - d[0] > (cylinder.height * high)
-    count = int(np.argmax(beyond)) if beyond.any() else len(d)
-    noise = load_noise(force[: max(count, MIN_SAMPLES)])
-    offset, contact = zero_of(d, force, noise, cylinder.height * low)
-    strain = (d - contact) / cylinder.height
-    # The first loading: samples before the first beyond the window, else to the largest
-    # strain.
-    beyond = strain > high
-    end = int(np.argmax(beyond)) if beyond.any() else int(np.argmax(strain)) + 1
-    used = np.arange(len(strain)) < end
-    used &= (strain >= low) & (strain <= high)
-    low, high = window
-    count = int(used.sum())
-    if float(strain.max()) < high * (1 - 1e-9) or count < MIN_SAMPLES:
-        raise RecordingError(
-            f"{recording.name}: strain from {strain.min():.4f} to {strain.max():.4f} with {count} "
-            f"samples in the window {low}-{high}; expected to cover it with {MIN_SAMPLES}: choose "
-            "another"
-        )
-    return _fit(recording.name, strain[used], force[used], cylinder.area, offset, contact, window)
 
 
 def load_noise(force: Floats) -> float:

@@ -19,6 +19,7 @@ to sample: n (1 - r) / (1 + r) of n samples are independent, r their correlation
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -44,32 +45,33 @@ class Ringing:
     damping_sd: float
     periods: float
 
+    @classmethod
+    def of(cls, t: Floats, y: Floats) -> Self:
+        """Of y (nt,) at times t (nt,) s; gaps are left out by the caller.
 
-def ringing(t: Floats, y: Floats) -> Ringing:
-    """Of y (nt,) at times t (nt,) s; gaps are left out by the caller.
-
-    Raises `ComparisonError` for fewer than three periods, too few samples, and what does not ring.
-    """
-    if len(t) < 4 * _LINEAR:
-        raise ComparisonError(f"{len(t)} samples of ringing; at least {4 * _LINEAR} are needed")
-    t = t - t[0]
-    f0 = _peak(t, y)
-    if f0 * t[-1] < _PERIODS:
-        raise ComparisonError(
-            f"{f0 * t[-1]:.1f} periods of ringing in {t[-1]:.2f} s: {_PERIODS:g} are needed; "
-            "record longer"
+        Raises `ComparisonError` for fewer than three periods, too few samples, and what does not
+        ring.
+        """
+        if len(t) < 4 * _LINEAR:
+            raise ComparisonError(f"{len(t)} samples of ringing; at least {4 * _LINEAR} are needed")
+        t = t - t[0]
+        f0 = _peak(t, y)
+        if f0 * t[-1] < _PERIODS:
+            raise ComparisonError(
+                f"{f0 * t[-1]:.1f} periods of ringing in {t[-1]:.2f} s: {_PERIODS:g} are needed; "
+                "record longer"
+            )
+        w0 = 2 * np.pi * f0
+        start = [w0, 0.05 * w0]
+        found = least_squares(_left, start, x_scale=start, args=(t, y), ftol=1e-12, xtol=1e-12)
+        w, d = (float(x) for x in found.x)
+        if not (found.success and 0.5 * w0 < w < 2 * w0):
+            raise ComparisonError(f"no ringing near {f0:.2f} Hz was found: {found.message}")
+        sd_w, sd_d = _spread(found.fun, np.asarray(found.jac))
+        whole = np.hypot(w, d)
+        return cls(
+            w / (2 * np.pi), sd_w / (2 * np.pi), d / whole, sd_d / whole, w * t[-1] / (2 * np.pi)
         )
-    w0 = 2 * np.pi * f0
-    start = [w0, 0.05 * w0]
-    found = least_squares(_left, start, x_scale=start, args=(t, y), ftol=1e-12, xtol=1e-12)
-    w, d = (float(x) for x in found.x)
-    if not (found.success and 0.5 * w0 < w < 2 * w0):
-        raise ComparisonError(f"no ringing near {f0:.2f} Hz was found: {found.message}")
-    sd_w, sd_d = _spread(found.fun, np.asarray(found.jac))
-    whole = np.hypot(w, d)
-    return Ringing(
-        w / (2 * np.pi), sd_w / (2 * np.pi), d / whole, sd_d / whole, w * t[-1] / (2 * np.pi)
-    )
 
 
 def spectrum(t: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -331,6 +333,6 @@ def _ringing(t: Floats, y: Floats) -> Ringing | None:
     """How it rings after its largest excursion."""
     after = int(np.abs(y - np.median(y)).argmax())
     try:
-        return ringing(*_even(t[after:], y[after:]))
+        return Ringing.of(*_even(t[after:], y[after:]))
     except (ComparisonError, ValueError, np.linalg.LinAlgError):
         return None

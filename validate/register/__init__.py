@@ -8,7 +8,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "markers.quality": ("Registration", "register_points"),
-    "markers.transform": ("Similarity", "fit_rigid", "fit_similarity", "fit_two_step"),
+    "markers.transform": ("Similarity", "fit_similarity", "fit_two_step"),
     "registration": ("Registered",),
     "observation": ("Deviation", "Observation", "Selection"),
     "markers.markers": ("MarkerObservation", "observe_markers"),

@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, damping_of, mass_of
 from validate.solve.dynamic.newmark import Newmark
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
 
@@ -42,7 +42,7 @@ def amplification(system: System, scheme: Newmark | ExplicitLinear) -> Amplifica
     if isinstance(scheme, ExplicitLinear):
         maps = explicit_maps(scheme.dt, c, omegas**2, scheme.update)
     else:
-        rule = rule_of(scheme.rule, scheme.dt, scheme.rho_inf)
+        rule = Rule.of(scheme.rule, scheme.dt, scheme.rho_inf)
         maps = newmark_maps(rule, c, omegas**2, misprinted=scheme.update == "misprinted")
     radii = spectral_radii(maps)
     worst = int(np.argmax(radii))

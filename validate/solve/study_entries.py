@@ -19,7 +19,7 @@ from validate.arrays import Floats
 from validate.fem.system import DampingTerms, MassName, System
 from validate.scene.material import LawName
 from validate.scene.mesh import Kind
-from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode, rule_of
+from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode
 from validate.solve.types import SceneSolver, Scheme
 
 # --- Maps of (q, v, a) of one mode over a step, of implicit and explicit rules, and their radii.
@@ -106,7 +106,7 @@ class Stepping:
 
 def implicit_maps(rule: RuleName) -> Radii:
     """Return the step map of a rule of Newmark's family."""
-    unit = rule_of(rule, 1.0)
+    unit = Rule.of(rule, 1.0)
     return lambda r: newmark_maps(unit, r.c("full"), r.x**2)
 
 

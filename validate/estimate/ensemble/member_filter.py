@@ -41,7 +41,7 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.dynamic.linear import StartName
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.handles import LARGE, Handles
 from validate.solve.types import Ending, State
 
@@ -106,7 +106,7 @@ class MemberModel:
         of = self.doubts(system.scene)
         if system.scene.material.law != "linear":
             return explicit_members(explicit_step(system, self.dt, self.substeps), of)
-        rule, at_once = rule_of(self.rule, self.h), self.a0 == "equilibrium"
+        rule, at_once = Rule.of(self.rule, self.h), self.a0 == "equilibrium"
         return implicit_members(system, of, rule, self.coordinates, self.shapes, at_once)
 
     def limit(self, system: System) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.estimate.kalman.covariance import Decoupled, Dense, GainSequence
 from validate.estimate.kalman.formulas import Gain, log_likelihood
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System, once
 from validate.solve.dynamic.linear import Excitation
 from validate.solve.dynamic.newmark_rule import Propagation, Rule, per_mode
@@ -112,7 +112,7 @@ def in_modes(system: System, rule: Rule) -> InModes:
 
 
 def _in_modes(system: System, rule: Rule) -> InModes:
-    modes = modes_of(system)
+    modes = Modes.of(system)
     M = system.M[system.free][:, system.free]
     factors = per_mode(rule, modes.damping, modes.omega**2)
     return InModes(modes.shapes, np.asarray(M @ modes.shapes), factors, rule)

@@ -46,7 +46,7 @@ from validate.fem.system import System, once
 from validate.memory import require_memory
 from validate.parameters import quantity
 from validate.solve.dynamic.linear import StartName, excitation, reactions
-from validate.solve.dynamic.newmark_rule import RuleName, propagation, rule_of
+from validate.solve.dynamic.newmark_rule import Rule, RuleName, propagation
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 
 _DENSE = 8  # matrices of all unknowns that the printed recursion holds at once
@@ -81,7 +81,7 @@ class DisplacementNoise:
     smooth: bool = smooth_setting()
 
     def __post_init__(self) -> None:
-        rule_of(self.rule, self.dt)
+        Rule.of(self.rule, self.dt)
         for name, value in (("Q", self.Q), ("P0", self.P0)):
             if not (np.isfinite(value) and value >= 0):
                 raise SceneError(
@@ -111,7 +111,7 @@ class KfFem(DisplacementNoise):
         """Raise `SceneError` for what linear schemes refuse, and for a load-shaped Q without a
         load; `ComparisonError` for measurements that land on no step."""
         require_handled(system.scene, self)
-        rule = rule_of(self.rule, self.dt)
+        rule = Rule.of(self.rule, self.dt)
         nodal = once(system, ("nodal step", rule), lambda: Nodal(propagation(system, rule)))
         if self.gains == "every_step":
             covariance = self._dense(system, measurements, nodal)
@@ -170,7 +170,7 @@ def stepper_of(
     """Return the stepper in `coordinates`, its covariance recursed in those of `claimed`."""
     table, H = timetable(measurements, settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
-    rule, a0 = rule_of(settings.rule, settings.dt), settings.a0
+    rule, a0 = Rule.of(settings.rule, settings.dt), settings.a0
     excited = once(system, ("excited", rule, a0), lambda: excitation(system, rule, a0=a0))
     return DisplacementStepper(
         system,

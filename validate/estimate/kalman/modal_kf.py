@@ -14,7 +14,7 @@ from validate.estimate.kalman.kf_fem import DisplacementNoise, Gains, modal_cova
 from validate.estimate.measurements import Measurements, timetable
 from validate.fem.system import System
 from validate.parameters import quantity
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.handles import require_handled
 
 
@@ -28,7 +28,7 @@ class ModalKf(DisplacementNoise):
     def prepare(self, system: System, measurements: Measurements) -> DisplacementStepper:
         """Raise `SceneError` for what linear schemes refuse and for damping that couples modes."""
         require_handled(system.scene, self)
-        return self.with_modes(system, measurements, in_modes(system, rule_of(self.rule, self.dt)))
+        return self.with_modes(system, measurements, in_modes(system, Rule.of(self.rule, self.dt)))
 
     def with_modes(
         self, system: System, measurements: Measurements, modes: InModes

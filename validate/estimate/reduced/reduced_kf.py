@@ -52,7 +52,7 @@ from validate.estimate.smoother import (
     smooth_setting,
     smoothed,
 )
-from validate.fem.critical import Modes, modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -253,7 +253,7 @@ def reduced_model(
 
     Raises `SceneError` for damping that couples the modes.
     """
-    lowest = modes_of(system, min(modes, len(system.free)))
+    lowest = Modes.of(system, min(modes, len(system.free)))
     rest = left_out(system, lowest, np.ascontiguousarray(system.loads[system.free]))
     # Share (l,) of the rests that stays over a step: exp(-dt k / c), 0 without damping
     K, C = (X[system.free][:, system.free] for X in (system.K, system.C))

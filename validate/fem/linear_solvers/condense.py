@@ -17,6 +17,7 @@ removed has left no trace.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from validate.errors import SceneError
 from validate.fem.cavity import CavitySurface
 from validate.fem.linear_solvers.factor import Factor, Fronts
 from validate.fem.system import Responses, System
-from validate.fem.system import responses as responses_of
 from validate.memory import require_memory
 from validate.scene.places import nodes_of
 
@@ -143,30 +143,33 @@ class Condensed:
         found[self._system.free] = self._factor.solve(loads[self._system.free])
         return found
 
+    @classmethod
+    def of(cls, system: System, keep: Ints) -> Self:
+        """Return the system on the nodes `keep`, those of its cavities and those of its driven
+        plates.
 
-def condense(system: System, keep: Ints) -> Condensed:
-    """Return the system on the nodes `keep`, those of its cavities and those of its driven plates.
-
-    Raises `SceneError` for nodes that the mesh does not have and for a law at large strain.
-    """
-    mesh = system.scene.mesh
-    if len(keep) and not (keep.min() >= 0 and keep.max() < len(mesh.nodes)):
-        raise SceneError(
-            f"nodes {int(keep.min())}..{int(keep.max())} to keep of a mesh of {len(mesh.nodes)}"
+        Raises `SceneError` for nodes that the mesh does not have and for a law at large strain.
+        """
+        mesh = system.scene.mesh
+        if len(keep) and not (keep.min() >= 0 and keep.max() < len(mesh.nodes)):
+            raise SceneError(
+                f"nodes {int(keep.min())}..{int(keep.max())} to keep of a mesh of {len(mesh.nodes)}"
+            )
+        plates = [nodes_of(mesh, drive.facets) for drive in system.scene.drives]
+        nodes = np.unique(np.concatenate([keep, *(c.nodes for c in system.cavities), *plates]))
+        nodes = nodes.astype(np.int64)
+        whole = Responses.of(system)
+        d = mesh.dimension
+        free = np.flatnonzero(np.isin((nodes[:, None] * d + np.arange(d)).ravel(), system.free))
+        kept = np.ascontiguousarray(
+            whole.fields[:, nodes].reshape(len(whole.fields), nodes.size * d)
         )
-    plates = [nodes_of(mesh, drive.facets) for drive in system.scene.drives]
-    nodes = np.unique(np.concatenate([keep, *(c.nodes for c in system.cavities), *plates]))
-    nodes = nodes.astype(np.int64)
-    whole = responses_of(system)
-    d = mesh.dimension
-    free = np.flatnonzero(np.isin((nodes[:, None] * d + np.arange(d)).ravel(), system.free))
-    kept = np.ascontiguousarray(whole.fields[:, nodes].reshape(len(whole.fields), nodes.size * d))
-    facets = [np.searchsorted(nodes, c.facets) for c in system.cavities]
-    surfaces = tuple(
-        CavitySurface(c.name, of, np.unique(of))
-        for c, of in zip(system.cavities, facets, strict=True)
-    )
-    return Condensed(whole, nodes, free, kept, surfaces, system, system.factor())
+        facets = [np.searchsorted(nodes, c.facets) for c in system.cavities]
+        surfaces = tuple(
+            CavitySurface(c.name, of, np.unique(of))
+            for c, of in zip(system.cavities, facets, strict=True)
+        )
+        return cls(whole, nodes, free, kept, surfaces, system, system.factor())
 
 
 _DEPENDENT = 1e-12  # of the compliance along a row: what others leave of it

@@ -25,7 +25,7 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.estimate.reduced.reduced_kf import ReducedKf
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import build
 from validate.identify.recorded_motion import (
     FRACTION,
@@ -127,7 +127,7 @@ def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:
     bare = replace(scene, cavities=(), material=replace(scene.material, stiffness_damping=0.0))
     system = build(with_law(bare, "linear"))
     try:
-        modes = modes_of(system, min(count, len(system.free)))
+        modes = Modes.of(system, min(count, len(system.free)))
     except (np.linalg.LinAlgError, RuntimeError) as singular:
         raise SceneError(f"no natural frequencies: {singular}; is the body held?") from None
     found = modes.omega[:count] / (2 * np.pi)

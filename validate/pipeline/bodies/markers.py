@@ -19,7 +19,7 @@ from validate.register.markers.measures import FEWEST
 from validate.register.markers.quality import as_declared
 from validate.register.observation import nearest_sample
 from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
-from validate.register.outlines.plane import cavity_sampler, section
+from validate.register.outlines.plane import SurfaceSampler, section
 from validate.scene.mesh import Mesh
 from validate.scene.places import pose_of
 from validate.scene.scene import Scene
@@ -44,7 +44,7 @@ def observed_outline(
             f"tetrahedra"
         )
     mesh.facet_nodes(p.settings.seen.surface)
-    wall = cavity_sampler(mesh, p.settings.seen.surface, None, _PARTS)
+    wall = SurfaceSampler.of_cavity(mesh, p.settings.seen.surface, None, _PARTS)
     said: tuple[str, ...] = ()
     if p.settings.seen.pose == "declared":
         contours = replace(contours, pose=_pose(p, p.settings.seen.origin))

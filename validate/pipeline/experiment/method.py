@@ -6,7 +6,7 @@ from inspect import signature
 from typing import Any, Protocol, cast, runtime_checkable
 
 from validate.errors import UsageError
-from validate.estimate.measurements import Measurements, measurements
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.parameters import part, quantity
 from validate.pipeline.experiment.variation import ByPath
@@ -69,7 +69,7 @@ class Method:
 
     def require_measured(self, scene: Scene, seen: Registered) -> None:
         """Raise `ComparisonError` where the recording has none of its markers and outlines."""
-        measurements(seen, scene.mesh).of(*self.markers)
+        Measurements.taken(seen, scene.mesh).of(*self.markers)
 
     def prepare(
         self,
@@ -89,7 +89,7 @@ class Method:
 
     def offered(self, system: System, seen: Registered) -> Measurements:
         """Return the measurements of its markers that a filter is given: of what moves freely."""
-        return measurements(seen, system.scene.mesh).of(*self.markers).moving(system.free)
+        return Measurements.taken(seen, system.scene.mesh).of(*self.markers).moving(system.free)
 
     def given(self, given: Mapping[str, Any], declared: "Method | None" = None) -> Any:
         """Return the settings with those that the experiment itself gives.

@@ -14,7 +14,7 @@ from typing import Any, cast
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import ComparisonError, UsageError
-from validate.identify.modulus import MIN_SAMPLES, fit_modulus
+from validate.identify.modulus import MIN_SAMPLES, ModulusFit
 from validate.pipeline.bodies.mesh import DIAMETER
 from validate.pipeline.calibration.fitted_moduli import toe_in
 from validate.pipeline.experiment.experiment import (
@@ -151,7 +151,7 @@ def _place(
             "outline.topic: the uncertain inputs of outlines are chosen in the experiment's file; "
             "name the topic there, PressedOutline(topic=...)"
         )
-    fit = fit_modulus(recording, size, (p.fit_from, p.fit_to), test)
+    fit = ModulusFit.of(recording, size, (p.fit_from, p.fit_to), test)
     noise = max(fit.noise, recording.signal("force", "N").sd)
     strains = {"fit": (p.fit_from, p.fit_to), "beyond": (p.fit_to, p.limit)}
     seen = pressed_log(

@@ -27,7 +27,7 @@ from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import Sampling, Together, placed_markers
 from validate.register.observation import nearest_sample
 from validate.register.outlines.outlines import Corner, observe_outlines
-from validate.register.outlines.plane import cavity_sampler, outlined_capsule
+from validate.register.outlines.plane import SurfaceSampler, outlined_capsule
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.register.registration import Registered
 from validate.register.signals import driving, holds_at, instant, require_rising, validating
@@ -374,7 +374,7 @@ def placed(
     contours = shifted(recording.contour(streams.outline), tree)
     measured = measured_inclusion(recording, tree)
     shape = None if how.wall == "facets" else measured
-    wall = cavity_sampler(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
+    wall = SurfaceSampler.of_cavity(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
     stage = driving(recording, streams.stage, "m")
     signals = []
     for topic in streams.signals:

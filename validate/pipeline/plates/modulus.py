@@ -16,10 +16,10 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.errors import UsageError
+from validate.fem.system import Responses
 from validate.fem.system import build as build_system
-from validate.fem.system import responses
 from validate.identify.budget import NOISE, IdentifiedValue, pattern
-from validate.identify.modulus import MIN_SAMPLES, ModulusFit, fit_modulus, loading
+from validate.identify.modulus import MIN_SAMPLES, ModulusFit, loading
 from validate.identify.scaled_curve import ScaledFit, UnitCurve, fit_modulus_of, fit_scaled
 from validate.pipeline.bodies.mesh import DIAMETER, HEIGHT
 from validate.pipeline.calibration.fitted_moduli import (
@@ -149,7 +149,7 @@ def identify_pressed(
 
 def _log(recording: Recording, tree: Tree, folder: Path) -> _Log:
     p, size, test = tree.settings, pressed_size(tree, folder), kind_of_test(tree)
-    fit = fit_modulus(recording, size, (p.fit_from, p.fit_to), test)
+    fit = ModulusFit.of(recording, size, (p.fit_from, p.fit_to), test)
     log = loading(recording, test)
     d = log.d - fit.contact
     strain = d / size.height
@@ -212,7 +212,7 @@ class _Fitting:
         reach = _BEYOND * limit * height + abs(self.log.fit.toe) * height
         if law == "linear":
             # One solution: displacement and force are in proportion.
-            unit = float(responses(build_system(built)).reactions[0, 0])
+            unit = float(Responses.of(build_system(built)).reactions[0, 0])
             return UnitCurve(np.array([0.0, reach]), np.array([0.0, unit * reach]), E)
         step = self.p.limit * height / _STEPS
         grid: Floats = step * np.arange(np.ceil(reach / step) + 1.0)

@@ -19,7 +19,7 @@ from validate.recording.types import Contours, Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Selection, nearest_samples
 from validate.register.outlines.outlines import enclosed, observe_outlines
-from validate.register.outlines.plane import cavity_sampler
+from validate.register.outlines.plane import SurfaceSampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Cylinder
@@ -64,8 +64,8 @@ def with_outline(
     stage = seen.drives[0]
     at, held = _instants(contours, stage, card)
     found = observe_outlines(
-        contours, cavity_sampler(mesh, card.surface, None, 4), float(at[0]), name=str(card.topic),
-        sd_t=clock_sd(recording, str(card.topic)),
+        contours, SurfaceSampler.of_cavity(mesh, card.surface, None, 4), float(at[0]),
+        name=str(card.topic), sd_t=clock_sd(recording, str(card.topic)),
     )  # fmt: skip
     # They enclose about as much
     area, _ = enclosed(found.simulated(np.zeros_like(mesh.nodes)))

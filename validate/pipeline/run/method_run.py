@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Self
 
 import numpy as np
 
@@ -34,18 +35,18 @@ class Truth:
     def __post_init__(self) -> None:
         object.__setattr__(self, "probes", MappingProxyType(dict(self.probes)))
 
+    @classmethod
+    def of(cls, run: Run, scene: Scene) -> Self:
+        """Return the truth from a twin's run, at its own probes and nodes."""
+        axes = "xyz"[: scene.mesh.dimension]
+        probes = {
+            p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in axes], axis=1)
+            for p in scene.probes
+        }
+        return cls(probes, run.u, scene.mesh)
+
 
 NO_TRUTH = Truth({})
-
-
-def truth_of(run: Run, scene: Scene) -> Truth:
-    """Return the truth from a twin's run, at its own probes and nodes."""
-    axes = "xyz"[: scene.mesh.dimension]
-    probes = {
-        p.name: np.stack([run.traces[f"{p.name}.{c}"].y for c in axes], axis=1)
-        for p in scene.probes
-    }
-    return Truth(probes, run.u, scene.mesh)
 
 
 @dataclass(frozen=True)

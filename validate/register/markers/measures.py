@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import chdtri
 
 from validate.arrays import Floats, Ints, rms
-from validate.register.markers.transform import Similarity, fit_rigid, fit_similarity, spread
+from validate.register.markers.transform import Similarity, fit_similarity, spread
 
 P_EXCESS = 1e-3  # chance that noise alone exceeds a bound stated here
 CLEARLY = 3.0  # an alternative this many times better explains an excess
@@ -64,7 +64,7 @@ class Outlier(NamedTuple):
 
 def least_squares(scaled: bool) -> Fit:
     """Return the rigid fit, or the one with a scale."""
-    return fit_similarity if scaled else fit_rigid
+    return fit_similarity if scaled else Similarity.rigid
 
 
 def chi_square_bound(dof: int, p: float = P_EXCESS) -> float:
@@ -164,7 +164,7 @@ def find_outliers(
     k, d = source.shape
     bound = chi_square_bound(d, P_EXCESS / k)
     # Least sum of distances by reweighting; distances below the noise count as the noise.
-    fit = fit_similarity if scaled else fit_rigid
+    fit = fit_similarity if scaled else Similarity.rigid
     weights = np.ones(len(source))
     for _ in range(30):  # only picks suspects: `_judged` decides, converged or not
         lengths = np.linalg.norm(fit(source, target, weights).apply(source) - target, axis=1)

@@ -100,22 +100,25 @@ class Similarity:
         """T_source_from_target."""
         return Similarity(self.R.T, -(self.t @ self.R) / self.s, 1.0 / self.s)
 
+    @classmethod
+    def rigid(
+        cls, source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None
+    ) -> "Similarity":
+        """T_target_from_source with s = 1 that minimises sum_i w_i |R x_i + t - y_i|^2.
 
-def fit_rigid(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Similarity:
-    """T_target_from_source with s = 1 that minimises sum_i w_i |R x_i + t - y_i|^2.
-
-    source, target (k, d) m row by row the same points, d = 2 or 3; weights (k,) >= 0, default 1.
-    Raises `RegistrationError` for shapes, non-finite values and degenerate sets (`check_spread`).
-    A planar 3-D set fits its mirror image exactly; the proper rotation is the one returned.
-    Source: Arun 1987, eqs 11-13, with the determinant correction of Umeyama 1991, eqs 40, 41, 43.
-    """
-    return _fit(*_pairs(source, target, weights), scaled=False)
+        source, target (k, d) m row by row the same points, d = 2 or 3; weights (k,) >= 0, default
+        1. Raises `RegistrationError` for shapes, non-finite values and degenerate sets
+        (`check_spread`). A planar 3-D set fits its mirror image exactly; the proper rotation is the
+        one returned. Source: Arun 1987, eqs 11-13, with the determinant correction of Umeyama 1991,
+        eqs 40, 41, 43.
+        """
+        return _fit(*_pairs(source, target, weights), scaled=False)
 
 
 def fit_similarity(
     source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None
 ) -> Similarity:
-    """As `fit_rigid`, with the scale free.
+    """As `Similarity.rigid`, with the scale free.
 
     Source: Umeyama 1991, eqs 40-43. The scale is fitted in the target frame: noise in the source
     biases it low by about noise variance over marker variance.
@@ -239,7 +242,7 @@ def fit_two_step(
     source, target (k, 3) m row by row the same points; `up`: directions (3,), (3,) in the source
     and in the target frame to the same side of the marker plane, e.g. that of the pen or camera.
     Raises `RegistrationError` as `fit_plane`, or when the in-plane angle is not determined.
-    Source: paper 000, section 4.5; equal to `fit_rigid` on exactly planar data.
+    Source: paper 000, section 4.5; equal to `Similarity.rigid` on exactly planar data.
     """
     x = checked(source, "source points [m]", (None, 3), error=RegistrationError)
     y = checked(target, "target points [m]", x.shape, error=RegistrationError)

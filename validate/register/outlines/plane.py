@@ -1,6 +1,7 @@
 """Image planes: their poses, the section of a deformed surface, round outlines."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import shapely
@@ -47,6 +48,34 @@ class SurfaceSampler:
         entries = (shares[each, best].ravel(), (np.repeat(each, 3), corners[each, best].ravel()))
         return sparse.csr_array(sparse.csr_array(entries, shape=shape) @ self.rows.weights)
 
+    @classmethod
+    def of_cavity(
+        cls,
+        mesh: Mesh,
+        facets: str,
+        shape: InclusionShape | None,
+        parts: int = 8,
+        *,
+        nearest: bool = False,
+    ) -> Self:
+        """Samples of a cavity wall, `parts` per facet edge.
+
+        With a `shape` the samples lie on it instead of on the flat facets, so that the outline
+        shows the inclusion that was measured and not the corners of the mesh; the displacement is
+        the mesh's, interpolated, or with `nearest` that of the nearest node of the wall (paper 000,
+        section 4.5).
+        """
+        rows, triangles = facet_samples(mesh, mesh.facets[facets], parts)
+        points = rows.apply(mesh.nodes)
+        _, first, number = np.unique(
+            np.round(points, 9), axis=0, return_index=True, return_inverse=True
+        )
+        rows = Rows(rows.weights[first], rows.outside[first])
+        rest = points[first] if shape is None else shape.project(points[first])
+        if nearest:
+            rows = nearest_node_rows(mesh, rest, mesh.facet_nodes(facets))
+        return cls(rest, rows, number.ravel()[triangles])
+
 
 def _shares(corners: Floats, points: Floats) -> Floats:
     """Barycentric coordinates (p, k, 3) of points (p, 3) m in triangles (p, k, 3, 3) m, within
@@ -60,27 +89,6 @@ def _shares(corners: Floats, points: Floats) -> Floats:
     s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
     inside = np.clip(np.stack([1 - s - t, s, t], axis=-1), 0, None)
     return np.asarray(inside / inside.sum(axis=-1, keepdims=True))
-
-
-def cavity_sampler(
-    mesh: Mesh, facets: str, shape: InclusionShape | None, parts: int = 8, *, nearest: bool = False
-) -> SurfaceSampler:
-    """Samples of a cavity wall, `parts` per facet edge.
-
-    With a `shape` the samples lie on it instead of on the flat facets, so that the outline shows
-    the inclusion that was measured and not the corners of the mesh; the displacement is the mesh's,
-    interpolated, or with `nearest` that of the nearest node of the wall (paper 000, section 4.5).
-    """
-    rows, triangles = facet_samples(mesh, mesh.facets[facets], parts)
-    points = rows.apply(mesh.nodes)
-    _, first, number = np.unique(
-        np.round(points, 9), axis=0, return_index=True, return_inverse=True
-    )
-    rows = Rows(rows.weights[first], rows.outside[first])
-    rest = points[first] if shape is None else shape.project(points[first])
-    if nearest:
-        rows = nearest_node_rows(mesh, rest, mesh.facet_nodes(facets))
-    return SurfaceSampler(rest, rows, number.ravel()[triangles])
 
 
 def to_image(pose: Floats, points: Floats) -> Floats:
@@ -152,32 +160,34 @@ class Circle:
     sd_radius: float
     rms: float
 
+    @classmethod
+    def fit(cls, points: Floats, sd: float) -> Self:
+        """Least squares of the radial distances of points (k, 2) m with noise sd m.
 
-def fit_circle(points: Floats, sd: float) -> Circle:
-    """Least squares of the radial distances of points (k, 2) m with noise sd m.
+        Raises `RegistrationError` for fewer than 6 points or an outline far from a circle.
+        """
+        if len(points) < 6:
+            raise RegistrationError(
+                f"outline of {len(points)} points: a circle fit needs 6 or more"
+            )
+        middle = points.mean(axis=0)
+        start = np.array([*middle, np.linalg.norm(points - middle, axis=1).mean()])
 
-    Raises `RegistrationError` for fewer than 6 points or an outline far from a circle.
-    """
-    if len(points) < 6:
-        raise RegistrationError(f"outline of {len(points)} points: a circle fit needs 6 or more")
-    middle = points.mean(axis=0)
-    start = np.array([*middle, np.linalg.norm(points - middle, axis=1).mean()])
+        def off_circle(p: Floats) -> Floats:
+            return np.asarray(np.linalg.norm(points - p[:2], axis=1) - p[2])
 
-    def off_circle(p: Floats) -> Floats:
-        return np.asarray(np.linalg.norm(points - p[:2], axis=1) - p[2])
-
-    found = least_squares(off_circle, start)
-    x, residual = found.x, np.asarray(found.fun)
-    off = rms(residual)
-    if off > 0.2 * x[2]:
-        raise RegistrationError(
-            f"the outline is not a circle: {1e3 * off:.2f} mm rms off a radius of "
-            f"{1e3 * x[2]:.2f} mm"
-        )
-    k = len(points)
-    noise = max(sd, off)
-    sds = noise * np.sqrt(2 / k), noise / np.sqrt(k)
-    return Circle(x[:2], float(x[2]), float(sds[0]), float(sds[1]), off)
+        found = least_squares(off_circle, start)
+        x, residual = found.x, np.asarray(found.fun)
+        off = rms(residual)
+        if off > 0.2 * x[2]:
+            raise RegistrationError(
+                f"the outline is not a circle: {1e3 * off:.2f} mm rms off a radius of "
+                f"{1e3 * x[2]:.2f} mm"
+            )
+        k = len(points)
+        noise = max(sd, off)
+        sds = noise * np.sqrt(2 / k), noise / np.sqrt(k)
+        return cls(x[:2], float(x[2]), float(sds[0]), float(sds[1]), off)
 
 
 def outlined_capsule(
@@ -188,7 +198,7 @@ def outlined_capsule(
     Raises `RegistrationError` when the outline's centre lies further from the sweep's than 4
     standard deviations and `allowance` m: a mirrored image or a wrong pose.
     """
-    circle = fit_circle(contours.outlines[rest], contours.sd)
+    circle = Circle.fit(contours.outlines[rest], contours.sd)
     centre = from_image(contours.pose, circle.centre[None])[0]
     declared = np.array([_metres(sweep, f"centre_{axis}_m") for axis in "xyz"])
     off = float(np.linalg.norm((centre - declared)[[0, 2]]))

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
 from validate.register.markers.measures import target_covariance
-from validate.register.markers.transform import COLLINEAR, Similarity, fit_rigid, spread
+from validate.register.markers.transform import COLLINEAR, Similarity, spread
 
 _SPIKE = 3  # samples of the median that a single false one does not pass
 _APART = 0.5  # s between two parts of one dwell
@@ -215,7 +215,7 @@ def _is_wide(points: Floats) -> bool:
 def _settled(known: Floats, seen: Floats, a: Ints, i: Ints, within: float) -> Match | None:
     """The assignment that a first one leads to; None where it ends with too few."""
     for _ in range(5):
-        T = fit_rigid(known[a], seen[i])
+        T = Similarity.rigid(known[a], seen[i])
         off = cdist(T.apply(known), seen)
         # Beyond `within` all distances cost the same: a landmark without a place moves no other.
         rows, columns = linear_sum_assignment(np.minimum(off, within) ** 2)
@@ -226,7 +226,7 @@ def _settled(known: Floats, seen: Floats, a: Ints, i: Ints, within: float) -> Ma
         a, i = rows[kept], columns[kept]
         if settled:
             break
-    T = fit_rigid(known[a], seen[i])
+    T = Similarity.rigid(known[a], seen[i])
     rms = float(np.sqrt(((T.apply(known[a]) - seen[i]) ** 2).sum(axis=1).mean()))
     return Match(a, i, rms)
 
@@ -267,7 +267,7 @@ class Digitised:
     @property
     def pose(self) -> Similarity:
         """T_frame_from_body of all touched landmarks."""
-        return fit_rigid(self.body, self.places)
+        return Similarity.rigid(self.body, self.places)
 
     @property
     def residuals(self) -> Floats:
@@ -279,7 +279,7 @@ class Digitised:
         """T_frame_from_body without each landmark in turn."""
         all_of = range(len(self.body))
         kept = [[j for j in all_of if j != i] for i in all_of]
-        return tuple(fit_rigid(self.body[k], self.places[k]) for k in kept)
+        return tuple(Similarity.rigid(self.body[k], self.places[k]) for k in kept)
 
     @property
     def left_out(self) -> Floats:

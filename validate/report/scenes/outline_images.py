@@ -14,7 +14,7 @@ from validate.errors import RegistrationError
 from validate.numbers import spaced, with_unit
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
-from validate.register.outlines.plane import Circle, fit_circle
+from validate.register.outlines.plane import Circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.sections.observations import Held
 
@@ -135,7 +135,7 @@ def _outline(contours: Contours, hold: Held) -> Floats:
 
 def _circle(contours: Contours, hold: Held) -> Circle | None:
     try:
-        return fit_circle(_outline(contours, hold), contours.sd)
+        return Circle.fit(_outline(contours, hold), contours.sd)
     except RegistrationError:
         return None  # an outline pressed flat is none
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.critical import Modes, modes_of
+from validate.fem.critical import Modes
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic.linear import (
@@ -28,7 +28,7 @@ from validate.solve.dynamic.linear import (
     excitation,
     reactions,
 )
-from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode, require_start, rule_of
+from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode, require_start
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.study_entries import Asked, Rates, Rival, Stepping, SwingingBody
 from validate.solve.types import Scheme, State, Stepper
@@ -149,17 +149,17 @@ class Modal:
         )
 
     def __post_init__(self) -> None:
-        rule_of("average", self.dt, self.rho_inf)
+        Rule.of("average", self.dt, self.rho_inf)
         if self.modes is not None and self.modes < 1:
             raise SceneError(f"{self.modes} modes: expected at least 1")
 
     def prepare(self, system: System) -> Stepper:
         """Raise `SceneError` for laws at large strain, cavities, damping that couples modes."""
         require_handled(system.scene, self)
-        modes = modes_of(system, self.modes)
+        modes = Modes.of(system, self.modes)
         exact = self.propagate in ("linear", "constant")
         name: RuleName = "average" if exact else self.propagate  # type: ignore[assignment]
-        rule = rule_of(name, self.dt, self.rho_inf)
+        rule = Rule.of(name, self.dt, self.rho_inf)
         if not exact and self.a0 == "equilibrium" and system.scene.loads:
             require_start(system, rule, "consistent")
         excited = excitation(system, rule)

@@ -30,10 +30,10 @@ from validate.solve.dynamic.linear import (
 )
 from validate.solve.dynamic.newmark_rule import (
     Propagation,
+    Rule,
     RuleName,
     propagation,
     require_start,
-    rule_of,
 )
 from validate.solve.explicit.linear import highest_frequency
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
@@ -56,7 +56,7 @@ from validate.solve.types import Ending, Scheme, State, Stepper
 
 def misprinted_maps(r: Rates) -> Floats:
     """Return the step map of the printed update."""
-    return newmark_maps(rule_of("average", 1.0), r.c("full"), r.x**2, misprinted=True)
+    return newmark_maps(Rule.of("average", 1.0), r.c("full"), r.x**2, misprinted=True)
 
 
 def misprint_limit(w: float, c: float) -> float:
@@ -159,7 +159,7 @@ class Newmark:
         )  # fmt: skip
 
     def __post_init__(self) -> None:
-        rule_of(self.rule, self.dt, self.rho_inf)
+        Rule.of(self.rule, self.dt, self.rho_inf)
         if self.update == "misprinted" and self.rule != "average":
             raise SceneError(
                 "the misprinted update belongs to the average rule of paper 002, "
@@ -173,7 +173,7 @@ class Newmark:
     def prepare(self, system: System) -> Stepper:
         """Raise `SceneError` for a law at large strain, cavities, or missing densities."""
         require_handled(system.scene, self)
-        rule = rule_of(self.rule, self.dt, self.rho_inf)
+        rule = Rule.of(self.rule, self.dt, self.rho_inf)
         terms = self.damping_terms
         if self.a0 == "equilibrium" and system.scene.loads:
             require_start(system, rule, self.mass, terms)

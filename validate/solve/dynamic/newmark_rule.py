@@ -13,7 +13,7 @@ do not ring as it does. Prescribed unknowns enter as forces on the free ones (`E
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy import sparse
@@ -52,25 +52,26 @@ class Rule:
         """Return an acceleration at the instant of the balance: `new` itself unless am != 0."""
         return new if self.am == 0 else (1 - self.am) * new + self.am * old
 
-
-def rule_of(name: RuleName, dt: float, rho_inf: float = 0.8) -> Rule:
-    """Return the rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside
-    0..1."""
-    if not (np.isfinite(dt) and dt > 0):
-        raise SceneError(f"time step {dt:g} s: expected a positive number")
-    if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
-        raise SceneError(
-            f"time step {dt:g} s: its square underflows in double precision; take at least 1e-150"
-        )
-    if not 0 <= rho_inf <= 1:
-        raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
-    if name == "average":
-        return Rule(dt, 0.25, 0.25, 0.5, 0.5)
-    if name == "backward_euler":
-        return Rule(dt, 0.0, 1.0, 0.0, 1.0)
-    am, af = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
-    beta, gamma = (1 - am + af) ** 2 / 4, 0.5 - am + af
-    return Rule(dt, 0.5 - beta, beta, 1 - gamma, gamma, am, af)
+    @classmethod
+    def of(cls, name: RuleName, dt: float, rho_inf: float = 0.8) -> Self:
+        """Return the rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside
+        0..1."""
+        if not (np.isfinite(dt) and dt > 0):
+            raise SceneError(f"time step {dt:g} s: expected a positive number")
+        if dt * dt < np.finfo(float).tiny:  # the step's matrix divides by it
+            raise SceneError(
+                f"time step {dt:g} s: its square underflows in double precision; take at least "
+                "1e-150"
+            )
+        if not 0 <= rho_inf <= 1:
+            raise SceneError(f"rho_inf = {rho_inf:g}: the spectral radius must lie in 0..1")
+        if name == "average":
+            return cls(dt, 0.25, 0.25, 0.5, 0.5)
+        if name == "backward_euler":
+            return cls(dt, 0.0, 1.0, 0.0, 1.0)
+        am, af = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+        beta, gamma = (1 - am + af) ** 2 / 4, 0.5 - am + af
+        return cls(dt, 0.5 - beta, beta, 1 - gamma, gamma, am, af)
 
 
 @dataclass(frozen=True)

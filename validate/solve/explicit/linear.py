@@ -29,7 +29,7 @@ from validate.solve.dynamic.linear import (
     excitation,
     reactions,
 )
-from validate.solve.dynamic.newmark_rule import rule_of
+from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import Diagonal, Solver
 from validate.solve.study_entries import (
@@ -90,7 +90,7 @@ class ExplicitLinear:
         )  # fmt: skip
 
     def __post_init__(self) -> None:
-        rule_of("average", self.dt)
+        Rule.of("average", self.dt)
         if self.drive_rates == "rule":
             raise SceneError(
                 "an explicit step does not support drive rules; use drive_rates=difference"
@@ -125,7 +125,7 @@ class ExplicitLinear:
         M, C, K = (sparse.csr_array(X[free][:, free]) for X in matrices)
         J = M if self.update == "lagged" else sparse.csr_array(M + self.dt / 2 * C)
         mesh = system.scene.mesh
-        rule = rule_of("average", self.dt)
+        rule = Rule.of("average", self.dt)
         # A division where J is diagonal, else its factorisation
         apart = J - sparse.diags_array(J.diagonal())
         solver = (

@@ -20,7 +20,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses, System
-from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
 from validate.solve.fluid.pressure_curve import NEWTON_STEPS, ROUNDING, cubic, least_slope, root_of
 from validate.solve.handles import GLUED, Handles, require_handled
@@ -48,7 +47,7 @@ class NoFluid:
 
     def prepare(self, system: System) -> Stepper:
         require_handled(system.scene, self)
-        return self.on(responses_of(system))
+        return self.on(Responses.of(system))
 
     def on(self, responses: Responses) -> Stepper:
         """The scheme on columns that are there already."""
@@ -87,7 +86,7 @@ class ExactPressure:
 
     def prepare(self, system: System) -> Stepper:
         require_handled(system.scene, self)
-        return self.on(responses_of(system))
+        return self.on(Responses.of(system))
 
     def on(self, responses: Responses) -> Stepper:
         """The scheme on columns that are there already."""
@@ -120,7 +119,7 @@ class ElasticPressure:
 
     def prepare(self, system: System) -> Stepper:
         require_handled(system.scene, self)
-        return self.on(responses_of(system))
+        return self.on(Responses.of(system))
 
     def on(self, responses: Responses) -> Stepper:
         """The scheme on columns that are there already."""
@@ -239,7 +238,7 @@ class PulsePressure:
 
     def prepare(self, system: System) -> Stepper:
         require_handled(system.scene, self)
-        return self.on(responses_of(system))
+        return self.on(Responses.of(system))
 
     def on(self, responses: Responses) -> Stepper:
         """Return the scheme on columns that are there already."""

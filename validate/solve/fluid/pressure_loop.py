@@ -21,7 +21,6 @@ import numpy as np
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import Responses, System
-from validate.fem.system import responses as responses_of
 from validate.parameters import quantity
 from validate.solve.fluid.cavities import FLUID, Settling
 from validate.solve.fluid.pressure_curve import (
@@ -72,7 +71,7 @@ class PressureLoop:
     def prepare(self, system: System) -> Stepper:
         """Raise `SceneError` for a line search on several cavities."""
         require_handled(system.scene, self)
-        return self.on(responses_of(system))
+        return self.on(Responses.of(system))
 
     def on(self, responses: Responses) -> Stepper:
         """Return the scheme on columns that are there already."""

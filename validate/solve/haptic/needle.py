@@ -23,14 +23,7 @@ from validate.errors import SceneError
 from validate.fem.assembly.locate import barycentric_rows
 from validate.fem.cavity import volume_form
 from validate.fem.kernels.jit_cache import compiled
-from validate.fem.linear_solvers.condense import (
-    Condensed,
-    Imposed,
-    WorkingSet,
-    along,
-    between,
-    condense,
-)
+from validate.fem.linear_solvers.condense import Condensed, Imposed, WorkingSet, along, between
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.places import facets_of
@@ -208,7 +201,7 @@ class NeedleLoop:
                 f"needle '{tool.name}' starts inside the body at ({at}) mm: move it out"
             )
         facets = facets_of(scene.mesh, tool.facets)
-        small = condense(system, np.unique(facets))
+        small = Condensed.of(system, np.unique(facets))
         numbers = np.searchsorted(small.nodes, facets)
         free = np.isin(np.arange(small.size), small.free).reshape(-1, scene.mesh.dimension)
         touchable = numbers[free[numbers].all(axis=(1, 2))]

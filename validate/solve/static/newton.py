@@ -32,7 +32,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.cavity import pressure_load, volume_hessian, volume_of
+from validate.fem.cavity import volume_hessian
 from validate.fem.large_strain.hyperelastic import BEYOND_LAW, Body
 from validate.fem.linear_solvers.factor import Factor, elimination_order, factorise_indefinite
 from validate.fem.system import System, require_held
@@ -114,8 +114,8 @@ class Equilibrium:
         (c,)."""
         cavities = self.system.cavities
         x = self._places(u)
-        ratios = np.array([volume_of(c, x) for c in cavities]) / self.rest_volumes
-        loads = np.array([pressure_load(c, x).ravel() for c in cavities]).reshape(-1, len(u))
+        ratios = np.array([c.volume(x) for c in cavities]) / self.rest_volumes
+        loads = np.array([c.pressure_load(x).ravel() for c in cavities]).reshape(-1, len(u))
         multipliers = self.body.multipliers if multipliers is None else multipliers
         inner = self.body.holding(multipliers).force(u)
         f = self.system.loads @ inputs[len(self.system.scene.drives) :]
@@ -192,7 +192,7 @@ def equilibrium(system: System, constrained: bool) -> Equilibrium:
     body = Body(system.scene)
     K = system.K[free][:, free]
     order = elimination_order(sparse.csr_array(K), free // mesh.dimension, mesh.nodes)
-    volumes = np.array([volume_of(c, mesh.nodes) for c in system.cavities])
+    volumes = np.array([c.volume(mesh.nodes) for c in system.cavities])
     return Equilibrium(body, system, constrained, volumes, order)
 
 

@@ -11,7 +11,7 @@ from validate.arrays import Floats
 from validate.catalogue import reports_of
 from validate.compare.effects import TELLS_APART
 from validate.fem.assembly.assemble import shape_gradients
-from validate.fem.critical import modes_of
+from validate.fem.critical import Modes
 from validate.fem.locking import LOCKING_FROM
 from validate.fem.system import build
 from validate.pipeline.experiment.experiment import EffectSpec, Experiment
@@ -183,7 +183,7 @@ def facts(trade: Trade, error: float, effects: ShownEffects | None = None) -> tu
 def _loading(scene: Trial, body: Scene) -> Fact:
     density = body.material.rho or _WATER
     solid = replace(body, cavities=(), material=replace(body.material, rho=density))
-    modes = modes_of(build(solid), 1)
+    modes = Modes.of(build(solid), 1)
     f, ratio = modes.omega[0] / (2 * np.pi), modes.damping[0] / (2 * modes.omega[0])
     assumed = "" if body.material.rho else f", at an assumed {_WATER:g} kg/m3"
     name = "loading rate against lowest frequency"

@@ -19,7 +19,7 @@ from validate.engine.cell import Plan, Where
 from validate.engine.execution import CELLS, Finished, Report, finish
 from validate.engine.store import key_of
 from validate.errors import ComparisonError
-from validate.fem.system import Responses, build, responses
+from validate.fem.system import Responses, build
 from validate.pipeline.bodies.own_body import own_body, with_law
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.run.job import Job, job_of, study_folder
@@ -119,7 +119,7 @@ def open_bench(job: Job) -> GainBench:
     own = own_body(job.experiment())
     inputs = own.seen.inputs
     largest = inputs[int(np.argmax(np.abs(inputs).sum(axis=1)))]
-    return GainBench(responses(build(with_law(own.scene, "linear"))), np.asarray(largest))
+    return GainBench(Responses.of(build(with_law(own.scene, "linear"))), np.asarray(largest))
 
 
 def run_cell(bench: GainBench, cell: GainCell) -> GainLimit:

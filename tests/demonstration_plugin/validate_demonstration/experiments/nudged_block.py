@@ -13,7 +13,7 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
-from validate.pipeline.run.method_run import Truth, truth_of
+from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.register.scene_registration import follow_signal
@@ -69,7 +69,7 @@ def record(tree: Tree, progress: Progress) -> Recording:
 
 def truth(tree: Tree, seen: Registered) -> Truth:
     twin = twin_of(tree)
-    return truth_of(twin.run(output_frames(tree.settings.clock.steps, 200)), twin.scene)
+    return Truth.of(twin.run(output_frames(tree.settings.clock.steps, 200)), twin.scene)
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
