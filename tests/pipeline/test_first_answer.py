@@ -122,8 +122,8 @@ def test_a_large_mesh_file_is_filled_anew_coarser_and_refine_takes_its_own(
 
 @pytest.mark.slow
 def test_a_file_that_cannot_be_halved_has_a_coarser_mesh_for_its_bound(tmp_path: Path) -> None:
-    declared(tmp_path, grid(SIZE, (18, 18, 18)))
-    own = ("--set", "seen.states=6", "--set", "body.halvings=0")
+    declared(tmp_path, grid(SIZE, (12, 12, 12)))
+    own = ("--set", "seen.states=3", "--set", "body.halvings=0")
     code, said = called("run", "mine", "--methods", "linear,solid", *own)
     assert code == 1
     assert "no bound" not in said
