@@ -120,4 +120,5 @@ def test_errors_and_verdicts_are_todays(
         every = set(one.methods) == set(load(one.name).methods)
         result: Result = whole(one.name) if every else table.run(one)
         today = [row[:-2] for row in table.rows_of(one, result)]
-        assert [row[:-2] for row in printed if row[0] == f"`{one.name}`"] == today
+        rows = [row[:-2] for row in printed if row[0] == f"`{one.name}`"]
+        assert sorted(rows) == sorted(today)  # a shared run has the methods in its own order

@@ -34,6 +34,7 @@ README = ["validate", "run", "fluid_phantom"]  # its first command, which `.ci/r
 # Words after those of an example: the same command, of fewer methods and seeds, or in this process.
 FEWER = {"run": ("--methods", "fem,kf_reduced"),
          "study tradeoff": ("--workers", "0"), "study choose": ("--workers", "0"),
+         "study stability": ("--workers", "0"), "study": ("--workers", "0"),
          "study filters": ("--methods", "kf_load", "--seeds", "2")}  # fmt: skip
 FAILS = {"study coverage": 1, "identify": 1}  # ten draws decide nothing; one law is not identified
 
