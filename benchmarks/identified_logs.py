@@ -2,7 +2,7 @@
 
 python benchmarks/identified_logs.py [COUNT] [--curve docs/pictures/law_detection.svg]
 
-COUNT is 200 logs; the slow test takes 40.
+COUNT is 200 logs; the slow test takes 20.
 
 A log is a function of its seed: law and contact, aspect ratio, Poisson ratio, sizes, share of
 friction, scale of the load cell, noise (white, or remembering .7 of its last sample), contact

@@ -158,7 +158,7 @@ def phantom_result(phantom: Experiment) -> Result:
 
 @pytest.fixture(scope="session")
 def whole(project_root: Path) -> Callable[[str], Result]:
-    """A whole experiment over time, as `validate run` compares it: minutes, once a session."""
+    """A whole experiment, as `validate run` compares it: minutes, once a session."""
 
     @cache
     def run(name: str) -> Result:

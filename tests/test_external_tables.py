@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -109,13 +110,15 @@ def test_a_label_names_the_nodes_that_are_solved(
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco absent: the extra 'peers' has it")
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx absent: apt-get calculix-ccx")
 def test_errors_and_verdicts_are_todays(
-    project_root: Path, shared_data: Path, table: ModuleType
+    project_root: Path, shared_data: Path, table: ModuleType, whole: Callable[[str], Result]
 ) -> None:
     """Of all but the beam under its mass: all but the last two columns, which are timings."""
     head, _, *printed = cells(project_root, table)
     assert tuple(head) == table.HEAD
     shown = [one for one in table.judged() if not one.values and one.name != "silicone_beam"]
     for one in shown:
-        result: Result = table.run(one)
+        every = set(one.methods) == set(load(one.name).methods)
+        result: Result = whole(one.name) if every else table.run(one)
         today = [row[:-2] for row in table.rows_of(one, result)]
-        assert [row[:-2] for row in printed if row[0] == f"`{one.name}`"] == today
+        rows = [row[:-2] for row in printed if row[0] == f"`{one.name}`"]
+        assert sorted(rows) == sorted(today)  # a shared run has the methods in its own order

@@ -13,12 +13,16 @@ from command_line import here
 from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 
+from validate.commands import check as checking
 from validate.commands.help import SECTIONS, command_at, every_command
 from validate.commands.main import cli
+from validate.pipeline.ladder import default as ladder
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import pose_signals
 from validate.recording.types import Recording, Signal, Source
+
+# private: _QUICK_UNKNOWNS: replaced by a small number: a short test.
 
 PAGES = (
     dict(every_command(cli)) | {n: command_at(cli, n) for n in ("study", "external")} | {"": cli}
@@ -27,6 +31,11 @@ TIP = np.array([0.108, 0.008, 0.003])
 SLOW = ("study", "run", "check", "identify", "show", "compare", "history", "summary", "export",
         "report", "open", "external", "live", "data get")  # fmt: skip
 README = ["validate", "run", "fluid_phantom"]  # its first command, which `.ci/run` executes
+# Words after those of an example: the same command, of fewer methods and seeds, or in this process.
+FEWER = {"run": ("--methods", "fem,kf_reduced"),
+         "study tradeoff": ("--workers", "0"), "study choose": ("--workers", "0"),
+         "study stability": ("--workers", "0"), "study": ("--workers", "0"),
+         "study filters": ("--methods", "kf_load", "--seeds", "2")}  # fmt: skip
 FAILS = {"study coverage": 1, "identify": 1}  # ten draws decide nothing; one law is not identified
 
 
@@ -58,13 +67,19 @@ def test_a_help_page_has_few_words_and_an_example(name: str) -> None:
                 *([pytest.mark.slow] if n.startswith(SLOW) or not n else []),
                 # Half of the time: studies share cells, and no other example reads them.
                 *([pytest.mark.xdist_group("examples of studies")] if "study" in n else []),
+                # The whole run that it checks is that of the experiment's own tests.
+                *([pytest.mark.xdist_group("whole")] if n == "check" else []),
             ],
         )
         for n in PAGES
     ],
 )
 def test_the_example_of_a_help_page_runs(
-    name: str, lab: Path, project_root: Path, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    lab: Path,
+    project_root: Path,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if name == "external check":
         script = project_root / "benchmarks" / "external" / "felupe_simulator.py"
@@ -72,12 +87,17 @@ def test_the_example_of_a_help_page_runs(
     if name == "summary":  # of measured recordings, and of whole runs only
         assert here("new", "pressed", "--from", "log.mcap", cwd=lab)[0] == 0
         assert here("run", "pressed", cwd=lab)[0] in (0, 1)
+    if name == "check":
+        whole = request.getfixturevalue("whole")
+        monkeypatch.setattr(checking, "compare", lambda found, *_, **__: whole(found.name))
+    if name in ("study tradeoff", "study choose"):
+        monkeypatch.setattr(ladder, "_QUICK_UNKNOWNS", 1000)
     monkeypatch.setattr("webbrowser.open", lambda address: True)  # no window on the tester's screen
     if name in ("show", "compare", "export", "history", "report", "open"):
         for experiment in ("kf_cube", "kf_cube_inertia"):
             stored(experiment, lab)
     for _, *words in (e for e in examples(name) if e != README):
-        done, out, err = here(*words, cwd=lab)
+        done, out, err = here(*words, *FEWER.get(name, ()), cwd=lab)
         if done == 2 and "validate data get" in err:
             pytest.skip("real data absent")
         assert done == FAILS.get(name, 0), (out, err)

@@ -91,7 +91,7 @@ def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
     motion = np.abs(converged).max()  # the compared markers were recorded at rest
     assert motion > 2e-3
     assert np.abs(mine - converged).max() < 0.01 * motion
-    for check in run_in_memory(made).checks:
+    for check in run_in_memory(made, methods=made.accepted).checks:
         assert 2 * check.u_val < 0.1 * motion, check
 
 

@@ -1,5 +1,7 @@
 """The bending rod: the beam beside it, and all its claims (slow)."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -52,8 +54,8 @@ def test_the_first_crossing_lies_between_two_steps() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_all_claims_stand(experiment: Experiment) -> None:
-    result = run_in_memory(experiment)
+def test_all_claims_stand(whole: Callable[[str], Result]) -> None:
+    result = whole("bending_rod")
     assert result.passed
     assert [(p.name, p.fault) for p in result.published if p.fault] == []
     assert len(result.published) == 23

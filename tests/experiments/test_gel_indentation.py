@@ -1,12 +1,14 @@
 """Pairs of particle clouds in general, and the public one: what is predicted, to which error."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from beside import beside, experiment
+from few_starts import from_few_starts
 from scipy.io import savemat
 
 from experiments.gel_indentation import box as box_module
@@ -135,7 +137,13 @@ def test_the_upper_box_is_predicted_by_the_lower_one(
     # The links are checked on a smaller pair: on this one it takes a sixth of the time.
     none = NumberTable("links", "Links", ("z (µm)",), ())
     monkeypatch.setattr(beside("gel_indentation", "exhibits"), "checked_links", lambda *_: none)
-    result = compare(experiment("gel_indentation"), Options({}))
+    shipped = experiment("gel_indentation")
+    some = {name: shipped.methods[name] for name in ("linear", "laplace")}
+    assert shipped.exhibits is not None
+    shown = partial(shipped.exhibits, methods=some)
+    fewer = replace(shipped, methods=some, accepted=("linear",), exhibits=shown)
+    result = compare(fewer, Options({}), identify=from_few_starts)
+    assert result.as_expected  # two axes undecided, one good enough
     (nu,) = (s for s in result.identified if s.name == "material.nu")
     assert 0.44 < nu.value < 0.49
     lower = {s.name: s.value for s in result.identified}

@@ -7,14 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from beside import beside, experiment
+from few_starts import from_few_starts
 
 from validate.arrays import Floats
 from validate.commands.main import run
 from validate.errors import RecordingError, UsageError
 from validate.parameters import with_values
-from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree, mesh_of
 from validate.pipeline.run.case_solution import solve
+from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.scene.mesh import Mesh
@@ -237,7 +239,8 @@ def test_the_data_set_is_paired_whole(shared_data: Path) -> None:
 def test_a_linear_law_fitted_to_4_mm_differs_at_8_mm(shared_data: Path) -> None:
     """Skin stiffens: what was fitted is no evidence, what was predicted lies far below."""
     values = {"data": str(shared_data / "force" / "skin-pads"), "body.cells": "1"}
-    result = run_in_memory(EXPERIMENT, values, methods=("linear",), quick=True)
+    asked = Options(values, ("linear",), quick=True)
+    result = compare(EXPERIMENT, asked, identify=from_few_starts)
     (linear,) = result.methods
     verdicts = {c.name: c.verdict for c in linear.checks}
     assert verdicts["force.max@predicted"] == "not good enough"

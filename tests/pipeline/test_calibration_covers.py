@@ -1,4 +1,4 @@
-"""Intervals of a modulus and a Poisson ratio of a finite-element body, over 200 whole twins."""
+"""Intervals of a modulus and a Poisson ratio of a finite-element body, over 60 whole twins."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -61,18 +61,22 @@ def recorded(true: Scene, run: Run, seed: int) -> Recording:
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_truth_of_two_hundred_twins_of_a_body() -> None:
-    """Force on the stage and a marker's motion; 190 and 194 of 200."""
+def test_intervals_hold_the_truth_of_sixty_twins_of_a_body() -> None:
+    """Force on the stage and a marker's motion; 190 and 194 of 200 in an earlier run.
+
+    95 % of 60 are 57 with a standard deviation of 1.7: 54 or fewer have a probability of 8 %.
+    Intervals of half the width would hold 40, of twice the width 60.
+    """
     (shipped,) = OPEN.load(OPENED, Path())
     true = OPEN.build(shipped, known(E=TRUTH[0], nu=TRUTH[1]), None)
     assert isinstance(true, Scene)
     run, held = moved(true), np.zeros(2)
     first = recorded(true, run, 0)
     problem = problem_of(BOTH, 0, (E, NU), BOTH.parameters, BOTH.methods, (first,))
-    for seed in range(200):
+    for seed in range(60):
         part = replace(problem.parts[0], recordings=(recorded(true, run, seed),))
         drawn = replace(problem, parts=(part,))
         found = identify(drawn.space, InTurn(drawn.residual), starts=1)
         held += [e.low <= v <= e.high for e, v in zip(found.estimates, TRUTH, strict=True)]
-    assert (held >= 0.92 * 200).all()
-    assert (held <= 0.98 * 200).all()
+    assert (held >= 54).all()
+    assert (held < 60).all()

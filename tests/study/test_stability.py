@@ -444,10 +444,18 @@ def test_bodies_too_large_are_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(2400)
-@pytest.mark.parametrize("name", MAPPED)
-def test_all_predictions_hold_on_the_map(name: str, tmp_path: Path) -> None:
-    """One scene in full, the others in their quick form: four full maps take twenty minutes."""
-    found = stability(mapped(name), quick=name != "needle_block", out=tmp_path)
+@pytest.mark.parametrize("name", ["bending_rod", "ekf_cube", "needle_block"])
+def test_all_predictions_hold_on_the_map(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third of one scene's full map, the others in their quick form: four full maps take twenty
+    minutes. That of `kf_cube` is the example of the command's help page, which runs, too."""
+    whole = name == "needle_block"
+    if whole:
+        planned = stability_cells(body(name), JOB)
+        third = tuple(c for i, c in enumerate(planned) if i % 3 == 0 or c.expected or c.drift)
+        monkeypatch.setattr(stability_module, "stability_cells", lambda *_: third)
+    found = stability(mapped(name), quick=not whole, out=tmp_path)
     assert found is not None
     assert [p.name for p in found.predictions if not p.holds] == []
-    assert found.points > (20_000 if name == "needle_block" else 500)
+    assert found.points > (7_000 if whole else 500)
