@@ -12,6 +12,7 @@ import io
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import warnings
@@ -29,6 +30,8 @@ os.environ.setdefault("VALIDATE_WORKERS", "1")  # of `run`: the tests themselves
 
 from collections.abc import Callable, Generator, Iterator
 from functools import cache
+from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -57,8 +60,12 @@ FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tre
 # The same examples each time, and no test judges the time that it takes.
 settings.register_profile("validate", deadline=None, derandomize=True)
 settings.load_profile("validate")
-BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
+BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study",  # no figure is read
+         "test_browser.py", "test_exhibits.py", "test_history.py", "test_long_table.py",
+         "test_page.py", "test_page_data.py", "test_paraview.py", "test_printed_figures.py",
+         "test_store.py", "test_views.py", "test_write.py")  # fmt: skip
 _DRAW = Figure.draw
+_NUMBERS = count()  # of folders
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -93,11 +100,34 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _machine_stays() -> Iterator[None]:
+    """Files of tests need not outlive a loss of power, and packages stay as they are installed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        patch.setattr("validate.report.stored.environment.version", cache(version))
+        yield
+
+
+@pytest.fixture
+def tmp_path(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """A folder of a test's own, removed where the test passes. That of pytest looks at the folders
+    of all tests before it, and keeps all for the next run to remove."""
+    before = request.session.testsfailed
+    path = tmp_path_factory.getbasetemp() / f"{request.node.originalname[:30]}_{next(_NUMBERS)}"
+    path.mkdir()
+    yield path
+    if request.session.testsfailed == before:
+        shutil.rmtree(path, ignore_errors=True)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Figures are composed, but not drawn, in folders where no test reads one."""
+    """Figures are composed, but not drawn, in folders and files where no test reads one."""
     with pytest.MonkeyPatch.context() as patch:
-        if request.path.parent.name in BLANK:
+        if {request.path.parent.name, request.path.name} & set(BLANK):
             patch.setattr(Figure, "draw", lambda figure, renderer: None)
             patch.setenv("VALIDATE_NO_GL", "1")
         yield
