@@ -97,15 +97,6 @@ def test_verdicts_of_a_new_experiment_are_covered(tmp_path: Path) -> None:
     assert code in (0, 1)
 
 
-def test_the_notes_of_a_pulled_body_speak_of_grips(tmp_path: Path) -> None:
-    pressed = log(**SIZES, test="tension")
-    pulled = {n: replace(s, y=-s.y) for n, s in pressed.signals.items()}
-    write_recording(replace(pressed, signals=pulled), tmp_path / "gel.mcap")
-    in_folder(tmp_path, "new", "b", "--from", "gel.mcap")
-    result = run_in_memory(load_file(tmp_path / "experiments" / "b.py"))
-    assert any("by bonded for grips" in note for note in result.notes)
-
-
 def test_sizes_that_nobody_measured_are_asked_for_by_line(tmp_path: Path) -> None:
     write_recording(log(), tmp_path / "gel.mcap")
     assert in_folder(tmp_path, "new", "bare", "--from", "gel.mcap")[0] == 0
@@ -277,6 +268,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     mine = load_file(tmp_path / "experiments" / "strip.py")
     result = run_in_memory(mine)
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
+    assert any("by bonded for grips" in note for note in result.notes)
     found = {p.path: p.default for p in result.parameters}
     assert found["material.E"] == pytest.approx(E, rel=0.02)
     (slip,) = [m for m in result.methods if m.name == "slip"]

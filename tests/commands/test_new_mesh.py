@@ -84,6 +84,8 @@ def test_the_sizes_of_a_mesh_are_not_asked(folder: Path, mesh: Mapping[str, Any]
     used = pressed_size(opened(mine, mine.parameters).parameters, folder / "experiments")
     assert used.diameter == pytest.approx(SIZES["body.diameter"], rel=1e-5)
     assert used.height == pytest.approx(SIZES["body.height"], rel=1e-5)
+    if "body.unit" not in mesh:  # the same body: one runs
+        return
     code, out, err = here("run", "mine", "--quick", "--methods", "slip")
     assert code == 0, err
     assert "1 of 1 requirements are met" in " ".join(out.split())
