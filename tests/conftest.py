@@ -58,7 +58,7 @@ LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do 
 # Groups that take minutes begin first: a short one ends each process.
 FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree")
 # The same examples each time, and no test judges the time that it takes.
-settings.register_profile("validate", deadline=None, derandomize=True)
+settings.register_profile("validate", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("validate")
 BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study",  # no figure is read
          "test_browser.py", "test_exhibits.py", "test_history.py", "test_long_table.py",
