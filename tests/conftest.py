@@ -42,6 +42,7 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 
 import pytest
 from hypothesis import settings
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from validate.compare.result import Result
@@ -152,6 +153,15 @@ def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(module, "_ended", ended)
     monkeypatch.setattr(module, "resource", free)
+
+
+@pytest.fixture
+def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are not even composed, which is half of a small run: for tests that write reports
+    again and again."""
+    figure = Figure(figsize=(0.1, 0.1))
+    FigureCanvasAgg(figure).draw()
+    monkeypatch.setattr("validate.report.charts.style.painted", lambda *_, **__: figure)
 
 
 @pytest.fixture

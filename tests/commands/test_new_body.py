@@ -24,6 +24,8 @@ from validate.recording.types import Contours, Frames, Markers, Recording, Signa
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh_files.mesh_file import write_mesh
 
+pytestmark = pytest.mark.usefixtures("one_picture")
+
 E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
 T = np.linspace(0.0, 4.0, 81)
 SHARE = np.clip((T - 0.5) / 3.0, 0, 1)

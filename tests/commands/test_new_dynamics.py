@@ -210,7 +210,7 @@ def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
 
 @pytest.mark.parametrize(("law", "names"), [
     ("linear", "implicit,ensemble_kf,filterpy,modal"),
-    ("neo_hooke", "large,static,modal"),
+    pytest.param("neo_hooke", "large,static,modal", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_methods_are_chosen(here: Path, law: str, names: str) -> None:
     """Each runs; its markers are within a millimetre, of a motion of 3.9 mm."""

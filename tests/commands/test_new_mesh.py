@@ -23,6 +23,8 @@ from validate.scene.mesh_files.mesh_file import write_mesh
 
 # private: _FIRST: replaced by a small number: a short test.
 
+pytestmark = pytest.mark.usefixtures("one_picture")
+
 SIDES, E = (0.06, 0.045, 0.07), 20e3
 ANSWERS = {"test": "compression", "accept.force": "0.1N", "why.force": "felt"}
 SIZES = {

@@ -280,6 +280,7 @@ def test_a_quarter_shows_its_force_alone(tmp_path: Path) -> None:
         run_in_memory(experiment(tmp_path, p))
 
 
+@pytest.mark.slow
 def test_hertz_on_a_large_block() -> None:
     """F = 4/3 E* sqrt(R) d^(3/2) on the mesh that an indenter gets: three cells a radius."""
     R, a, nu = 1.0, 0.01, 0.3

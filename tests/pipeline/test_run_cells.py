@@ -14,8 +14,6 @@ from typing import Any
 import pytest
 from beside import experiment
 from command_line import here
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from study_samples import TEXT
 from test_external_methods import FAKE
 
@@ -27,7 +25,6 @@ from validate.pipeline.calibration.calibrated import middle
 from validate.pipeline.checks.checks import variants_of
 from validate.pipeline.experiment.declaration import decoded, encoded
 from validate.pipeline.run.runs import ExperimentRuns
-from validate.report.charts import style
 from validate.report.export.table_file import stored_table
 
 # private: _PATIENCE, _WORTH: replaced by a small number: a short test.
@@ -37,12 +34,7 @@ NAMES = sorted(experiment_files(shipped().parent))
 STORED = re.compile(r"(\d+) of (\d+) computations were stored")
 
 
-@pytest.fixture(autouse=True)
-def _one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports are written again and again: half of their time goes into pictures."""
-    figure = Figure(figsize=(0.1, 0.1))
-    FigureCanvasAgg(figure).draw()
-    monkeypatch.setattr(style, "painted", lambda *_, **__: figure)
+pytestmark = pytest.mark.usefixtures("one_picture")
 
 
 @pytest.mark.parametrize("name", NAMES)

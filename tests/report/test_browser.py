@@ -667,6 +667,7 @@ def failing() -> Result:
     return replace(result, methods=(replace(result.methods[0], checks=(bad,)), result.methods[1]))
 
 
+@pytest.mark.slow
 def test_screenshot(browser: str, report: Path, tmp_path: Path) -> None:
     shot = tmp_path / "shot.png"
     run(browser, report, tmp_path / "profile", "--window-size=1280,900", f"--screenshot={shot}")
