@@ -25,7 +25,7 @@ PAGES = (
 )
 TIP = np.array([0.108, 0.008, 0.003])
 SLOW = ("study", "run", "check", "identify", "show", "compare", "history", "summary", "export",
-        "report", "open", "external", "live", "data get")  # fmt: skip
+        "report", "open", "external", "live", "data get", "body")  # fmt: skip
 README = ["validate", "run", "fluid_phantom"]  # its first command, which `.ci/run` executes
 FAILS = {"study coverage": 1, "identify": 1}  # ten draws decide nothing; one law is not identified
 

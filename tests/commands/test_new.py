@@ -71,7 +71,7 @@ def test_a_force_log_becomes_an_experiment_that_runs(tmp_path: Path) -> None:
     paths = {p["path"]: p["default"] for p in json.loads(listed)["parameters"]}
     assert (paths["body.diameter"], paths["body.height"]) == (DIAMETER, HEIGHT)
     own = load_file(tmp_path / "experiments" / "my_gel.py")
-    result = run_in_memory(own)
+    result = run_in_memory(own, {"body.cells": "4,3"})
     assert [(c.name, c.verdict) for c in result.checks] == [
         ("force.max@fit", "fitted"), ("force.max@beyond", "good enough"),
     ]  # fmt: skip
@@ -266,7 +266,7 @@ def test_a_test_in_tension_becomes_an_experiment_that_pulls(tmp_path: Path) -> N
     assert 'drives=(Drive("stage", "upper_plate", "+z"),),  # tension, recorded' in text
     assert 'Method("linear, gripped ends", NoFluid(), BONDED_PLATES)' in text
     mine = load_file(tmp_path / "experiments" / "strip.py")
-    result = run_in_memory(mine)
+    result = run_in_memory(mine, {"body.cells": "4,3"})
     assert [c.verdict for c in result.checks] == ["fitted", "good enough"]
     assert any("by bonded for grips" in note for note in result.notes)
     found = {p.path: p.default for p in result.parameters}

@@ -1,6 +1,5 @@
 """What a mesh file of a specimen holds is not asked again, by `validate new` or a run."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,8 @@ from command_line import here, refused
 
 from validate.commands.questions import new
 from validate.commands.questions.scene import answered_mesh
+from validate.pipeline import run_in_memory
+from validate.pipeline.experiment.experiment import Uncertainty
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.origins import opened
 from validate.pipeline.plates.scene import pressed_size
@@ -103,14 +104,13 @@ def test_a_run_takes_the_sizes_from_the_mesh_that_it_is_given(folder: Path) -> N
     write_mesh(block(sides=(0.03, 0.045, 0.07)), folder / "block.npz")
     answers(folder, **{"body.file": "block.npz"})
     assert here("new", "mine", "--from", "log.mcap", "--answers", "a.toml", "--force")[0] == 0
-    quick = ("run", "mine", "--quick", "--methods", "slip")
+    mine = replace(
+        load_file(folder / "experiments" / "mine.py"), uncertainty=Uncertainty(surrogate="slip")
+    )
     moduli = []
-    for mesh in ((), ("--set", "body.file=../other.npz")):
-        code, _, err = here(*quick, *mesh, "--out", f"out{len(mesh)}")
-        assert code == 0, err
-        (found,) = (folder / f"out{len(mesh)}").rglob("results.json")
-        stored = json.loads(found.read_text("utf-8"))["parameters"]
-        moduli.append(stored["material.E"]["value"])
+    for mesh in ({}, {"body.file": "../other.npz"}):
+        found = run_in_memory(mine, mesh, methods=("slip",), quick=True).parameters
+        moduli.append(next(p.default for p in found if p.path == "material.E"))
     assert moduli[0] == pytest.approx(2 * moduli[1], rel=1e-3)  # half the area
 
 
