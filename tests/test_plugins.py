@@ -122,9 +122,52 @@ def package(folder: Path, name: str, points: str, module: str = "") -> None:
     (folder / f"{name}.py").write_text(module)
 
 
-def test_an_installed_package_is_listed_with_its_version(site: Path, tmp_path: Path) -> None:
-    commands = ("list --plugins --json", "list --plugins", "list")
-    ((code, out, err), table, experiments), _ = each(*commands, site=site, cwd=tmp_path)
+DECLARED = """
+import json
+from pathlib import Path
+from validate.pipeline.experiment.declaration import classes, from_json, to_json
+from validate.pipeline.experiment.find import find, load_file
+from validate.pipeline.run.cached_runs import plug_ins_used
+experiment = find("nudged_block", Path.cwd())
+methods = json.loads(to_json(experiment))["experiment"]["methods"]["items"]
+print(methods["nudged"]["settings"], methods["gent"]["scene"]["items"])
+again = from_json(to_json(experiment), experiment.path, experiment)
+assert again.methods["nudged"] == experiment.methods["nudged"]
+assert {"Nudging", "GentCoefficients", "KfFem"} <= classes().keys()
+assert [len(plug_ins_used(m)) for m in experiment.methods.values()] == [0, 1, 1]
+print(*plug_ins_used({"law": "gent"}, {"law": "neo_hooke"}))
+for name in ("plates", "body"):
+    material = load_file(Path(f"experiments/{name}.py")).parameters.scene.material
+    print(type(material.coefficients).__name__, material.coefficients.J_m)
+"""
+Told = tuple[list[tuple[int, str, str]], str]
+
+
+@pytest.fixture(scope="module")
+def told(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Told:
+    """What the installed package changes, asked of one process."""
+    folder = tmp_path_factory.mktemp("installed")
+    (folder / "pull.gauge").write_text(LOG)
+    t = np.arange(200) / 10
+    log = [f"{a:g},{8e-2 * a:.5g},{0.056 * a:.5g}" for a in t]
+    (folder / "log.csv").write_text("\n".join(["Time (s),Position (mm),Load (N)", *log]))
+    imported = ("import", "log.csv", "--map", "test=compression", "-o", "log.mcap")
+    code, _, err = here(*imported, cwd=folder)
+    assert code == 0, err
+    kinds = {"plates": PLATES, "body": BODY}
+    for kind, answers in kinds.items():
+        text = f'law = "gent"\nmaterial.J_m = "2.5"\n{answers}'
+        (folder / f"{kind}.toml").write_text(text, "utf-8")
+    commands = (
+        "list --plugins --json", "list --plugins", "list", "inspect pull.gauge --map unit=mN",
+        "inspect pull.gauge --map unti=mN",
+        *(f"new {kind} --from log.mcap --answers {kind}.toml" for kind in kinds),
+    )  # fmt: skip
+    return each(*commands, site=site, cwd=folder, then=DECLARED)
+
+
+def test_an_installed_package_is_listed_with_its_version(told: Told) -> None:
+    (code, out, err), table, experiments = told[0][:3]
     assert (code, err) == (0, "")
     listed = [(p["kind"], p["name"], p["package"], p["version"], p["left_out"])
               for p in json.loads(out)]  # fmt: skip
@@ -137,10 +180,8 @@ def test_an_installed_package_is_listed_with_its_version(site: Path, tmp_path: P
     assert "nudged_block" in experiments[1]
 
 
-def test_its_format_is_read(site: Path, tmp_path: Path) -> None:
-    (tmp_path / "pull.gauge").write_text(LOG)
-    commands = (f"inspect pull.gauge --map {key}=mN" for key in ("unit", "unti"))
-    ((code, out, err), (wrong, _, why)), _ = each(*commands, site=site, cwd=tmp_path)
+def test_its_format_is_read(told: Told) -> None:
+    (code, out, err), (wrong, _, why) = told[0][3:5]
     assert (code, err) == (0, "")
     assert "read as gauge (log of a force gauge), because its first line is '# gauge'" in out
     assert "'force' changes most, 29.0 N peak to peak" in out
@@ -150,27 +191,16 @@ def test_its_format_is_read(site: Path, tmp_path: Path) -> None:
     assert why == "validate: --map unti=...: no such key; did you mean 'unit'? known: unit\n"
 
 
-def test_a_declaration_names_its_law_and_filter(site: Path, tmp_path: Path) -> None:
-    script = """
-import json
-from pathlib import Path
-from validate.pipeline.experiment.declaration import classes, from_json, to_json
-from validate.pipeline.experiment.find import find
-from validate.pipeline.run.cached_runs import plug_ins_used
-experiment = find("nudged_block", Path.cwd())
-methods = json.loads(to_json(experiment))["experiment"]["methods"]["items"]
-print(methods["nudged"]["settings"], methods["gent"]["scene"]["items"])
-again = from_json(to_json(experiment), experiment.path, experiment)
-assert again.methods["nudged"] == experiment.methods["nudged"]
-assert {"Nudging", "GentCoefficients", "KfFem"} <= classes().keys()
-assert [len(plug_ins_used(m)) for m in experiment.methods.values()] == [0, 1, 1]
-print(*plug_ins_used({"law": "gent"}, {"law": "neo_hooke"}))
-"""
-    done = python("-c", script, site=site, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "{'type': 'Nudging'}" in done.stdout
-    assert "{'type': 'GentCoefficients', 'J_m': 30.0}" in done.stdout
-    assert done.stdout.splitlines()[-1] == f"validate-demonstration {VERSION}"
+def test_a_declaration_names_its_law_and_filter(told: Told) -> None:
+    first, second, *_ = told[1].splitlines()
+    assert "{'type': 'Nudging'}" in first
+    assert "{'type': 'GentCoefficients', 'J_m': 30.0}" in first
+    assert second == f"validate-demonstration {VERSION}"
+
+
+def test_a_new_experiment_has_its_law_with_its_coefficients(told: Told) -> None:
+    assert [code for code, _, _ in told[0][5:]] == [0, 0], told[0][5:]
+    assert told[1].splitlines()[2:] == 2 * ["GentCoefficients 2.5"]
 
 
 def test_a_law_of_a_plug_in_is_solved_or_refused_in_one_line(further_law: LawKind) -> None:
@@ -336,30 +366,6 @@ READER = Reader("gauge", "a gauge", lambda p: p.suffix == ".gauge", read, "its e
     code, out, err = called("inspect", "pull.gauge", site=tmp_path / "site", cwd=tmp_path)
     assert (code, err) == (0, "")
     assert "force" in out
-
-
-def test_a_new_experiment_has_its_law_with_its_coefficients(site: Path, tmp_path: Path) -> None:
-    t = np.arange(200) / 10
-    log = [f"{a:g},{8e-2 * a:.5g},{0.056 * a:.5g}" for a in t]
-    (tmp_path / "log.csv").write_text("\n".join(["Time (s),Position (mm),Load (N)", *log]))
-    imported = ("import", "log.csv", "--map", "test=compression", "-o", "log.mcap")
-    code, _, err = here(*imported, cwd=tmp_path)
-    assert code == 0, err
-    kinds = {"plates": PLATES, "body": BODY}
-    for kind, answers in kinds.items():
-        text = f'law = "gent"\nmaterial.J_m = "2.5"\n{answers}'
-        (tmp_path / f"{kind}.toml").write_text(text, "utf-8")
-    script = """
-from validate.pipeline.experiment.find import load_file
-from pathlib import Path
-for name in ("plates", "body"):
-    material = load_file(Path(f"experiments/{name}.py")).parameters.scene.material
-    print(type(material.coefficients).__name__, material.coefficients.J_m)
-"""
-    commands = (f"new {kind} --from log.mcap --answers {kind}.toml" for kind in kinds)
-    made, printed = each(*commands, site=site, cwd=tmp_path, then=script)
-    assert [code for code, _, _ in made] == [0, 0], made
-    assert printed.split() == 2 * ["GentCoefficients", "2.5"]
 
 
 def test_an_experiment_whose_name_is_taken_is_told_of(tmp_path: Path) -> None:
