@@ -57,7 +57,8 @@ from validate.recording.formats import subprocess_decoder
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 # Groups that take minutes begin first: a short one ends each process.
-FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree")
+FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree",
+         "test_plugins.py")  # fmt: skip
 # The same examples each time, and no test judges the time that it takes.
 settings.register_profile("validate", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("validate")

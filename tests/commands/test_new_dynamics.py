@@ -180,6 +180,7 @@ def test_filters_of_an_outline_are_ranked_at_the_marker(
     assert not ranking.failed
 
 
+@pytest.mark.slow
 def test_of_three_markers_filters_are_given_two_and_each_is_held_out(
     unchanged: Callable[[str], Unchanged], tmp_path: Path
 ) -> None:

@@ -95,6 +95,7 @@ def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
         assert 2 * check.u_val < 0.1 * motion, check
 
 
+@pytest.mark.slow
 def test_refine_sets_all_load_steps_and_no_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
