@@ -2,10 +2,15 @@
 
 import pickle
 from collections.abc import Iterator
+from hashlib import sha256
+from typing import Any
 
 import pytest
 
+from validate.arrays import Floats
 from validate.commands.questions import motion, new
+from validate.fem import modes
+from validate.fem.modes import lowest
 from validate.pipeline.bodies.first_modes import COUNT, first_frequencies
 from validate.pipeline.bodies.own_body import with_law
 from validate.scene.scene import Scene
@@ -16,6 +21,7 @@ STIFF = (  # nothing moves fast
     "test_new_mesh.py",
 )  # fmt: skip
 _FOUND: dict[bytes, tuple[float, ...]] = {}
+_MODES: dict[tuple[bytes, int], tuple[Floats, Floats]] = {}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -31,7 +37,15 @@ def _same_bodies_once(request: pytest.FixtureRequest) -> Iterator[None]:
             _FOUND[body] = first_frequencies(scene, count)
         return _FOUND[body]
 
+    def lowest_once(K: Any, M: Any, count: int) -> tuple[Floats, Floats]:
+        matrices = sha256(pickle.dumps((K.data, K.indices, M.data))).digest()
+        if (matrices, count) not in _MODES:
+            _MODES[matrices, count] = lowest(K, M, count)
+        squares, shapes = _MODES[matrices, count]
+        return squares.copy(), shapes.copy()
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(modes, "lowest", lowest_once)
         patch.setattr(motion, "first_frequencies", once)
         if request.path.name not in ESTIMATED:
             patch.setattr(new, "estimated", lambda path: None)
