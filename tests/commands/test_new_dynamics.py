@@ -209,9 +209,10 @@ def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
     assert (code, "no marker end; there are tip, middle, side" in said) == (2, True), said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "names"), [
     ("linear", "implicit,ensemble_kf,filterpy,modal"),
-    pytest.param("neo_hooke", "large,static,modal", marks=pytest.mark.slow),
+    ("neo_hooke", "large,static,modal"),
 ])  # fmt: skip
 def test_methods_are_chosen(here: Path, law: str, names: str) -> None:
     """Each runs; its markers are within a millimetre, of a motion of 3.9 mm."""
@@ -243,6 +244,7 @@ def test_filters_of_a_mesh_file_run(here: Path, law: str, names: str, damping: s
     )  # fmt: skip
     assert code == 0, said
     mine = experiment(here)
+    assert set(mine.methods) == set(names.split(","))
     short = replace(mine, parameters=with_given(mine.parameters, {"motion.length": 0.05}))
     for name in names.split(","):
         assert run(short, name).run.finished, name

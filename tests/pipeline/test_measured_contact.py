@@ -198,6 +198,7 @@ def test_an_uncertain_gap_moves_no_instant_to_the_other_window(tmp_path: Path) -
     assert windows[0] == windows[1] == [4, 4]
 
 
+@pytest.mark.slow
 def test_a_quarter_has_the_force_of_the_whole(tmp_path: Path) -> None:
     """A tip a little off the middle presses a whole body, with cells as large."""
     forces = []
