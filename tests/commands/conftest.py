@@ -13,9 +13,9 @@ from validate.fem import modes
 from validate.fem.modes import lowest
 from validate.pipeline.bodies.first_modes import COUNT, first_frequencies
 from validate.pipeline.bodies.own_body import with_law
+from validate.pipeline.run.estimate import estimated
 from validate.scene.scene import Scene
 
-ESTIMATED = ("test_new_mesh.py", "test_new_slender.py")  # they read what a first answer takes
 STIFF = (  # nothing moves fast
     "test_new.py", "test_new_body.py", "test_new_contact.py", "test_new_laws.py",
     "test_new_mesh.py",
@@ -27,7 +27,7 @@ _MODES: dict[tuple[bytes, int], tuple[Floats, Floats]] = {}
 @pytest.fixture(scope="module", autouse=True)
 def _same_bodies_once(request: pytest.FixtureRequest) -> Iterator[None]:
     """A body's modes are a third of a command's time: they are high where nothing moves fast, else
-    found once for one body. How long a first answer takes is estimated where a test reads it."""
+    found once for one body. How long a first answer takes is not estimated."""
 
     def once(scene: Scene, count: int = COUNT) -> tuple[float, ...]:
         if request.path.name in STIFF:
@@ -47,6 +47,11 @@ def _same_bodies_once(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(modes, "lowest", lowest_once)
         patch.setattr(motion, "first_frequencies", once)
-        if request.path.name not in ESTIMATED:
-            patch.setattr(new, "estimated", lambda path: None)
+        patch.setattr(new, "estimated", lambda path: None)
         yield
+
+
+@pytest.fixture
+def estimates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a first answer takes is estimated, for a test that reads it."""
+    monkeypatch.setattr(new, "estimated", estimated)

@@ -150,6 +150,7 @@ def test_a_mesh_file_that_changed_is_read_again(
         assert np.ptp(mesh.nodes[:, 0]) == pytest.approx(side)
 
 
+@pytest.mark.usefixtures("estimates")
 def test_a_large_mesh_file_between_plates_is_filled_anew_coarser_and_refine_takes_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +171,7 @@ def test_a_large_mesh_file_between_plates_is_filled_anew_coarser_and_refine_take
         mine.parameters.given({"body.halvings": 0})))  # fmt: skip
 
 
+@pytest.mark.usefixtures("estimates")
 def test_a_halved_mesh_of_nodal_mean_dilatation_is_as_dear_as_it_is(folder: Path) -> None:
     """Its rows reach two cells far: 82 000 unknowns of an inclusion took minutes of a first answer,
     of which 12 s were estimated. A coarser mesh bounds u_num instead."""
