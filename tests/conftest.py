@@ -34,7 +34,7 @@ from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 ROOT = Path(__file__).resolve().parents[1]
 if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is found by what they test
@@ -42,15 +42,10 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 
 import pytest
 from hypothesis import settings
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from validate.compare.result import Result
-from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.find import find
-from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.pipeline import compare
-from validate.recording.formats import subprocess_decoder
+if TYPE_CHECKING:  # the process that hands tests out would take a second to import what none runs
+    from validate.compare.result import Result
+    from validate.pipeline.experiment.experiment import Experiment
 
 # private: _ended, _decode: the process between them is what `decoded_here` leaves out.
 
@@ -66,7 +61,6 @@ BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study",  #
          "test_browser.py", "test_exhibits.py", "test_history.py", "test_long_table.py",
          "test_page.py", "test_page_data.py", "test_paraview.py", "test_printed_figures.py",
          "test_store.py", "test_views.py", "test_write.py")  # fmt: skip
-_DRAW = Figure.draw
 _NUMBERS = count()  # of folders
 
 
@@ -125,9 +119,20 @@ def tmp_path(
         shutil.rmtree(path, ignore_errors=True)
 
 
+@cache
+def _drawn() -> Any:
+    """How figures are drawn; asked first before they are blank."""
+    from matplotlib.figure import Figure
+
+    return Figure.draw
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
     """Figures are composed, but not drawn, in folders and files where no test reads one."""
+    _drawn()
+    from matplotlib.figure import Figure
+
     with pytest.MonkeyPatch.context() as patch:
         if {request.path.parent.name, request.path.name} & set(BLANK):
             patch.setattr(Figure, "draw", lambda figure, renderer: None)
@@ -143,7 +148,8 @@ def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
     process that decodes a user's files."""
     if request.node.get_closest_marker("own_process"):
         return
-    module = subprocess_decoder
+    from validate.recording.formats import subprocess_decoder as module
+
     free = SimpleNamespace(**{**vars(resource), "setrlimit": lambda *limits: None})
 
     def ended(decoder: str, path: Path, out: Path, given: Any, least: int) -> Any:
@@ -160,6 +166,9 @@ def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not even composed, which is half of a small run: for tests that write reports
     again and again."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(0.1, 0.1))
     FigureCanvasAgg(figure).draw()
     monkeypatch.setattr("validate.report.charts.style.painted", lambda *_, **__: figure)
@@ -168,7 +177,7 @@ def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def drawn_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures as a user has them, for a test that reads one in such a folder."""
-    monkeypatch.setattr(Figure, "draw", _DRAW)
+    monkeypatch.setattr("matplotlib.figure.Figure.draw", _drawn())
     monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
 
 
@@ -187,22 +196,30 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def phantom(project_root: Path) -> Experiment:
+def phantom(project_root: Path) -> "Experiment":
+    from validate.pipeline.experiment.find import find
+
     return find("fluid_phantom", project_root)
 
 
 @pytest.fixture(scope="session")
-def phantom_result(phantom: Experiment) -> Result:
+def phantom_result(phantom: "Experiment") -> "Result":
     """The whole fluid phantom, all methods, as `validate run fluid_phantom` compares it."""
+    from validate.pipeline.experiment.options import Options
+    from validate.pipeline.run.pipeline import compare
+
     return compare(phantom, Options({}))
 
 
 @pytest.fixture(scope="session")
-def whole(project_root: Path) -> Callable[[str], Result]:
+def whole(project_root: Path) -> "Callable[[str], Result]":
     """A whole experiment over time, as `validate run` compares it: minutes, once a session."""
+    from validate.pipeline.experiment.find import find
+    from validate.pipeline.experiment.options import Options
+    from validate.pipeline.run.pipeline import compare
 
     @cache
-    def run(name: str) -> Result:
+    def run(name: str) -> "Result":
         return compare(find(name, project_root), Options({}))
 
     return run
